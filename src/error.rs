@@ -1,0 +1,75 @@
+//! Errors by reader: who can mend it decides the type, and the type decides the exit code.
+
+use std::fmt;
+
+/// One fault with the place where it is: `stages[2].with.cycles`, `controller.csv:17`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    pub place: String,
+    pub message: String,
+}
+
+impl Fault {
+    pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { place: place.into(), message: message.into() }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.place.is_empty() { write!(f, "{}", self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+    }
+}
+
+/// Everything that can go wrong, by who can mend it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The author of a YAML file or of a command line: all faults at once. Exit code 2.
+    #[error("{}", join(.0))]
+    Spec(Vec<Fault>),
+    /// The owner of the measurements: do not retry with the same data. Exit code 10.
+    #[error("{}", join(.0))]
+    Data(Vec<Fault>),
+    /// The machine: disk, permissions, locks; later may work. Exit code 75.
+    #[error("{0}")]
+    Store(Fault),
+    /// A bug in calib. Exit code 70.
+    #[error("{0} (this is a bug in calib)")]
+    Bug(String),
+}
+
+impl Error {
+    pub fn spec(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Spec(vec![Fault::new(place, message)])
+    }
+    pub fn data(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Data(vec![Fault::new(place, message)])
+    }
+    pub fn store(place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Store(Fault::new(place, message))
+    }
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Spec(_) => 2,
+            Self::Data(_) => 10,
+            Self::Store(_) => 75,
+            Self::Bug(_) => 70,
+        }
+    }
+}
+
+fn join(faults: &[Fault]) -> String {
+    faults.iter().map(Fault::to_string).collect::<Vec<_>>().join("\n")
+}
+
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// The nearest of `allowed` to `given`, for "did you mean".
+pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    allowed
+        .into_iter()
+        .map(|name| (strsim::damerau_levenshtein(given, name), name))
+        .filter(|(distance, name)| *distance <= 1 + name.len() / 3)
+        .min()
+        .map(|(_, name)| name)
+}

@@ -1,0 +1,4 @@
+//! Estimation: least squares, observability, swarm, network.
+
+pub mod network;
+pub mod swarm;

@@ -1,0 +1,1 @@
+//! Beetle swarm optimisation and its kin.

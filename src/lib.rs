@@ -1,0 +1,67 @@
+//! `calib` makes industrial robots accurate and says why they were not.
+//!
+//! # The map
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate`) has no files
+//! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
+//! YAML -> `Spec` -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
+//!
+//! | layer | what it holds | may use |
+//! |---|---|---|
+//! | [`error`], [`units`] | errors by reader, units of stored columns | - |
+//! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
+//! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial |
+//! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
+//! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
+//! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
+//! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
+//! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
+//! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
+//! | [`stage`] | one file per step of a pipeline | report, table, numerics |
+//! | [`pipeline`] | the YAML, the plan, the run | stage, store |
+//! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
+//!
+//! # Invariants
+//! 1. Below `cli` nothing prints, exits, reads the environment or the clock.
+//! 2. A stage never sees a path or the store.
+//! 3. `estimate` never sees a frame, `store` never a robot.
+//! 4. Randomness enters only as a seed.
+//! 5. SI inside; a stored column's name ends in its unit, one unit per quantity (lengths mm, angles rad).
+//! 6. A table once committed is never changed.
+//!
+//! # Adding things
+//! | add | new | touch |
+//! |---|---|---|
+//! | effect | `src/effect/<name>.rs` | one line in [`effect::EFFECTS`] |
+//! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
+//! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
+//! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
+
+#![forbid(unsafe_code)]
+
+pub mod error;
+pub mod units;
+
+pub mod spatial;
+
+pub mod robot;
+
+pub mod effect;
+
+pub mod estimate;
+
+pub mod twin;
+
+pub mod store;
+
+pub mod table;
+
+pub mod report;
+
+pub mod stage;
+
+pub mod pipeline;
+
+pub mod progress;
+
+pub mod cli;

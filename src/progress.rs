@@ -1,0 +1,1 @@
+//! Progress bars: the only file that knows a terminal.

@@ -1,0 +1,54 @@
+//! The robot as plain data, in SI and at its zero pose in the base frame: the one thing that estimator and twin share.
+
+/// What a joint does along its axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    Revolute,
+    Prismatic,
+}
+
+/// One joint and the body (link) that it moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointDescription {
+    pub name: String,
+    pub kind: JointKind,
+    /// Unit vector along the axis, zero pose, base frame.
+    pub axis: [f64; 3],
+    /// A point on the axis, m, zero pose, base frame.
+    pub point: [f64; 3],
+    /// Travel, rad or m.
+    pub limits: Option<[f64; 2]>,
+    /// Motor turns per turn of the joint.
+    pub reduction_ratio: Option<f64>,
+    /// Torque at the motor per ampere, Nm/A.
+    pub motor_constant: Option<f64>,
+    /// Mass of the body moved by this joint, kg, and its centre, m, zero pose, base frame.
+    pub mass: Option<f64>,
+    pub centre: Option<[f64; 3]>,
+}
+
+/// Joint `moved` turns by `ratio` times the angle of joint `by` (both from 0), as the controller believes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coupling {
+    pub moved: usize,
+    pub by: usize,
+    pub ratio: f64,
+}
+
+/// A serial robot: joints from the base to the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotDescription {
+    pub name: String,
+    pub joints: Vec<JointDescription>,
+    /// The measured point, m, zero pose, base frame.
+    pub tool: [f64; 3],
+    /// Orientation of the tool frame at the zero pose, row-major.
+    pub tool_rotation: [[f64; 3]; 3],
+    pub couplings: Vec<Coupling>,
+    /// Rated payload, kg; a recording says how much of it was on in each row.
+    pub payload_mass: f64,
+    /// Centre of the payload, m, zero pose, base frame.
+    pub payload_centre: [f64; 3],
+    /// Acceleration of gravity in the base frame, m/s2.
+    pub gravity: [f64; 3],
+}

@@ -1,0 +1,3 @@
+//! The robot as data, its import, its screws and its gravity torques.
+
+pub mod description;

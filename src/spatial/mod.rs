@@ -1,0 +1,1 @@
+//! Pose, twist, exponential, adjoint and left Jacobian.

@@ -1,0 +1,224 @@
+//! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
+
+use crate::error::Result;
+use crate::store::frame::Frame;
+use crate::table::Table;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::io::Read;
+use std::path::PathBuf;
+
+/// How many upstream tables a port takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arity {
+    /// The latest upstream stage that writes this kind, or the one named in `reads:`.
+    One,
+    /// The same, or none.
+    Optional,
+    /// All upstream stages that write this kind, in pipeline order.
+    Every,
+}
+
+/// A named input or output of a stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Port {
+    pub name: &'static str,
+    pub kind: &'static str,
+    pub arity: Arity,
+}
+
+/// What a field of a `reads!` struct may be: `T`, `Option<T>` or `Vec<From<T>>`.
+pub trait PortValue: Sized {
+    const ARITY: Arity;
+    const KIND: &'static str;
+    fn take(frames: Vec<(String, Frame)>) -> Result<Self>;
+}
+
+/// A table together with the id of the stage that wrote it.
+#[derive(Debug, Clone)]
+pub struct Labelled<T> {
+    pub stage: String,
+    pub table: T,
+}
+
+impl<T: Table> PortValue for T {
+    const ARITY: Arity = Arity::One;
+    const KIND: &'static str = T::KIND;
+    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
+        T::from_frame(&frames.first().expect("the plan wired this port").1)
+    }
+}
+impl<T: Table> PortValue for Option<T> {
+    const ARITY: Arity = Arity::Optional;
+    const KIND: &'static str = T::KIND;
+    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
+        frames.first().map(|(_, frame)| T::from_frame(frame)).transpose()
+    }
+}
+impl<T: Table> PortValue for Vec<Labelled<T>> {
+    const ARITY: Arity = Arity::Every;
+    const KIND: &'static str = T::KIND;
+    fn take(frames: Vec<(String, Frame)>) -> Result<Self> {
+        frames.into_iter().map(|(stage, frame)| Ok(Labelled { stage, table: T::from_frame(&frame)? })).collect()
+    }
+}
+
+/// The input ports of a stage.
+pub trait Reads: Sized {
+    fn ports() -> Vec<Port>;
+    /// Takes the frames of each port, in the order of [`Reads::ports`].
+    fn take(frames: Vec<Vec<(String, Frame)>>) -> Result<Self>;
+}
+
+/// The output ports of a stage.
+pub trait Writes: Sized {
+    fn ports() -> Vec<Port>;
+    fn give(self) -> Result<Vec<Output>>;
+}
+
+/// What a stage hands back on one port: columns in memory, or a table already streamed through [`Context::sink`].
+pub enum Output {
+    Frame(Frame),
+    Streamed(Streamed),
+}
+
+/// Declares input ports: `reads! { pub struct IdentifyReads { robot: Robot, parameters: Option<Parameters>, } }`.
+macro_rules! reads {
+    ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
+        $(#[$doc])*
+        pub struct $name { $( pub $field: $ty, )* }
+        impl crate::stage::Reads for $name {
+            fn ports() -> Vec<crate::stage::Port> {
+                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY } ),* ]
+            }
+            #[allow(unused_mut, unused_variables)]
+            fn take(frames: Vec<Vec<(String, crate::store::frame::Frame)>>) -> crate::error::Result<Self> {
+                let mut frames = frames.into_iter();
+                Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(frames.next().expect("one entry per port"))?, )* })
+            }
+        }
+    };
+}
+
+/// What a field of a `writes!` struct may be: a table, or a [`Streamed`] one.
+pub trait Produced {
+    const KIND: &'static str;
+    fn give(self) -> Result<Output>;
+}
+impl<T: Table> Produced for T {
+    const KIND: &'static str = T::KIND;
+    fn give(self) -> Result<Output> {
+        self.to_frame().map(Output::Frame)
+    }
+}
+
+/// Declares output ports: `writes! { pub struct IdentifyWrites { parameters: Parameters, } }`.
+macro_rules! writes {
+    ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
+        $(#[$doc])*
+        pub struct $name { $( pub $field: $ty, )* }
+        impl crate::stage::Writes for $name {
+            fn ports() -> Vec<crate::stage::Port> {
+                vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::Produced>::KIND, arity: crate::stage::Arity::One } ),* ]
+            }
+            fn give(self) -> crate::error::Result<Vec<crate::stage::Output>> {
+                Ok(vec![ $( crate::stage::Produced::give(self.$field)? ),* ])
+            }
+        }
+    };
+}
+#[allow(unused_imports)]
+pub(crate) use {reads, writes};
+
+/// A table written chunk by chunk, for what does not fit into memory.
+pub struct Streamed {
+    pub kind: &'static str,
+    pub rows: u64,
+    /// The engine's handle to the finished file.
+    pub handle: Box<dyn std::any::Any + Send>,
+}
+
+/// A streamed table with its kind as a type, for a field of a `writes!` struct.
+pub struct StreamedTable<T>(Streamed, std::marker::PhantomData<fn() -> T>);
+
+impl<T: Table> StreamedTable<T> {
+    pub fn new(streamed: Streamed) -> Self {
+        assert_eq!(streamed.kind, T::KIND, "a sink of another kind");
+        Self(streamed, std::marker::PhantomData)
+    }
+}
+impl<T: Table> Produced for StreamedTable<T> {
+    const KIND: &'static str = T::KIND;
+    fn give(self) -> Result<Output> {
+        Ok(Output::Streamed(self.0))
+    }
+}
+
+/// Takes chunks of one table, in key order, and checks each against the schema.
+pub trait Sink: Send {
+    fn push(&mut self, chunk: Frame) -> Result<()>;
+    fn finish(self: Box<Self>) -> Result<Streamed>;
+}
+
+/// An input file named in the settings. Its content, not its path, is part of the stage's key.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct RawFile(pub PathBuf);
+
+impl Serialize for RawFile {
+    /// A path is no part of the key: two names of one content are one input.
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.serialize_str("<file>")
+    }
+}
+
+/// An opened input file.
+pub struct Source {
+    /// As the user named it, for messages and tables.
+    pub label: String,
+    pub reader: Box<dyn Read + Send>,
+    /// Bytes, where known.
+    pub size: Option<u64>,
+}
+
+/// What a stage may ask of the engine while it runs.
+pub trait Services: Sync {
+    fn open(&self, file: &RawFile) -> Result<Source>;
+    fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>>;
+    /// A bar starts: what is done, how many units in all, and what a unit is called (`rows`, `generations`).
+    fn begin(&self, what: &str, total: Option<u64>, unit: &str);
+    fn advance(&self, done: u64, message: &str);
+    /// A line for the person and the run's record, e.g. `rank 27 as expected; 8 parameters redundant`.
+    fn note(&self, line: String);
+    fn warn(&self, line: String);
+}
+
+/// The stage's place in the run.
+pub struct Context<'a> {
+    /// The id of this stage in the pipeline; the `step` of its tables.
+    pub id: &'a str,
+    /// Derived from the pipeline's seed and the stage id.
+    pub seed: u64,
+    /// Worker threads that the stage may use; results must not depend on it.
+    pub jobs: usize,
+    pub services: &'a dyn Services,
+}
+
+/// A step of a pipeline: settings (`with:`), typed ports and a body. The settings are the type itself.
+pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'static {
+    const NAME: &'static str;
+    const SUMMARY: &'static str;
+    /// Bumped by hand whenever equal inputs give other outputs.
+    const IMPLEMENTATION: u32;
+    type Reads: Reads;
+    type Writes: Writes;
+    /// Faults of the settings that types cannot express, each with its path below `with`.
+    fn check(&self) -> Vec<crate::error::Fault> {
+        Vec::new()
+    }
+    /// The input files among the settings, each with its path below `with`.
+    fn files(&self) -> Vec<(String, RawFile)> {
+        Vec::new()
+    }
+    fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
+}

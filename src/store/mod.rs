@@ -1,0 +1,4 @@
+//! Columns: schemas, checked frames, content-addressed objects, action records and runs. Knows no robot.
+
+pub mod frame;
+pub mod schema;

@@ -1,0 +1,91 @@
+//! The bridge between Parquet columns and Rust values: one file per table, one schema file each in `schemas/`.
+//!
+//! Most tables are a list of rows declared by [`rows!`]; only the recording, whose columns depend on the number of joints,
+//! is written by hand.
+
+use crate::error::Result;
+use crate::store::frame::Frame;
+
+/// A table kind: Rust values that go to and from checked columns.
+pub trait Table: Sized + Send + Sync + 'static {
+    const KIND: &'static str;
+    fn to_frame(&self) -> Result<Frame>;
+    fn from_frame(frame: &Frame) -> Result<Self>;
+}
+
+/// Declares a table as a list of rows: `rows! { "kind", /// doc pub struct Name of Row { column: type, ... } }`.
+macro_rules! rows {
+    ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
+        $(#[$doc])*
+        #[derive(Debug, Clone, Default, PartialEq)]
+        pub struct $table(pub Vec<$row>);
+        impl crate::table::Table for $table {
+            const KIND: &'static str = $kind;
+            fn to_frame(&self) -> crate::error::Result<crate::store::frame::Frame> {
+                use crate::store::frame::Cell;
+                let mut frame = crate::store::frame::FrameBuilder::new(Self::KIND);
+                $( frame.push(stringify!($field), <$ty as Cell>::to_array(self.0.iter().map(|row| row.$field.clone()).collect())); )+
+                frame.finish()
+            }
+            fn from_frame(frame: &crate::store::frame::Frame) -> crate::error::Result<Self> {
+                $( let mut $field = frame.read::<$ty>(stringify!($field))?.into_iter(); )+
+                let mut rows = Vec::with_capacity(frame.rows());
+                for _ in 0..frame.rows() {
+                    rows.push($row { $( $field: $field.next().expect("columns have equal length"), )+ });
+                }
+                Ok(Self(rows))
+            }
+        }
+    };
+}
+pub(crate) use rows;
+
+mod document;
+mod fit;
+mod intake;
+mod network;
+mod observability;
+mod parameters;
+mod prediction;
+mod recording;
+mod rejected;
+mod robot;
+mod split;
+mod statistics;
+mod training;
+mod truth;
+
+pub use document::{Document, DocumentRow};
+pub use fit::{Fit, FitRow};
+pub use intake::{Intake, IntakeRow};
+pub use network::{Network, NetworkRow};
+pub use observability::{Observability, ObservabilityRow};
+pub use parameters::{ParameterRow, Parameters};
+pub use prediction::{Prediction, PredictionRow};
+pub use recording::Recording;
+pub use rejected::{Rejected, RejectedRow};
+pub use robot::{Robot, RobotRow};
+pub use split::{Split, SplitRow};
+pub use statistics::{Statistics, StatisticsRow};
+pub use training::{Training, TrainingRow};
+pub use truth::{Truth, TruthRow};
+
+/// Every table kind; `schemas/<kind>.json` holds its schema.
+pub const TABLES: &[&str] = &[
+    Document::KIND,
+    Fit::KIND,
+    Intake::KIND,
+    Network::KIND,
+    Observability::KIND,
+    Parameters::KIND,
+    Prediction::KIND,
+    Recording::KIND,
+    Rejected::KIND,
+    Robot::KIND,
+    Split::KIND,
+    Statistics::KIND,
+    Training::KIND,
+    Truth::KIND,
+];
