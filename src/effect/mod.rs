@@ -1,1 +1,143 @@
-//! The library of physical effects, one file each.
+//! The library of physical effects: one file each, one line each in [`EFFECTS`].
+//!
+//! An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
+//! and compensation use the same effects through one composition, the [`EffectStack`].
+
+mod base_frame;
+mod coupling_ratio;
+mod deflection;
+mod joint_compliance;
+mod joint_offset;
+mod link_geometry;
+mod reduction_ratio;
+mod stack;
+mod tool_offset;
+
+pub use base_frame::BaseFrame;
+pub use deflection::{Deflection, Direction};
+pub use stack::{EffectStack, Scratch};
+
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Pose;
+use crate::units::Unit;
+
+/// A parameter of an effect: its name, its unit and how large it may plausibly be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterSpec {
+    /// E.g. `reduction_ratio.j2`; zero always means the nominal robot.
+    pub name: String,
+    /// E.g. `joint 2`, `link 3`, `base`, `tool`.
+    pub place: String,
+    /// The unit that people and tables see; values are SI.
+    pub unit: Unit,
+    /// One sigma of what is known before any measurement, SI; wide.
+    pub prior_sigma: f64,
+}
+
+/// The circumstances of one row that effects may depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct ArmState<'a> {
+    /// Commanded joint positions, rad or m.
+    pub q: &'a [f64],
+    /// Gravity torque about each joint where the arm really is, Nm; zeros unless an effect of the stack asks for it.
+    pub torque: &'a [f64],
+    /// Motor currents, A, where recorded.
+    pub current: Option<&'a [f64]>,
+    /// Payload, kg.
+    pub payload: f64,
+}
+
+/// A physical cause of pose error.
+pub trait Effect: Send + Sync {
+    /// Canonical name, e.g. `reduction_ratio`.
+    fn name(&self) -> &'static str;
+    /// The parameters, in the order of `p` in [`Effect::deflect`].
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec>;
+    /// Adds the motions that parameters `p` (SI) cause in this state, with their partials.
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
+    /// True if the effect reads [`ArmState::torque`].
+    fn needs_torque(&self) -> bool {
+        false
+    }
+    /// What the recording or the robot lacks for this effect, if anything, as a sentence.
+    fn missing(&self, _robot: &RobotModel, _data: &Measurements) -> Option<String> {
+        None
+    }
+}
+
+/// What stands in for the torque that winds a joint up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Load {
+    /// Gravity torque from the masses of the robot file; compliance in rad/Nm.
+    GravityTorque,
+    /// Motor current as in the paper (Eq. 28); factors in rad/A, sign as the controller's.
+    MotorCurrent,
+}
+
+/// What an effect needs to be made.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting {
+    /// Where the base stands in the tracker's frame before any correction.
+    pub base: Pose,
+    pub load: Load,
+}
+
+/// A line of the registry.
+pub struct EffectEntry {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// Where two parameters do the same, the one whose effect has the lower precedence number is kept.
+    pub precedence: u8,
+    pub make: fn(&Setting) -> Box<dyn Effect>,
+}
+
+/// Every effect that can be identified, predicted and compensated.
+pub const EFFECTS: &[EffectEntry] = &[
+    EffectEntry {
+        name: "base_frame",
+        summary: "where the robot stands in the tracker's frame",
+        precedence: 0,
+        make: |s| Box::new(BaseFrame::new(s.base)),
+    },
+    EffectEntry {
+        name: "tool_offset",
+        summary: "where the measured point sits on the tool",
+        precedence: 1,
+        make: |_| Box::new(tool_offset::ToolOffset),
+    },
+    EffectEntry {
+        name: "joint_offset",
+        summary: "zero error of a joint",
+        precedence: 2,
+        make: |_| Box::new(joint_offset::JointOffset),
+    },
+    EffectEntry {
+        name: "link_geometry",
+        summary: "length and twist errors of a link",
+        precedence: 3,
+        make: |_| Box::new(link_geometry::LinkGeometry),
+    },
+    EffectEntry {
+        name: "reduction_ratio",
+        summary: "output angle scaled by k",
+        precedence: 4,
+        make: |_| Box::new(reduction_ratio::ReductionRatio),
+    },
+    EffectEntry {
+        name: "coupling_ratio",
+        summary: "a joint moves with another joint",
+        precedence: 5,
+        make: |_| Box::new(coupling_ratio::CouplingRatio),
+    },
+    EffectEntry {
+        name: "joint_compliance",
+        summary: "wind-up of a joint proportional to its load",
+        precedence: 6,
+        make: |s| Box::new(joint_compliance::JointCompliance::new(s.load)),
+    },
+];
+
+/// The registry entry of a canonical name.
+pub fn entry(name: &str) -> Option<&'static EffectEntry> {
+    EFFECTS.iter().find(|entry| entry.name == name)
+}

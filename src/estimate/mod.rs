@@ -1,4 +1,17 @@
-//! Estimation: least squares, observability, swarm, network.
+//! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
+mod align;
+mod factor;
+mod fit;
+mod levenberg;
+mod model;
 pub mod network;
+mod observe;
+mod problem;
 pub mod swarm;
+
+pub use align::align;
+pub use fit::{Fate, FitOptions, Fitted, fit};
+pub use levenberg::{Iteration, Stop};
+pub use model::Model;
+pub use observe::Visibility;

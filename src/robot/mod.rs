@@ -1,3 +1,9 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
 pub mod description;
+mod gravity;
+mod model;
+mod observation;
+
+pub use model::RobotModel;
+pub use observation::{Instrument, Measurements};

@@ -1,0 +1,65 @@
+//! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
+
+use super::{ArmState, Deflection, Effect, ParameterSpec};
+use crate::robot::RobotModel;
+use crate::spatial::{Pose, Twist};
+use crate::units::Unit;
+use nalgebra::Vector3;
+
+/// Corrections to a starting pose: exp of the twist, given in tracker axes, applied in the base frame.
+#[derive(Debug, Clone, Copy)]
+pub struct BaseFrame {
+    start: Pose,
+}
+
+const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
+impl BaseFrame {
+    pub const NAME: &'static str = "base_frame";
+
+    pub fn new(start: Pose) -> Self {
+        Self { start }
+    }
+
+    /// The base pose after corrections `p` (m, rad).
+    pub fn pose(&self, p: &[f64]) -> Pose {
+        let mut twist = Twist::zeros();
+        for (parameter, value) in p.iter().enumerate() {
+            twist += self.direction(parameter) * *value;
+        }
+        self.start * Pose::exp(&twist)
+    }
+
+    fn direction(&self, parameter: usize) -> Twist {
+        let mut unit = Vector3::zeros();
+        unit[parameter % 3] = 1.0;
+        let local = self.start.rotation.tr_mul(&unit);
+        let mut twist = Twist::zeros();
+        twist.fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 }).copy_from(&local);
+        twist
+    }
+}
+
+impl Effect for BaseFrame {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        AXES.iter()
+            .enumerate()
+            .map(|(k, axis)| ParameterSpec {
+                name: format!("base_frame.{axis}"),
+                place: "base".into(),
+                unit: if k < 3 { Unit::Millimetre } else { Unit::Radian },
+                prior_sigma: if k < 3 { 10.0 } else { 1.0 },
+            })
+            .collect()
+    }
+
+    fn deflect(&self, _robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
+        for parameter in 0..6 {
+            out.shift(parameter, p, 0, self.direction(parameter));
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! The small motions of one row, and their partial derivatives by the parameters.
+
+use crate::spatial::Twist;
+
+/// Where a partial derivative acts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Direction {
+    /// Along the screw of a joint (from 0): rad or m per unit of the parameter.
+    Joint(usize, f64),
+    /// At a station: 0 the base, k the body moved by joint k, n also the tool; zero-pose base coordinates, per unit of the parameter.
+    Station(usize, Twist),
+}
+
+/// Sums of all motions of a row. Twists at a station are added before the exponential, so the order of effects is irrelevant.
+#[derive(Debug, Clone)]
+pub struct Deflection {
+    /// Extra travel of each joint, rad or m.
+    pub joint: Vec<f64>,
+    /// Twist at each station 0..=n.
+    pub station: Vec<Twist>,
+    /// (parameter of the stack, direction); a parameter may appear several times.
+    pub partials: Vec<(usize, Direction)>,
+    first: usize,
+}
+
+impl Deflection {
+    pub fn new(joints: usize) -> Self {
+        Self { joint: vec![0.0; joints], station: vec![Twist::zeros(); joints + 1], partials: Vec::new(), first: 0 }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.joint.fill(0.0);
+        self.station.fill(Twist::zeros());
+        self.partials.clear();
+    }
+
+    /// The number of the current effect's first parameter within the stack.
+    pub(crate) fn start(&mut self, first: usize) {
+        self.first = first;
+    }
+
+    /// Moves a joint by `p[parameter] * rate`.
+    pub fn turn(&mut self, parameter: usize, p: &[f64], joint: usize, rate: f64) {
+        self.joint[joint] += p[parameter] * rate;
+        self.partials.push((self.first + parameter, Direction::Joint(joint, rate)));
+    }
+
+    /// Moves everything beyond a station by the twist `p[parameter] * rate`.
+    pub fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
+        self.station[station] += rate * p[parameter];
+        self.partials.push((self.first + parameter, Direction::Station(station, rate)));
+    }
+}

@@ -1,0 +1,31 @@
+//! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
+
+use super::{ArmState, Deflection, Effect, ParameterSpec};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+
+#[derive(Debug, Clone, Copy)]
+pub struct JointOffset;
+
+impl Effect for JointOffset {
+    fn name(&self) -> &'static str {
+        "joint_offset"
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        (0..robot.joints())
+            .map(|j| ParameterSpec {
+                name: format!("joint_offset.j{}", j + 1),
+                place: format!("joint {}", j + 1),
+                unit: if robot.is_revolute(j) { Unit::Radian } else { Unit::Millimetre },
+                prior_sigma: 0.02,
+            })
+            .collect()
+    }
+
+    fn deflect(&self, robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
+        for joint in 0..robot.joints() {
+            out.turn(joint, p, joint, 1.0);
+        }
+    }
+}

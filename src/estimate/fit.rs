@@ -1,0 +1,154 @@
+//! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
+
+use super::factor::Factor;
+use super::levenberg::{Iteration, Stop, minimise};
+use super::model::Model;
+use super::observe::{Visibility, indices, visibility};
+use super::problem::{HUBER, Problem};
+use crate::robot::Measurements;
+
+/// What is free. Everything else keeps the value it has in `model.x`.
+pub struct FitOptions<'a> {
+    /// Rows of the recording to fit.
+    pub rows: &'a [usize],
+    /// Candidate parameters of the stack, in order of precedence.
+    pub candidates: &'a [usize],
+}
+
+/// What became of a parameter of the stack.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fate {
+    /// Estimated, with its standard deviation (SI).
+    Free(f64),
+    /// Not a candidate: kept.
+    Kept,
+    /// As [`Visibility::Redundant`], with positions in the stack.
+    Redundant(Vec<(usize, f64)>),
+    Unseen,
+}
+
+/// The outcome of [`fit`]; the values are in the model.
+pub struct Fitted {
+    pub fates: Vec<Fate>,
+    pub course: Vec<Iteration>,
+    pub stop: Stop,
+    /// Standard deviation per axis that the rows show beyond the instrument's, m.
+    pub unmodelled: f64,
+    /// Rows with Huber weight below one.
+    pub downweighted: usize,
+    /// Singular values of the free parameters scaled by prior sigma, largest first.
+    pub singular: Vec<f64>,
+    /// Singular values of all candidates, to show the gap behind the rank.
+    pub singular_all: Vec<f64>,
+    /// (name, value, meaning).
+    pub indices: Vec<(&'static str, f64, &'static str)>,
+}
+
+/// Median of the squared length of three unit normals.
+const MEDIAN_CHI2_3: f64 = 2.366;
+/// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
+const ROUNDS: usize = 4;
+
+/// Fits the candidates that the data can see, into `model.x`.
+pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitted {
+    let specs = model.stack.specs().to_vec();
+    let prior = |set: &[usize]| set.iter().map(|k| specs[*k].prior_sigma).collect::<Vec<_>>();
+    let mut problem = Problem { data, rows: options.rows, unmodelled: 0.0 };
+    let mut course = Vec::new();
+    let mut candidates = options.candidates.to_vec();
+    let mut fates: Vec<Fate> = vec![Fate::Kept; specs.len()];
+    let mut last: Option<(Stop, Factor, Vec<usize>)> = None;
+
+    // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
+    problem.unmodelled = unmodelled(&problem, model, 0);
+    for round in 0..ROUNDS {
+        let sight = Problem { data, rows: options.rows, unmodelled: if round == 0 { 0.0 } else { problem.unmodelled } };
+        let seen = visibility(&sight.linearise(model, &candidates), &prior(&candidates));
+        for (k, verdict) in candidates.iter().zip(&seen) {
+            fates[*k] = match verdict {
+                Visibility::Seen => Fate::Free(f64::NAN),
+                Visibility::Unseen => Fate::Unseen,
+                Visibility::Redundant(with) => Fate::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect()),
+            };
+        }
+        let free: Vec<usize> = candidates.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
+        // What is dropped goes back to nominal and stays there.
+        for k in &candidates {
+            if !free.contains(k) {
+                model.x[*k] = 0.0;
+            }
+        }
+        let (steps, stop, factor) = minimise(&problem, model, &free);
+        course.extend(steps);
+        let next = unmodelled(&problem, model, free.len());
+        let settled = (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();
+        problem.unmodelled = next;
+        candidates = free.clone();
+        last = Some((stop, factor, free));
+        if settled {
+            break;
+        }
+    }
+    let (stop, _, free) = last.expect("at least one round");
+    let factor = problem.linearise(model, &free);
+    let errors = problem.errors(model);
+    if let Some(inverse) = factor.inverse() {
+        let scale = reduced(&errors, free.len()).sqrt();
+        for (row, parameter) in free.iter().enumerate() {
+            let variance: f64 = (0..free.len()).map(|column| inverse[(row, column)].powi(2)).sum();
+            fates[*parameter] = Fate::Free(variance.sqrt() * scale);
+        }
+    }
+    let singular = factor.singular_values(&prior(&free));
+    let singular_all = problem.linearise(model, options.candidates).singular_values(&prior(options.candidates));
+    Fitted {
+        fates,
+        course,
+        stop,
+        unmodelled: problem.unmodelled,
+        downweighted: errors.iter().filter(|error| **error > HUBER).count(),
+        indices: indices(&singular, options.rows.len()),
+        singular,
+        singular_all,
+    }
+}
+
+/// Reduced chi-square with Huber's weights.
+fn reduced(errors: &[f64], parameters: usize) -> f64 {
+    let sum: f64 = errors.iter().map(|e| e.min(HUBER) * e.min(HUBER)).sum();
+    let freedom = (3 * errors.len()).saturating_sub(parameters).max(1);
+    sum / freedom as f64
+}
+
+/// The extra standard deviation (m, per axis) that brings the median whitened error to what noise alone would give.
+fn unmodelled(problem: &Problem, model: &Model, parameters: usize) -> f64 {
+    let residuals = problem.residuals(model);
+    let rows = residuals.len();
+    if rows == 0 {
+        return 0.0;
+    }
+    let freedom = (3 * rows).saturating_sub(parameters).max(1) as f64 / (3 * rows) as f64;
+    let mut errors = vec![0.0; rows];
+    let mut median = |extra: f64| {
+        for (error, (residual, row)) in errors.iter_mut().zip(residuals.iter().zip(problem.rows)) {
+            let variance = problem.data.sigma[*row].map(|sigma| sigma * sigma + extra * extra);
+            *error = residual.component_mul(residual).component_div(&variance).sum();
+        }
+        let middle = rows / 2;
+        *errors.select_nth_unstable_by(middle, f64::total_cmp).1 / freedom
+    };
+    // One sigma of the median's own scatter is no evidence of anything unmodelled.
+    if median(0.0) <= MEDIAN_CHI2_3 * (1.0 + 1.6 / (rows as f64).sqrt()) {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.0, 1e-6);
+    while median(high) > MEDIAN_CHI2_3 && high < 1e3 {
+        low = high;
+        high *= 4.0;
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if median(middle) > MEDIAN_CHI2_3 { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}

@@ -1,0 +1,128 @@
+//! Levenberg-Marquardt on triangular factors: every way to stop is named, not converging is data.
+
+use super::factor::Factor;
+use super::model::Model;
+use super::problem::Problem;
+
+/// Why the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// The cost and the parameters no longer change: the minimum.
+    Converged,
+    /// No step lowers the cost although the gradient is not zero.
+    Stalled,
+    /// The limit of iterations was reached.
+    IterationLimit,
+    /// There is nothing to estimate.
+    NothingFree,
+}
+
+impl Stop {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Stalled => "stalled",
+            Self::IterationLimit => "iteration limit",
+            Self::NothingFree => "nothing free",
+        }
+    }
+}
+
+/// One accepted state of the iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iteration {
+    /// Sum of losses, dimensionless.
+    pub cost: f64,
+    /// Largest component of the gradient, in units of (column norm x residual norm): the cosine between them.
+    pub gradient: f64,
+    /// Norm of the step that led here, in sigmas of prediction.
+    pub step_norm: f64,
+    pub damping: f64,
+}
+
+/// Limit of accepted steps; calibration problems need four to ten.
+const ITERATIONS: usize = 60;
+/// A relative fall of the cost below this is rounding.
+const COST_TOLERANCE: f64 = 1e-10;
+/// A step that moves the whitened predictions by less than this in all changes nothing.
+const STEP_TOLERANCE: f64 = 1e-7;
+
+/// Minimises the problem in the `free` parameters, from and into `model.x`.
+///
+/// Returns the course, why it stopped, and the factor at the end.
+pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> (Vec<Iteration>, Stop, Factor) {
+    let mut cost = problem.cost(model);
+    let mut factor = problem.linearise(model, free);
+    let mut course = vec![Iteration { cost, gradient: cosine(&factor, cost), step_norm: 0.0, damping: 0.0 }];
+    if free.is_empty() {
+        return (course, Stop::NothingFree, factor);
+    }
+    let mut damping = 0.0;
+    for _ in 0..ITERATIONS {
+        let mut tries = 0;
+        let (step, trial_cost) = loop {
+            tries += 1;
+            if tries > 20 {
+                return (course, Stop::Stalled, factor);
+            }
+            let Some(step) = factor.solve(damping) else {
+                damping = raise(damping);
+                continue;
+            };
+            let before = model.x.clone();
+            for (parameter, change) in free.iter().zip(&step) {
+                model.x[*parameter] += change;
+            }
+            let trial_cost = problem.cost(model);
+            if trial_cost.is_finite() && trial_cost <= cost * (1.0 + 1e-12) {
+                break (step, trial_cost);
+            }
+            model.x = before;
+            if step_norm(&factor, &step) < STEP_TOLERANCE {
+                return (course, Stop::Converged, factor);
+            }
+            damping = raise(damping);
+        };
+        let step_norm = step_norm(&factor, &step);
+        let fall = cost - trial_cost;
+        cost = trial_cost;
+        factor = problem.linearise(model, free);
+        course.push(Iteration { cost, gradient: cosine(&factor, cost), step_norm, damping });
+        if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * cost {
+            return (course, Stop::Converged, factor);
+        }
+        damping = if damping < 1e-9 { 0.0 } else { damping / 10.0 };
+    }
+    (course, Stop::IterationLimit, factor)
+}
+
+fn raise(damping: f64) -> f64 {
+    if damping == 0.0 { 1e-6 } else { damping * 10.0 }
+}
+
+/// |J dx|: how far a step moves the whitened predictions.
+fn step_norm(factor: &Factor, step: &[f64]) -> f64 {
+    let p = step.len();
+    let mut moved = vec![0.0; p];
+    for (j, change) in step.iter().enumerate() {
+        for (sum, entry) in moved.iter_mut().zip(factor.column(j)) {
+            *sum += entry * change;
+        }
+    }
+    moved.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+/// Largest cosine between a column of J and the residual; zero at the minimum.
+fn cosine(factor: &Factor, cost: f64) -> f64 {
+    let residual = (2.0 * cost).sqrt();
+    let gradient = factor.gradient();
+    let largest = gradient
+        .iter()
+        .enumerate()
+        .map(|(j, g)| {
+            let norm = factor.column_norm(j) * residual;
+            if norm > 0.0 { g.abs() / norm } else { 0.0 }
+        })
+        .fold(0.0, f64::max);
+    largest.min(1.0)
+}

@@ -1,0 +1,42 @@
+//! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
+
+use crate::effect::{BaseFrame, EffectStack};
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Pose;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// The forward model of measured points.
+pub struct Model {
+    pub robot: RobotModel,
+    pub stack: EffectStack,
+    /// Parameter values, SI, in the order of the stack's specs.
+    pub x: Vec<f64>,
+}
+
+impl Model {
+    /// The model with all parameters zero: the nominal robot.
+    pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
+        let x = vec![0.0; stack.specs().len()];
+        Self { robot, stack, x }
+    }
+
+    /// Where the base stands in the tracker's frame, corrections included.
+    pub fn base(&self) -> Pose {
+        self.stack
+            .effects()
+            .find(|(effect, _)| effect.name() == BaseFrame::NAME)
+            .map_or(*self.stack.base(), |(_, range)| BaseFrame::new(*self.stack.base()).pose(&self.x[range]))
+    }
+
+    /// Measured points (m, tracker frame) of every row.
+    pub fn predict(&self, data: &Measurements) -> Vec<Vector3<f64>> {
+        (0..data.rows())
+            .into_par_iter()
+            .map_init(
+                || self.stack.scratch(&self.robot),
+                |scratch, row| self.stack.point(&self.robot, data, row, &self.x, scratch),
+            )
+            .collect()
+    }
+}

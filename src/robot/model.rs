@@ -1,0 +1,77 @@
+//! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
+
+use crate::robot::description::{JointKind, RobotDescription};
+use crate::spatial::{Pose, Twist, screw};
+use nalgebra::{Matrix3, Vector3};
+
+/// A serial robot ready for computing; immutable.
+#[derive(Debug, Clone)]
+pub struct RobotModel {
+    description: RobotDescription,
+    screws: Vec<Twist>,
+    axes: Vec<Vector3<f64>>,
+    points: Vec<Vector3<f64>>,
+    home: Pose,
+}
+
+impl RobotModel {
+    pub fn new(description: RobotDescription) -> Self {
+        let axes: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.axis).normalize()).collect();
+        let points: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.point)).collect();
+        let screws = description
+            .joints
+            .iter()
+            .zip(axes.iter().zip(&points))
+            .map(|(joint, (axis, point))| match joint.kind {
+                JointKind::Revolute => screw(axis, point),
+                JointKind::Prismatic => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
+            })
+            .collect();
+        let r = &description.tool_rotation;
+        let rotation = Matrix3::from_fn(|row, column| r[row][column]);
+        let home = Pose::new(rotation, Vector3::from(description.tool));
+        Self { description, screws, axes, points, home }
+    }
+
+    pub fn description(&self) -> &RobotDescription {
+        &self.description
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.screws.len()
+    }
+
+    /// Unit screws at the zero pose in the base frame.
+    pub fn screws(&self) -> &[Twist] {
+        &self.screws
+    }
+
+    /// Unit axis of joint `joint` (from 0) at the zero pose.
+    pub fn axis(&self, joint: usize) -> &Vector3<f64> {
+        &self.axes[joint]
+    }
+
+    /// A point on the axis of joint `joint`, m, at the zero pose.
+    pub fn point(&self, joint: usize) -> &Vector3<f64> {
+        &self.points[joint]
+    }
+
+    pub fn is_revolute(&self, joint: usize) -> bool {
+        self.description.joints[joint].kind == JointKind::Revolute
+    }
+
+    /// Tool frame at the zero pose; its origin is the measured point.
+    pub fn home(&self) -> &Pose {
+        &self.home
+    }
+
+    /// Tool frame in the base frame for joint positions `q` (rad or m): exp(x1 q1) ... exp(xn qn) home.
+    pub fn forward(&self, q: &[f64]) -> Pose {
+        let mut pose = Pose::identity();
+        for (twist, angle) in self.screws.iter().zip(q) {
+            pose = pose * Pose::exp(&(twist * *angle));
+        }
+        pose * self.home
+    }
+}
