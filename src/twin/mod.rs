@@ -1,1 +1,15 @@
-//! The truth maker.
+//! The twin: recordings of a robot whose truth is known, made by other mathematics than the estimator's.
+//!
+//! Plain 4x4 arrays, link by link transforms, statics by summing forces over bodies, effects by their physical definition. It shares
+//! the robot's description with the rest of the crate and nothing else, else the tool would mark its own homework.
+//! Adding an effect: a file in `effect/` and a line in [`effect::Physical`].
+
+pub mod arm;
+pub mod effect;
+pub mod matrix;
+pub mod noise;
+pub mod plan;
+pub mod recorder;
+pub mod statics;
+pub mod tracker;
+pub mod truth;

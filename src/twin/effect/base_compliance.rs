@@ -1,0 +1,34 @@
+//! The foundation tilts under the overturning moment of the whole arm about its foot.
+
+use super::{Act, Motion, State, TrueValue, true_value};
+use crate::twin::matrix::{self, Vector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A base on elastic anchors: soft about both horizontal axes, stiff about the vertical one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BaseCompliance {
+    /// Tilt about base x and y per moment, rad/Nm.
+    pub rad_per_nm: [f64; 2],
+    /// The point about which it tilts, base frame, mm.
+    #[serde(default)]
+    pub pivot_mm: Vector,
+}
+
+impl Act for BaseCompliance {
+    fn act(&self, state: &State, motion: &mut Motion) {
+        let pivot = matrix::scale(self.pivot_mm, 1e-3);
+        let (_, moment) = state.loads.wrench(0, pivot);
+        let tilt = [self.rad_per_nm[0] * moment[0], self.rad_per_nm[1] * moment[1], 0.0];
+        let about = matrix::times(&matrix::turn_by(tilt), &matrix::shift(matrix::scale(pivot, -1.0)));
+        motion.base = matrix::times(&motion.base, &matrix::times(&matrix::shift(pivot), &about));
+    }
+    fn seat(&self) -> Option<usize> {
+        None
+    }
+    fn truth(&self) -> Vec<TrueValue> {
+        let value = |axis: &str, rad_per_nm| true_value("base_compliance", "base", "base".into(), axis, "rad/Nm", rad_per_nm);
+        vec![value("x", self.rad_per_nm[0]), value("y", self.rad_per_nm[1])]
+    }
+}

@@ -1,0 +1,50 @@
+//! A gear that is softer under little torque than under much: teeth and rollers that first have to come into full contact.
+
+use super::{Act, Motion, State, TrueValue, true_value};
+use crate::twin::truth::ARCSEC;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The form of the wind-up beside the linear one, of amplitude 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Curve {
+    /// `tanh(torque / scale)`: lost motion and soft first contact that is used up at a few `scale`.
+    Tanh,
+    /// `-(torque / scale)^3`: the spring stiffens with torque; at `scale` it holds back the whole amplitude.
+    Cubic,
+}
+
+/// Wind-up beside the linear one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointHardening {
+    /// From 1.
+    pub joint: usize,
+    pub curve: Curve,
+    /// arcsec.
+    pub amplitude_arcsec: f64,
+    /// The torque that sets the scale of the curve, Nm.
+    pub scale_nm: f64,
+}
+
+impl Act for JointHardening {
+    fn act(&self, state: &State, motion: &mut Motion) {
+        let load = state.torque[self.joint - 1] / self.scale_nm;
+        let shape = match self.curve {
+            Curve::Tanh => load.tanh(),
+            Curve::Cubic => -load.powi(3),
+        };
+        motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * shape;
+    }
+    fn seat(&self) -> Option<usize> {
+        Some(self.joint)
+    }
+    fn truth(&self) -> Vec<TrueValue> {
+        let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
+        vec![
+            true_value("joint_hardening", &tag, place.clone(), "amplitude", "arcsec", self.amplitude_arcsec),
+            true_value("joint_hardening", &tag, place, "scale", "Nm", self.scale_nm),
+        ]
+    }
+}

@@ -1,0 +1,102 @@
+//! Rigid motions as plain 4x4 arrays, and the few vector operations that statics needs.
+
+/// A homogeneous transform, rows first.
+pub type Matrix = [[f64; 4]; 4];
+pub type Vector = [f64; 3];
+
+pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+/// The motion `a` followed by `b` in a's frame.
+pub fn times(a: &Matrix, b: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+pub fn shift(v: Vector) -> Matrix {
+    let mut m = IDENTITY;
+    for i in 0..3 {
+        m[i][3] = v[i];
+    }
+    m
+}
+
+/// Rotation by `angle` (rad) about the unit vector `axis` through the origin (Rodrigues, written out).
+pub fn turn(axis: Vector, angle: f64) -> Matrix {
+    let [x, y, z] = axis;
+    let (s, c) = angle.sin_cos();
+    let u = 1.0 - c;
+    [
+        [c + x * x * u, x * y * u - z * s, x * z * u + y * s, 0.0],
+        [y * x * u + z * s, c + y * y * u, y * z * u - x * s, 0.0],
+        [z * x * u - y * s, z * y * u + x * s, c + z * z * u, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+}
+
+/// Rotation by a rotation vector (rad).
+pub fn turn_by(v: Vector) -> Matrix {
+    let angle = norm(v);
+    if angle == 0.0 { IDENTITY } else { turn(scale(v, 1.0 / angle), angle) }
+}
+
+/// Roll, pitch, yaw (rad) about the fixed x, y and z axis, in this order.
+pub fn roll_pitch_yaw(v: Vector) -> Matrix {
+    let x = turn([1.0, 0.0, 0.0], v[0]);
+    let y = turn([0.0, 1.0, 0.0], v[1]);
+    let z = turn([0.0, 0.0, 1.0], v[2]);
+    times(&z, &times(&y, &x))
+}
+
+/// The inverse of a rigid motion.
+pub fn inverse(m: &Matrix) -> Matrix {
+    let mut out = IDENTITY;
+    for i in 0..3 {
+        for j in 0..3 {
+            out[i][j] = m[j][i];
+        }
+        out[i][3] = -(0..3).map(|k| m[k][i] * m[k][3]).sum::<f64>();
+    }
+    out
+}
+
+/// Where a point goes.
+pub fn place(m: &Matrix, p: Vector) -> Vector {
+    add(direct(m, p), origin(m))
+}
+
+/// Where a direction goes.
+pub fn direct(m: &Matrix, v: Vector) -> Vector {
+    std::array::from_fn(|i| (0..3).map(|k| m[i][k] * v[k]).sum())
+}
+
+/// A direction of the outer frame as seen in the inner one.
+pub fn see(m: &Matrix, v: Vector) -> Vector {
+    std::array::from_fn(|i| (0..3).map(|k| m[k][i] * v[k]).sum())
+}
+
+pub fn origin(m: &Matrix) -> Vector {
+    [m[0][3], m[1][3], m[2][3]]
+}
+
+pub fn add(a: Vector, b: Vector) -> Vector {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+pub fn minus(a: Vector, b: Vector) -> Vector {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+pub fn scale(a: Vector, s: f64) -> Vector {
+    a.map(|x| x * s)
+}
+
+pub fn dot(a: Vector, b: Vector) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+pub fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub fn norm(a: Vector) -> f64 {
+    dot(a, a).sqrt()
+}

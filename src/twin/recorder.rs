@@ -1,0 +1,113 @@
+//! The experiment: every planned point settled, seen by the tracker, with the currents that the controller would log.
+
+use super::arm::Arm;
+use super::effect::{JointCompliance, Motion, Physical};
+use super::matrix::{self, Vector};
+use super::noise::{Noise, Purpose};
+use super::plan::{self, Block, Climate, Poses};
+use super::statics::{Row, settle};
+use super::tracker::Tracker;
+use super::truth::{ARCSEC, TrueRobot};
+use crate::robot::description::RobotDescription;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The motors as the controller logs them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Motors {
+    /// +1 where a positive current drives the joint in its positive direction, else -1; empty: all +1.
+    pub sign: Vec<f64>,
+    /// Standard deviation of a logged current, A.
+    pub noise_a: f64,
+}
+
+/// An experiment on a twin.
+#[derive(Debug, Clone)]
+pub struct Experiment<'a> {
+    pub robot: &'a RobotDescription,
+    pub truth: &'a TrueRobot,
+    pub effects: &'a [Physical],
+    pub tracker: &'a Tracker,
+    pub motors: &'a Motors,
+    /// Standard deviation of each joint from move to move, arcsec; empty: none.
+    pub repeatability_arcsec: &'a [f64],
+    pub poses: &'a Poses,
+    pub blocks: &'a [Block],
+    pub climate: &'a Climate,
+    pub seed: u64,
+}
+
+/// A measured point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shot {
+    pub block: usize,
+    /// Reported joint positions, rad or m.
+    pub q: Vec<f64>,
+    pub direction: Vec<f64>,
+    pub time_s: f64,
+    pub temperature_c: f64,
+    /// Logged currents, A.
+    pub current: Vec<f64>,
+    /// Tracker frame, m, and its standard deviation per axis.
+    pub position: Vector,
+    pub sigma: f64,
+}
+
+impl Experiment<'_> {
+    /// All points in order; `tick` hears of each. Fails with what is wrong where no pose is allowed.
+    pub fn record(&self, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
+        let arm = Arm::new(self.robot, self.truth);
+        let points = plan::plan(self.robot, &arm, self.poses, self.blocks, self.climate, self.seed)?;
+        let effects = self.all_effects(&arm);
+        let base = self.tracker.base();
+        let mut beam = Noise::new(self.seed, Purpose::Tracker);
+        let mut meter = Noise::new(self.seed, Purpose::Current);
+        let mut play = Noise::new(self.seed, Purpose::Repeatability);
+        let mut shots = Vec::with_capacity(points.len());
+        for point in points {
+            let mut drive = self.truth.drive(self.robot, &point.q);
+            for (angle, sigma) in drive.iter_mut().zip(self.repeatability_arcsec) {
+                *angle += sigma * ARCSEC * play.normal();
+            }
+            let payload_kg = self.blocks[point.block].payload_kg;
+            let (time_s, temperature_c) = (point.time_s, point.temperature_c);
+            let row = Row { command: point.q, drive, direction: point.direction, time_s, temperature_c, payload_kg };
+            let rest = settle(&arm, &row, &effects);
+            let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            shots.push(Shot {
+                block: point.block,
+                current: self.currents(&arm, &rest.torque, &rest.motion, &mut meter),
+                position: self.tracker.measure(seen, &mut beam),
+                sigma: self.tracker.sigma(seen),
+                q: row.command,
+                direction: row.direction,
+                time_s,
+                temperature_c,
+            });
+            tick();
+        }
+        Ok(shots)
+    }
+
+    /// The chosen effects and the true robot's linear wind-up.
+    fn all_effects(&self, arm: &Arm) -> Vec<Physical> {
+        let wind_up = arm.links.iter().enumerate().map(|(joint, link)| {
+            let rad_per_nm = self.truth.compliance(joint, link.gear * link.motor_constant);
+            Physical::JointCompliance(JointCompliance { joint: joint + 1, rad_per_nm })
+        });
+        wind_up.chain(self.effects.iter().cloned()).collect()
+    }
+
+    /// Holding currents: the motor carries what gravity does to the joint, plus what friction adds.
+    fn currents(&self, arm: &Arm, torque: &[f64], motion: &Motion, meter: &mut Noise) -> Vec<f64> {
+        let joints = arm.links.iter().zip(torque).zip(&motion.motor_torque).enumerate();
+        joints
+            .map(|(joint, ((link, gravity), extra))| {
+                let sign = self.motors.sign.get(joint).copied().unwrap_or(1.0);
+                let held = (extra - gravity) / (link.gear * link.motor_constant);
+                sign * held + self.motors.noise_a * meter.normal()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,103 @@
+//! Statics: forces summed over bodies, and the posture in which the deflected arm carries them.
+
+use super::arm::{Arm, Posture};
+use super::effect::{Motion, Physical, State};
+use super::matrix::{self, Vector};
+
+/// Bodies with weight, in the base frame: centre, mass in kg, and the link that carries it.
+#[derive(Debug, Clone)]
+pub struct Loads {
+    bodies: Vec<(usize, f64, Vector)>,
+    gravity: Vector,
+}
+
+impl Loads {
+    /// The links and the payload (kg) of an arm in `posture`.
+    pub fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
+        let mut bodies: Vec<(usize, f64, Vector)> = (arm.links.iter().zip(&posture.frames).enumerate())
+            .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
+            .collect();
+        if let Some(hand) = posture.frames.last() {
+            bodies.push((arm.links.len() - 1, payload, matrix::place(hand, arm.payload_centre)));
+        }
+        Loads { bodies, gravity: arm.gravity }
+    }
+
+    /// Force (N) and moment about `point` (Nm) of the weight of everything from link `from` (from 0) on, base frame.
+    pub fn wrench(&self, from: usize, point: Vector) -> (Vector, Vector) {
+        let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
+        for (_, mass, centre) in self.bodies.iter().filter(|(link, _, _)| *link >= from) {
+            let weight = matrix::scale(self.gravity, *mass);
+            force = matrix::add(force, weight);
+            moment = matrix::add(moment, matrix::cross(matrix::minus(*centre, point), weight));
+        }
+        (force, moment)
+    }
+
+    /// What gravity does to each joint along its axis, Nm (N for a prismatic joint).
+    pub fn torques(&self, arm: &Arm, posture: &Posture) -> Vec<f64> {
+        let joints = arm.links.iter().zip(&posture.frames).zip(&posture.axes).enumerate();
+        joints
+            .map(|(index, ((link, frame), axis))| {
+                let (force, moment) = self.wrench(index, matrix::origin(frame));
+                matrix::dot(*axis, if link.revolute { moment } else { force })
+            })
+            .collect()
+    }
+}
+
+/// What holds in one row besides the loads.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// Joint positions that the controller reports, rad or m.
+    pub command: Vec<f64>,
+    /// Joint positions at the gears' outputs without load, rad or m.
+    pub drive: Vec<f64>,
+    /// +1, -1 or 0: last move of each joint.
+    pub direction: Vec<f64>,
+    pub time_s: f64,
+    pub temperature_c: f64,
+    pub payload_kg: f64,
+}
+
+/// The arm at rest under its loads.
+#[derive(Debug, Clone)]
+pub struct Equilibrium {
+    pub posture: Posture,
+    pub motion: Motion,
+    /// Gravity's torque on each joint in the deflected posture, Nm.
+    pub torque: Vec<f64>,
+}
+
+/// A change of less than this (rad or m) is rest; a picometre at 3 m.
+const REST: f64 = 1e-13;
+/// Every round shrinks the change by the wind-up itself, about 1e-3: six are usual, more than this many mean a collapsing arm.
+const ROUNDS: usize = 60;
+
+/// Lets the arm sag until loads and deflections agree.
+pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
+    let mut motion = Motion::none(arm.links.len());
+    for _ in 0..ROUNDS {
+        let held = hold(arm, row, motion);
+        let mut next = Motion::none(arm.links.len());
+        let state = State { arm, row, posture: &held.0, loads: &held.1, torque: &held.2 };
+        for effect in effects {
+            effect.act(&state, &mut next);
+        }
+        let change = next.distance(&held.3);
+        motion = next;
+        if change < REST {
+            break;
+        }
+    }
+    let (posture, _, torque, motion) = hold(arm, row, motion);
+    Equilibrium { posture, motion, torque }
+}
+
+fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Motion) {
+    let angle: Vec<f64> = row.drive.iter().zip(&motion.joint).map(|(drive, extra)| drive + extra).collect();
+    let posture = arm.posture(&angle, &motion);
+    let loads = Loads::new(arm, &posture, row.payload_kg);
+    let torque = loads.torques(arm, &posture);
+    (posture, loads, torque, motion)
+}

@@ -1,0 +1,65 @@
+//! The laser tracker: a pose in the room and a noise that grows with range.
+
+use super::effect::{TrueValue, true_value};
+use super::matrix::{self, Matrix, Vector};
+use super::noise::Noise;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where the tracker stands and how well it measures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Tracker {
+    /// Origin of the tracker's frame in the robot's base frame, mm.
+    pub position_mm: Vector,
+    /// Its roll, pitch and yaw about the fixed base axes, deg.
+    pub roll_pitch_yaw_deg: Vector,
+    /// Uncertainty of one coordinate at range 0, um.
+    pub noise_um: f64,
+    /// Its growth with range, um per m.
+    pub noise_um_per_m: f64,
+    /// How many standard deviations the two figures stand for.
+    pub coverage: f64,
+}
+
+impl Default for Tracker {
+    fn default() -> Self {
+        Self {
+            position_mm: [4200.0, -1500.0, 900.0],
+            roll_pitch_yaw_deg: [0.0, 0.0, 150.0],
+            noise_um: 10.0,
+            noise_um_per_m: 2.5,
+            coverage: 2.0,
+        }
+    }
+}
+
+impl Tracker {
+    /// The base frame as the tracker sees it.
+    pub fn base(&self) -> Matrix {
+        let turned = matrix::roll_pitch_yaw(self.roll_pitch_yaw_deg.map(f64::to_radians));
+        matrix::inverse(&matrix::times(&matrix::shift(matrix::scale(self.position_mm, 1e-3)), &turned))
+    }
+
+    /// The true pose of the tracker under names of its own; a fit's base frame is a correction of an alignment.
+    pub fn values(&self) -> Vec<TrueValue> {
+        let value = |number: String, unit, value| true_value("tracker", "pose", "tracker".into(), &number, unit, value);
+        let axes = ["x", "y", "z"].into_iter().enumerate();
+        axes.flat_map(|(index, axis)| {
+            let turned = self.roll_pitch_yaw_deg[index].to_radians();
+            [value(axis.into(), "mm", self.position_mm[index]), value(format!("r{axis}"), "rad", turned)]
+        })
+        .collect()
+    }
+
+    /// Standard deviation of a coordinate of `point` (m, tracker frame), m.
+    pub fn sigma(&self, point: Vector) -> f64 {
+        1e-6 * (self.noise_um + self.noise_um_per_m * matrix::norm(point)) / self.coverage
+    }
+
+    /// What the tracker says where `point` (m, tracker frame) is.
+    pub fn measure(&self, point: Vector, noise: &mut Noise) -> Vector {
+        let sigma = self.sigma(point);
+        point.map(|coordinate| coordinate + sigma * noise.normal())
+    }
+}

@@ -1,0 +1,173 @@
+//! What the true robot is, apart from its effects: lengths, zero positions, gears, couplings and linear wind-up.
+//!
+//! Joint i stands at `offset_i + k_i (q_i - sum c_ij q_j) + sum k_j (c_ij + e_ij) q_j`, where c_ij is the nominal coupling (the
+//! motion of joint i caused by joint j, which the controller takes out) and e_ij its error.
+
+use super::effect::{TrueValue, true_value};
+use super::matrix::Vector;
+use crate::robot::description::{JointKind, RobotDescription};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Rigid errors of a link's far end, where the next joint (or the measured point) sits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinkError {
+    /// Number of the link, from 1: the body moved by joint N.
+    pub link: usize,
+    /// Displacement at the zero pose along the base axes, mm.
+    #[serde(default)]
+    pub shift_mm: Vector,
+    /// Rotation vector at the zero pose along the base axes, arcsec.
+    #[serde(default)]
+    pub tilt_arcsec: Vector,
+}
+
+/// Error of a coupling between two joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CouplingError {
+    /// The joint that moves along, from 1.
+    pub moved: usize,
+    /// The joint that moves it, from 1.
+    pub by: usize,
+    /// True coupling ratio minus the one that the controller takes out, joint turn per joint turn.
+    pub error: f64,
+}
+
+/// The true robot against its description.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrueRobot {
+    /// Manufacturing errors, any number of entries a link.
+    #[serde(default)]
+    pub links: Vec<LinkError>,
+    /// Error of the zero position of every joint, deg (mm for a prismatic joint); empty: none.
+    #[serde(default)]
+    pub offset_deg: Vec<f64>,
+    /// True motion of every joint per reported motion; empty: 1.
+    #[serde(default)]
+    pub ratio: Vec<f64>,
+    /// Errors of couplings; others are as in the description.
+    #[serde(default)]
+    pub couplings: Vec<CouplingError>,
+    /// Wind-up of every joint per ampere of holding current, in the controller's sign, rad/A; empty: none.
+    #[serde(default)]
+    pub compliance_rad_a: Vec<f64>,
+    /// Wind-up of every joint per torque of the load, rad/Nm, added to `compliance_rad_a`; empty: none.
+    #[serde(default)]
+    pub compliance_rad_nm: Vec<f64>,
+}
+
+/// Summed errors of one link in m and rad.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RigidError {
+    pub shift: Vector,
+    pub tilt: Vector,
+}
+
+pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+
+impl TrueRobot {
+    /// Errors of the link that joint `index` (from 0) moves.
+    pub fn link_error(&self, index: usize) -> RigidError {
+        let mut out = RigidError::default();
+        for error in self.links.iter().filter(|error| error.link == index + 1) {
+            for axis in 0..3 {
+                out.shift[axis] += 1e-3 * error.shift_mm[axis];
+                out.tilt[axis] += ARCSEC * error.tilt_arcsec[axis];
+            }
+        }
+        out
+    }
+
+    /// Joint positions (rad or m) without load for reported positions `q`.
+    pub fn drive(&self, robot: &RobotDescription, q: &[f64]) -> Vec<f64> {
+        let ratio = |joint: usize| self.ratio.get(joint).copied().unwrap_or(1.0);
+        let mut out: Vec<f64> = (0..q.len()).map(|joint| self.offset(robot, joint) + ratio(joint) * q[joint]).collect();
+        for nominal in &robot.couplings {
+            // The controller takes the nominal coupling out with the gear it believes in; the true gears put it back.
+            out[nominal.moved] += nominal.ratio * q[nominal.by] * (ratio(nominal.by) - ratio(nominal.moved));
+        }
+        for wrong in &self.couplings {
+            out[wrong.moved - 1] += wrong.error * q[wrong.by - 1] * ratio(wrong.by - 1);
+        }
+        out
+    }
+
+    /// Error of a joint's zero position, rad or m.
+    pub fn offset(&self, robot: &RobotDescription, joint: usize) -> f64 {
+        let revolute = robot.joints[joint].kind == JointKind::Revolute;
+        self.offset_deg.get(joint).copied().unwrap_or(0.0) * if revolute { std::f64::consts::PI / 180.0 } else { 1e-3 }
+    }
+
+    /// Linear wind-up of a joint per torque, rad/Nm; `per_ampere` is the joint's torque per ampere of its motor.
+    pub fn compliance(&self, joint: usize, per_ampere: f64) -> f64 {
+        let by_current = self.compliance_rad_a.get(joint).map_or(0.0, |c| c.abs() / per_ampere.abs());
+        by_current + self.compliance_rad_nm.get(joint).copied().unwrap_or(0.0)
+    }
+
+    /// The true numbers under the names that identified parameters have; those of a link's rigid errors summed.
+    pub fn values(&self, robot: &RobotDescription) -> Vec<TrueValue> {
+        let mut out = Vec::new();
+        for (joint, described) in robot.joints.iter().enumerate() {
+            let (tag, place) = (format!("j{}", joint + 1), format!("joint {}", joint + 1));
+            let mut push =
+                |effect, number: &str, unit, value| out.push(true_value(effect, &tag, place.clone(), number, unit, value));
+            let offset = self.offset(robot, joint);
+            match described.kind {
+                JointKind::Revolute => push("joint_offset", "", "rad", offset),
+                JointKind::Prismatic => push("joint_offset", "", "mm", 1e3 * offset),
+            }
+            push("reduction_ratio", "", "1", self.ratio.get(joint).map_or(0.0, |ratio| ratio - 1.0));
+            if let Some(factor) = self.compliance_rad_a.get(joint) {
+                push("joint_compliance", "", "rad/A", *factor);
+            }
+            let per_ampere = described.reduction_ratio.unwrap_or(1.0) * described.motor_constant.unwrap_or(1.0);
+            push("joint_compliance", "torque", "rad/Nm", self.compliance(joint, per_ampere));
+            let (error, tag, place) = (self.link_error(joint), format!("l{}", joint + 1), format!("link {}", joint + 1));
+            for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+                let name = "link_geometry";
+                out.push(true_value(name, &tag, place.clone(), letter, "mm", 1e3 * error.shift[axis]));
+                out.push(true_value(name, &tag, place.clone(), &format!("r{letter}"), "rad", error.tilt[axis]));
+            }
+        }
+        for wrong in &self.couplings {
+            let tag = format!("j{}_j{}", wrong.by, wrong.moved);
+            let place = format!("joint {}->{}", wrong.by, wrong.moved);
+            let ratio = self.ratio.get(wrong.by - 1).copied().unwrap_or(1.0);
+            out.push(true_value("coupling_ratio", &tag, place, "", "1", wrong.error * ratio));
+        }
+        out
+    }
+
+    /// What cannot be true of a robot with this description: place below `truth` and message.
+    pub fn faults(&self, robot: &RobotDescription) -> Vec<(String, String)> {
+        let joints = robot.joints.len();
+        let mut out = Vec::new();
+        for (name, list) in [
+            ("offset_deg", &self.offset_deg),
+            ("ratio", &self.ratio),
+            ("compliance_rad_a", &self.compliance_rad_a),
+            ("compliance_rad_nm", &self.compliance_rad_nm),
+        ] {
+            if !list.is_empty() && list.len() != joints {
+                out.push((
+                    name.into(),
+                    format!("has {} numbers, the robot {joints} joints; give one a joint or none", list.len()),
+                ));
+            }
+        }
+        for (index, error) in self.links.iter().enumerate() {
+            if !(1..=joints).contains(&error.link) {
+                out.push((format!("links[{index}].link"), format!("is {}; allowed: 1 to {joints}", error.link)));
+            }
+        }
+        for (index, error) in self.couplings.iter().enumerate() {
+            if ![error.moved, error.by].iter().all(|joint| (1..=joints).contains(joint)) || error.moved == error.by {
+                out.push((format!("couplings[{index}]"), format!("needs two different joints out of 1 to {joints}")));
+            }
+        }
+        out
+    }
+}
