@@ -1,4 +1,130 @@
 //! Columns: schemas, checked frames, content-addressed objects, action records and runs. Knows no robot.
+//!
+//! `format.json` | `objects/ab/<file hash>.parquet` | `actions/cd/<key hash>.json` | `runs/<id>/` | `tables/`, `documents/` for
+//! people | `tmp/`. Objects and records are written aside, synced and moved into place; a crash leaves nothing visible by half.
 
+pub mod actions;
+mod cell;
+mod check;
+pub mod content;
+mod disk;
 pub mod frame;
+pub mod key;
+mod reader;
+pub mod runs;
 pub mod schema;
+mod view;
+mod workspace;
+pub mod writer;
+
+pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
+pub use content::TableHash;
+pub use key::{ActionId, FileHash, KEY_FORMAT, StageKey};
+pub use runs::Run;
+pub use writer::{FinishedFile, TableWriter};
+
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::error::{Error, Result};
+use disk::{make_dir, put_if_absent, refused, write_synced};
+use workspace::Workspace;
+
+/// The layout described above.
+const STORE_FORMAT: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+struct Format {
+    calib_store: u32,
+}
+
+/// A folder of tables and the record of how they came about.
+#[derive(Debug)]
+pub struct Store {
+    root: PathBuf,
+    /// Opened with the first write, so that looking leaves no trace.
+    workspace: Mutex<Option<Arc<Workspace>>>,
+}
+
+impl Store {
+    /// Opens a store, or a place where one will be: nothing is written before the first publish or run.
+    pub fn open(root: impl Into<PathBuf>) -> Result<Self> {
+        let root = root.into();
+        let path = root.join("format.json");
+        match fs::read(&path) {
+            Ok(bytes) => check_format(&path, &bytes)?,
+            Err(e) if e.kind() == ErrorKind::NotFound => check_vacant(&root)?,
+            Err(e) => return Err(refused(&path, "read", &e)),
+        }
+        Ok(Self { root, workspace: Mutex::new(None) })
+    }
+
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// A writer for a table that does not fit into memory.
+    pub fn writer(&self, kind: &str) -> Result<TableWriter> {
+        Ok(TableWriter::new(schema::of(kind)?, self.workspace()?))
+    }
+
+    /// The folder for unfinished files; the first call makes the store.
+    fn workspace(&self) -> Result<Arc<Workspace>> {
+        let mut slot = self.workspace.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(workspace) = &*slot {
+            return Ok(workspace.clone());
+        }
+        make_dir(&self.root)?;
+        let workspace = Arc::new(Workspace::open(&self.root.join("tmp"))?);
+        let path = self.root.join("format.json");
+        if !path.exists() {
+            let aside = workspace.fresh();
+            let text = serde_json::to_vec(&Format { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))?;
+            write_synced(&aside, &text)?;
+            put_if_absent(&aside, &path)?;
+            let _ = fs::remove_file(&aside);
+        }
+        *slot = Some(workspace.clone());
+        Ok(workspace)
+    }
+}
+
+fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
+    let place = path.display().to_string();
+    match serde_json::from_slice::<Format>(bytes) {
+        Ok(format) if format.calib_store == STORE_FORMAT => Ok(()),
+        Ok(format) => Err(Error::spec(
+            place,
+            format!(
+                "the store was written by a newer calib (format {}, this one knows {STORE_FORMAT}): use that calib, or another store with --store DIR",
+                format.calib_store
+            ),
+        )),
+        Err(e) => Err(Error::store(
+            place,
+            format!("not the format file of a calib store ({e}); expected {{\"calib_store\": {STORE_FORMAT}}}"),
+        )),
+    }
+}
+
+/// A store may be begun in a folder that does not exist, is empty, or holds only the beginning of one.
+fn check_vacant(root: &Path) -> Result<()> {
+    let entries = match fs::read_dir(root) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(refused(root, "read", &e)),
+    };
+    match entries.flatten().find(|entry| entry.file_name() != "tmp") {
+        None => Ok(()),
+        Some(entry) => {
+            let found = entry.file_name().to_string_lossy().into_owned();
+            Err(Error::spec(
+                root.display().to_string(),
+                format!("not a calib store (no format.json, but `{found}`); --store takes a store, or a new or empty folder"),
+            ))
+        }
+    }
+}

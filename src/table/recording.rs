@@ -1,8 +1,9 @@
 //! The recording: joints as commanded or logged, and where the tracker saw the tool. SI in Rust, mm and rad in the table.
 
 use crate::error::Result;
-use crate::store::frame::Frame;
+use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
+use crate::units::Unit;
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 ///
@@ -47,12 +48,103 @@ impl Recording {
 
 impl Table for Recording {
     const KIND: &'static str = "recording";
+
     fn to_frame(&self) -> Result<Frame> {
-        unimplemented!(
-            "columns sequence, point_id, usage, q{{j}}_rad|q{{j}}_mm, x_mm.., sigma_x_mm.., time_s, payload_kg, temp_c, i{{j}}_a, dir{{j}}"
-        )
+        let mut frame = FrameBuilder::new(Self::KIND);
+        let per_joint = |values: &[f64], joint: usize, unit: Unit| -> Vec<f64> {
+            values.iter().skip(joint).step_by(self.joints.max(1)).map(|&value| unit.from_si(value)).collect()
+        };
+        frame.push("sequence", Cell::to_array(self.sequence.clone()));
+        frame.push("point_id", Cell::to_array(self.point_id.clone()));
+        frame.push("usage", Cell::to_array(self.usage.clone()));
+        for joint in 0..self.joints {
+            let (ending, unit) = joint_unit(self.prismatic.get(joint).copied().unwrap_or(false));
+            frame.push(format!("q{}_{ending}", joint + 1), Cell::to_array(per_joint(&self.q, joint, unit)));
+        }
+        for (axis, name) in AXES.iter().enumerate() {
+            let of = |points: &[[f64; 3]]| points.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect::<Vec<f64>>();
+            frame.push(format!("{name}_mm"), Cell::to_array(of(&self.position)));
+            if let Some(sigma) = &self.position_sigma {
+                frame.push(format!("sigma_{name}_mm"), Cell::to_array(present(of(sigma))));
+            }
+        }
+        for (name, values) in [("time_s", &self.time), ("payload_kg", &self.payload), ("temp_c", &self.temperature)] {
+            if let Some(values) = values {
+                frame.push(name, Cell::to_array(present(values.clone())));
+            }
+        }
+        for joint in 0..self.joints {
+            for (prefix, ending, values) in [("i", "_a", &self.current), ("dir", "", &self.direction)] {
+                if let Some(values) = values {
+                    let column = present(per_joint(values, joint, Unit::One));
+                    frame.push(format!("{prefix}{}{ending}", joint + 1), Cell::to_array(column));
+                }
+            }
+        }
+        frame.finish()
     }
-    fn from_frame(_frame: &Frame) -> Result<Self> {
-        unimplemented!()
+
+    fn from_frame(frame: &Frame) -> Result<Self> {
+        let has = |name: &str| frame.column(name).is_some();
+        let prismatic: Vec<bool> = (1..)
+            .map(|joint| (has(&format!("q{joint}_rad")), has(&format!("q{joint}_mm"))))
+            .take_while(|(turns, slides)| *turns || *slides)
+            .map(|(_, slides)| slides)
+            .collect();
+        let joints = prismatic.len();
+        let optional = |name: &str| has(name).then(|| absent(frame, name)).transpose();
+        let optional_joints = |prefix: &str, ending: &str| {
+            let columns = (1..=joints).map(|joint| absent(frame, &format!("{prefix}{joint}{ending}")));
+            has(&format!("{prefix}1{ending}"))
+                .then(|| columns.collect::<Result<Vec<_>>>().map(|columns| interleave(&columns)))
+                .transpose()
+        };
+        let points = |prefix: &str| -> Result<Vec<[f64; 3]>> {
+            let columns = AXES.iter().map(|axis| absent(frame, &format!("{prefix}{axis}_mm"))).collect::<Result<Vec<_>>>()?;
+            let si = |row: usize, axis: usize| Unit::Millimetre.to_si(columns[axis][row]);
+            Ok((0..frame.rows()).map(|row| [si(row, 0), si(row, 1), si(row, 2)]).collect())
+        };
+        let q = prismatic.iter().enumerate().map(|(joint, &slides)| {
+            let (ending, unit) = joint_unit(slides);
+            let column = frame.read::<f64>(&format!("q{}_{ending}", joint + 1))?;
+            Ok(column.into_iter().map(|value| unit.to_si(value)).collect())
+        });
+        Ok(Self {
+            joints,
+            q: interleave(&q.collect::<Result<Vec<_>>>()?),
+            prismatic,
+            sequence: frame.read("sequence")?,
+            point_id: frame.read("point_id")?,
+            usage: frame.read("usage")?,
+            position: points("")?,
+            position_sigma: has("sigma_x_mm").then(|| points("sigma_")).transpose()?,
+            time: optional("time_s")?,
+            payload: optional("payload_kg")?,
+            temperature: optional("temp_c")?,
+            current: optional_joints("i", "_a")?,
+            direction: optional_joints("dir", "")?,
+        })
     }
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+fn joint_unit(prismatic: bool) -> (&'static str, Unit) {
+    if prismatic { ("mm", Unit::Millimetre) } else { ("rad", Unit::Radian) }
+}
+
+/// NaN -> null.
+fn present(values: Vec<f64>) -> Vec<Option<f64>> {
+    values.into_iter().map(|value| (!value.is_nan()).then_some(value)).collect()
+}
+
+/// Null -> NaN.
+fn absent(frame: &Frame, name: &str) -> Result<Vec<f64>> {
+    Ok(frame.read::<Option<f64>>(name)?.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+}
+
+/// Columns of equal length -> row-major.
+fn interleave(columns: &[Vec<f64>]) -> Vec<f64> {
+    let rows = columns.first().map_or(0, Vec::len);
+    (0..rows).flat_map(|row| columns.iter().map(move |column| column[row])).collect()
 }

@@ -1,0 +1,197 @@
+//! Action records, the commit point: which tables a stage made from which key. Data first, then the record, put if absent.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::Store;
+use super::content::TableHash;
+use super::disk::{make_read_only, put_if_absent, refused, replace, write_synced};
+use super::frame::Frame;
+use super::key::{ActionId, FileHash, StageKey};
+use super::reader;
+use super::writer::{FinishedFile, TableWriter};
+use crate::error::{Error, Result};
+
+/// Bumped when older records can no longer be understood: all stages run again.
+const RECORD_FORMAT: u32 = 1;
+
+/// A published table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TableRef {
+    /// `name/version`.
+    pub schema: String,
+    /// Identity of the content.
+    pub table_hash: TableHash,
+    /// Name of the object that holds it.
+    pub file_hash: FileHash,
+    pub rows: u64,
+    pub bytes: u64,
+}
+
+/// What a stage made, and how it went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ActionRecord {
+    pub record_format: u32,
+    pub id: ActionId,
+    pub key: StageKey,
+    pub tables: BTreeMap<String, TableRef>,
+    pub account: Account,
+}
+
+/// How a stage's run went: what it told the person, and what it cost.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Account {
+    /// The run that executed the stage.
+    pub run: String,
+    /// RFC 3339.
+    pub started: String,
+    pub ended: String,
+    pub wall_seconds: f64,
+    pub cpu_seconds: Option<f64>,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+/// The answer to "is this already done?".
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lookup {
+    Done(Box<ActionRecord>),
+    Absent,
+    /// There is a record, but it or one of its tables is damaged: as good as absent. Why, in a sentence.
+    Damaged(String),
+}
+
+/// A table on its way into the store.
+#[derive(Debug)]
+pub enum Product {
+    Frame(Frame),
+    File(FinishedFile),
+}
+
+/// The record that stands after publishing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    pub record: ActionRecord,
+    /// Set where somebody published other content under the same key: the stage is not deterministic.
+    pub conflict: Option<String>,
+}
+
+impl Store {
+    fn record_path(&self, id: &ActionId) -> PathBuf {
+        self.root().join("actions").join(&id.as_str()[..2]).join(format!("{id}.json"))
+    }
+
+    /// The file of a published table.
+    pub fn object_path(&self, table: &TableRef) -> PathBuf {
+        let name = table.file_hash.as_str();
+        self.root().join("objects").join(name.get(..2).unwrap_or("00")).join(format!("{name}.parquet"))
+    }
+
+    /// Looks a stage up: done only if the record is whole and all its tables are there in full length.
+    pub fn action(&self, key: &StageKey) -> Result<Lookup> {
+        let path = self.record_path(&key.id());
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Lookup::Absent),
+            Err(e) => return Err(refused(&path, "read", &e)),
+        };
+        let damaged = |why: String| Ok(Lookup::Damaged(format!("{}: {why}; the stage runs again", path.display())));
+        let record: ActionRecord = match serde_json::from_slice(&bytes) {
+            Ok(record) => record,
+            Err(e) => return damaged(format!("not a whole action record ({e})")),
+        };
+        if record.record_format != RECORD_FORMAT || record.id != key.id() || &record.key != key {
+            return damaged("the record is not of this key".into());
+        }
+        for (port, table) in &record.tables {
+            let length = fs::metadata(self.object_path(table)).map(|metadata| metadata.len());
+            match length {
+                Ok(length) if length == table.bytes => (),
+                Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
+                Err(e) => return damaged(format!("table {port}: {e}")),
+            }
+        }
+        Ok(Lookup::Done(Box::new(record)))
+    }
+
+    /// Commits what a stage made: objects first, then the record. If a whole record is there already, that one stands.
+    pub fn publish(&self, key: &StageKey, products: Vec<(String, Product)>, account: Account) -> Result<Published> {
+        let mut tables = BTreeMap::new();
+        for (port, product) in products {
+            let file = match product {
+                Product::Frame(frame) => self.write_frame(&frame)?,
+                Product::File(file) => file,
+            };
+            let table = self.put_object(&file)?;
+            if tables.insert(port.clone(), table).is_some() {
+                return Err(Error::Bug(format!("stage {}: port {port} twice", key.stage)));
+            }
+        }
+        let record = ActionRecord { record_format: RECORD_FORMAT, id: key.id(), key: key.clone(), tables, account };
+        let path = self.record_path(&record.id);
+        let aside = self.workspace()?.fresh();
+        let text = serde_json::to_vec_pretty(&record).map_err(|e| Error::Bug(e.to_string()))?;
+        write_synced(&aside, &text)?;
+        if put_if_absent(&aside, &path)? {
+            let _ = fs::remove_file(&aside);
+            return Ok(Published { record, conflict: None });
+        }
+        match self.action(key)? {
+            Lookup::Done(standing) => {
+                let _ = fs::remove_file(&aside);
+                Ok(Published { conflict: conflict(&standing, &record), record: *standing })
+            }
+            Lookup::Absent | Lookup::Damaged(_) => {
+                replace(&aside, &path)?;
+                Ok(Published { record, conflict: None })
+            }
+        }
+    }
+
+    /// Reads a published table.
+    pub fn load(&self, table: &TableRef) -> Result<Frame> {
+        reader::load(&self.object_path(table), table)
+    }
+
+    fn write_frame(&self, frame: &Frame) -> Result<FinishedFile> {
+        let mut writer = TableWriter::new(frame.schema(), self.workspace()?);
+        writer.push(frame)?;
+        writer.finish()
+    }
+
+    /// Moves a finished file to its place among the objects; an equal one that is there already stands.
+    fn put_object(&self, file: &FinishedFile) -> Result<TableRef> {
+        let table = file.table().clone();
+        let path = self.object_path(&table);
+        if !same_bytes(&path, &table) {
+            make_read_only(file.path())?;
+            replace(file.path(), &path)?;
+        }
+        Ok(table)
+    }
+}
+
+fn same_bytes(path: &Path, table: &TableRef) -> bool {
+    fs::File::open(path).and_then(FileHash::of_reader).is_ok_and(|found| found == table.file_hash)
+}
+
+fn conflict(standing: &ActionRecord, fresh: &ActionRecord) -> Option<String> {
+    let ports = |record: &ActionRecord| -> BTreeMap<String, TableHash> {
+        record.tables.iter().map(|(port, table)| (port.clone(), table.table_hash.clone())).collect()
+    };
+    let (old, new) = (ports(standing), ports(fresh));
+    if old == new {
+        return None;
+    }
+    let differing: Vec<&str> =
+        new.iter().filter(|(port, hash)| old.get(*port) != Some(hash)).map(|(port, _)| port.as_str()).collect();
+    Some(format!(
+        "stage {} is not deterministic: the same key gave other content before in {}; the earlier tables stand (action {})",
+        fresh.key.stage,
+        differing.join(", "),
+        standing.id
+    ))
+}

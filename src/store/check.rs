@@ -1,0 +1,218 @@
+//! The check behind [`super::frame::FrameBuilder::finish`]: columns against a schema, once.
+
+use arrow::array::{Array, ArrayRef, AsArray, DynComparator, RecordBatch, make_comparator};
+use arrow::compute::{SortColumn, SortOptions, lexsort_to_indices, take_record_batch};
+use arrow::datatypes::{Field, Float64Type, Int64Type, Schema};
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::schema::{ColumnType, FieldSchema, TableSchema};
+use crate::error::{Error, Fault, Result};
+
+/// Rows ascend by the key; nulls do not occur in it.
+const ASCENDING: SortOptions = SortOptions { descending: false, nulls_first: true };
+
+/// Columns by name -> the batch in the order of the schema and of the key.
+pub(super) fn parse(schema: &TableSchema, columns: Vec<(String, ArrayRef)>) -> Result<RecordBatch> {
+    let bug = |message: String| Error::Bug(format!("table {}: {message}", schema.name));
+    let mut given = BTreeMap::new();
+    for (name, array) in columns {
+        if given.insert(name.clone(), array).is_some() {
+            return Err(bug(format!("column {name} twice")));
+        }
+    }
+    if let Some(name) = given.keys().find(|name| schema.field_of(name).is_none()) {
+        return Err(bug(format!("column {name} is not in the schema")));
+    }
+    let layout = layout(schema, &given).map_err(bug)?;
+    let metadata = [("calib.schema".to_string(), schema.id()), ("calib.primary_key".to_string(), schema.primary_key.join(","))];
+    let mut fields: Vec<Field> = Vec::new();
+    let mut arrays = Vec::new();
+    for (field, joint) in &layout {
+        let name = field.column(*joint);
+        let array = given.remove(&name).ok_or_else(|| bug(format!("column {name} is missing")))?;
+        if array.data_type() != &field.column_type.arrow() {
+            return Err(bug(format!("column {name} is {}, expected {}", array.data_type(), field.column_type.arrow())));
+        }
+        fields.push(field.arrow(*joint));
+        arrays.push(array);
+    }
+    let arrow_schema = Arc::new(Schema::new_with_metadata(fields, metadata.into_iter().collect()));
+    if arrays.windows(2).any(|pair| pair[0].len() != pair[1].len()) {
+        return Err(bug("columns of unequal length".into()));
+    }
+    let batch =
+        match arrays.iter().zip(arrow_schema.fields()).find(|(array, field)| !field.is_nullable() && array.null_count() > 0) {
+            Some((array, field)) => {
+                let row = (0..array.len()).find(|&row| array.is_null(row)).unwrap_or_default();
+                return Err(bug(format!("column {}, row {row}: null where a value is needed", field.name())));
+            }
+            None => RecordBatch::try_new(arrow_schema, arrays).map_err(|e| bug(e.to_string()))?,
+        };
+    check_values(schema, &layout, &batch)?;
+    in_key_order(schema, batch)
+}
+
+/// The columns that a table has, in order, for the per-joint and optional columns that are there.
+fn layout<'a>(
+    schema: &'a TableSchema,
+    given: &BTreeMap<String, ArrayRef>,
+) -> std::result::Result<Vec<(&'a FieldSchema, Option<usize>)>, String> {
+    let joints = given.keys().filter_map(|name| schema.field_of(name)?.1).max().unwrap_or(0);
+    if joints == 0 && schema.fields.iter().any(|field| field.per_joint && !field.optional) {
+        return Err("no column of any joint".into());
+    }
+    let mut layout = Vec::new();
+    let mut settled: Vec<&str> = Vec::new();
+    for field in &schema.fields {
+        match &field.either {
+            _ if !field.per_joint => {
+                if !field.optional || given.contains_key(&field.name) {
+                    layout.push((field, None));
+                }
+            }
+            None => {
+                let any = (1..=joints).any(|joint| given.contains_key(&field.column(Some(joint))));
+                if !field.optional || any {
+                    layout.extend((1..=joints).map(|joint| (field, Some(joint))));
+                }
+            }
+            Some(group) if !settled.contains(&group.as_str()) => {
+                settled.push(group);
+                let members: Vec<&FieldSchema> =
+                    schema.fields.iter().filter(|other| other.either.as_ref() == Some(group)).collect();
+                for joint in 1..=joints {
+                    let mut there = members.iter().filter(|member| given.contains_key(&member.column(Some(joint))));
+                    match (there.next(), there.next()) {
+                        (Some(member), None) => layout.push((member, Some(joint))),
+                        _ => {
+                            let names: Vec<String> = members.iter().map(|member| member.column(Some(joint))).collect();
+                            return Err(format!("joint {joint} needs exactly one of the columns {}", names.join(", ")));
+                        }
+                    }
+                }
+            }
+            Some(_) => (),
+        }
+    }
+    Ok(layout)
+}
+
+fn check_values(schema: &TableSchema, layout: &[(&FieldSchema, Option<usize>)], batch: &RecordBatch) -> Result<()> {
+    let mut faults = Vec::new();
+    for ((field, joint), array) in layout.iter().zip(batch.columns()) {
+        let place =
+            |row: usize| format!("table {}, column {}, {}", schema.name, field.column(*joint), key_of(schema, batch, row));
+        let range = &field.constraints;
+        let outside = |value: f64| range.min.is_some_and(|min| value < min) || range.max.is_some_and(|max| value > max);
+        let mut bad: Vec<(usize, String)> = Vec::new();
+        match field.column_type {
+            ColumnType::Float64 => {
+                for (row, value) in array.as_primitive::<Float64Type>().iter().enumerate() {
+                    match value {
+                        Some(value) if !value.is_finite() => {
+                            return Err(Error::Bug(format!(
+                                "{}: {value}; a stored number is finite, or null where allowed",
+                                place(row)
+                            )));
+                        }
+                        Some(value) if outside(value) => bad.push((row, value.to_string())),
+                        _ => (),
+                    }
+                }
+            }
+            ColumnType::Int64 if range.min.is_some() || range.max.is_some() => {
+                let values = array.as_primitive::<Int64Type>().iter().enumerate();
+                bad.extend(values.filter_map(|(row, value)| {
+                    value.filter(|value| outside(*value as f64)).map(|value| (row, value.to_string()))
+                }));
+            }
+            ColumnType::Utf8 if !range.values.is_empty() => {
+                for (row, value) in array.as_string::<i32>().iter().enumerate() {
+                    if let Some(value) = value.filter(|value| !range.values.iter().any(|allowed| allowed == value)) {
+                        return Err(Error::Bug(format!("{}: `{value}`; allowed: {}", place(row), range.values.join(", "))));
+                    }
+                }
+            }
+            _ => (),
+        }
+        if let Some((row, value)) = bad.first() {
+            let unit = field
+                .unit
+                .as_deref()
+                .filter(|unit| *unit != "1" && *unit != "row")
+                .map_or(String::new(), |unit| format!(" {unit}"));
+            let more = if bad.len() > 1 { format!(" (and {} more rows)", bad.len() - 1) } else { String::new() };
+            faults.push(Fault::new(
+                place(*row),
+                format!("{value}{unit} is out of range; allowed: {}{unit}{more}", span(range.min, range.max)),
+            ));
+        }
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+}
+
+fn span(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} to {max}"),
+        (Some(min), None) => format!("at least {min}"),
+        (None, Some(max)) => format!("at most {max}"),
+        (None, None) => "any".into(),
+    }
+}
+
+/// `sequence 17`, `step geometry, iteration 3`.
+pub(super) fn key_of(schema: &TableSchema, batch: &RecordBatch, row: usize) -> String {
+    let part = |name: &String| {
+        let array = batch.column_by_name(name)?;
+        let value = match array.data_type() {
+            arrow::datatypes::DataType::Utf8 => array.as_string::<i32>().value(row).to_string(),
+            arrow::datatypes::DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
+            _ => return None,
+        };
+        Some(format!("{name} {value}"))
+    };
+    schema.primary_key.iter().filter_map(part).collect::<Vec<_>>().join(", ")
+}
+
+/// Compares rows of two batches of one table by key.
+pub(super) fn compare_keys(
+    schema: &TableSchema,
+    left: &RecordBatch,
+    right: &RecordBatch,
+) -> Result<impl Fn(usize, usize) -> Ordering> {
+    let compare = |name: &String| -> Result<DynComparator> {
+        let column =
+            |batch: &RecordBatch| batch.column_by_name(name).cloned().ok_or_else(|| Error::Bug(format!("no key column {name}")));
+        make_comparator(&column(left)?, &column(right)?, ASCENDING).map_err(|e| Error::Bug(e.to_string()))
+    };
+    let comparators = schema.sort.iter().map(compare).collect::<Result<Vec<_>>>()?;
+    Ok(move |l, r| comparators.iter().map(|compare| compare(l, r)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal))
+}
+
+fn in_key_order(schema: &TableSchema, batch: RecordBatch) -> Result<RecordBatch> {
+    let ascending = {
+        let compare = compare_keys(schema, &batch, &batch)?;
+        (1..batch.num_rows()).all(|row| compare(row - 1, row).is_lt())
+    };
+    if ascending {
+        return Ok(batch);
+    }
+    let columns: Vec<SortColumn> = schema
+        .sort
+        .iter()
+        .filter_map(|name| batch.column_by_name(name))
+        .map(|values| SortColumn { values: values.clone(), options: Some(ASCENDING) })
+        .collect();
+    let bug = |e: arrow::error::ArrowError| Error::Bug(e.to_string());
+    let sorted = take_record_batch(&batch, &lexsort_to_indices(&columns, None).map_err(bug)?).map_err(bug)?;
+    let twice = {
+        let compare = compare_keys(schema, &sorted, &sorted)?;
+        (1..sorted.num_rows()).find(|&row| compare(row - 1, row).is_eq())
+    };
+    match twice {
+        Some(row) => Err(Error::Bug(format!("table {}: key {} twice", schema.name, key_of(schema, &sorted, row)))),
+        None => Ok(sorted),
+    }
+}

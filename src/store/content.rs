@@ -1,0 +1,112 @@
+//! The identity of a table: a hash of its logical content, whatever the chunks and whoever wrote the Parquet file.
+//!
+//! One blake3 stream per column over its cells (a presence byte, then 8 little-endian bytes, 1 byte, or length and text), then
+//! one hash over kind, major version, row count and every column's name, type, unit and stream.
+
+use arrow::array::{Array, ArrayRef, AsArray};
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+use super::frame::Frame;
+use super::schema::TableSchema;
+
+/// Hash of a table's logical content, as 64 hex digits.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct TableHash(String);
+
+impl TableHash {
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for TableHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl Frame {
+    /// The identity of this table.
+    pub fn table_hash(&self) -> TableHash {
+        let mut hasher = ContentHasher::new(self.schema());
+        hasher.push(self);
+        hasher.finish()
+    }
+}
+
+/// Hashes a table chunk by chunk; every chunk has the same columns.
+pub(super) struct ContentHasher {
+    schema: &'static TableSchema,
+    rows: u64,
+    columns: Vec<(String, blake3::Hasher)>,
+}
+
+impl ContentHasher {
+    pub(super) fn new(schema: &'static TableSchema) -> Self {
+        Self { schema, rows: 0, columns: Vec::new() }
+    }
+
+    pub(super) fn push(&mut self, chunk: &Frame) {
+        if self.columns.is_empty() {
+            let header = |field: &std::sync::Arc<arrow::datatypes::Field>| {
+                let unit = field.metadata().get("unit").map_or("", String::as_str);
+                format!("{}\0{}\0{unit}", field.name(), field.data_type())
+            };
+            self.columns = chunk.arrow_schema().fields().iter().map(|field| (header(field), blake3::Hasher::new())).collect();
+        }
+        assert_eq!(self.columns.len(), chunk.batch().num_columns(), "chunks of one table have the same columns");
+        self.rows += chunk.rows() as u64;
+        for ((_, hasher), array) in self.columns.iter_mut().zip(chunk.batch().columns()) {
+            hash_cells(hasher, array);
+        }
+    }
+
+    pub(super) fn finish(self) -> TableHash {
+        let mut whole = blake3::Hasher::new();
+        let mut text = |text: &str| {
+            whole.update(&(text.len() as u64).to_le_bytes());
+            whole.update(text.as_bytes());
+        };
+        text("calib table 1");
+        text(&self.schema.name);
+        text(&self.schema.version.major.to_string());
+        text(&self.rows.to_string());
+        for (header, hasher) in self.columns {
+            text(&header);
+            text(&hasher.finalize().to_hex());
+        }
+        TableHash(whole.finalize().to_hex().to_string())
+    }
+}
+
+/// Feeds the cells of a column, presence first, in blocks that are large enough for blake3 to be fast.
+fn hash_cells(hasher: &mut blake3::Hasher, array: &ArrayRef) {
+    const BLOCK: usize = 1 << 16; // bytes
+    let mut block = Vec::with_capacity(BLOCK + 64);
+    for row in 0..array.len() {
+        block.push(u8::from(array.is_valid(row)));
+        if array.is_valid(row) {
+            match array.data_type() {
+                DataType::Float64 => {
+                    block.extend_from_slice(&array.as_primitive::<Float64Type>().value(row).to_bits().to_le_bytes())
+                }
+                DataType::Int64 => block.extend_from_slice(&array.as_primitive::<Int64Type>().value(row).to_le_bytes()),
+                DataType::Boolean => block.push(u8::from(array.as_boolean().value(row))),
+                DataType::Utf8 => {
+                    let text = array.as_string::<i32>().value(row);
+                    block.extend_from_slice(&(text.len() as u64).to_le_bytes());
+                    block.extend_from_slice(text.as_bytes());
+                }
+                other => unreachable!("no schema has a column of type {other}"),
+            }
+        }
+        if block.len() >= BLOCK {
+            hasher.update(&block);
+            block.clear();
+        }
+    }
+    hasher.update(&block);
+}

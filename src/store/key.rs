@@ -1,0 +1,99 @@
+//! What a stage's result depends on, as a record that a person can read; its hash names the action.
+//!
+//! Content only: never a path, a date, a host, a thread count or calib's own version.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::io::Read;
+
+use super::content::TableHash;
+
+/// Bumped when the meaning of a key changes: all stages run again.
+pub const KEY_FORMAT: u32 = 1;
+
+/// Everything that the outputs of a stage depend on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StageKey {
+    pub key_format: u32,
+    pub stage: String,
+    pub implementation: u32,
+    /// Resolved settings, defaults filled in.
+    pub settings: Value,
+    /// Input tables by port.
+    pub reads: BTreeMap<String, Vec<TableHash>>,
+    /// Raw input files, by their place in the settings.
+    pub files: BTreeMap<String, FileHash>,
+    /// Output schemas (`name/version`) by port.
+    pub schemas: BTreeMap<String, String>,
+    pub seed: u64,
+}
+
+/// The hash of a [`StageKey`], as 64 hex digits.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ActionId(String);
+
+/// blake3 of a file's bytes, as 64 hex digits.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct FileHash(String);
+
+impl StageKey {
+    pub fn id(&self) -> ActionId {
+        let value = serde_json::to_value(self).expect("a key is plain data");
+        ActionId(blake3::hash(canonical(&value).as_bytes()).to_hex().to_string())
+    }
+}
+
+impl ActionId {
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for ActionId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl FileHash {
+    pub(super) fn of_hasher(hasher: &blake3::Hasher) -> Self {
+        Self(hasher.finalize().to_hex().to_string())
+    }
+    /// Reads to the end.
+    pub fn of_reader(mut reader: impl Read) -> std::io::Result<Self> {
+        let mut hasher = blake3::Hasher::new();
+        let mut block = vec![0; 1 << 18];
+        loop {
+            match reader.read(&mut block)? {
+                0 => return Ok(Self::of_hasher(&hasher)),
+                n => hasher.update(&block[..n]),
+            };
+        }
+    }
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for FileHash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// JSON without white space, keys in order, floats as their shortest round trip: one text per value.
+pub fn canonical(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let ordered: BTreeMap<&String, &Value> = map.iter().collect();
+            let member = |(key, value): (&String, &Value)| format!("{}:{}", Value::String(key.clone()), canonical(value));
+            format!("{{{}}}", ordered.into_iter().map(member).collect::<Vec<_>>().join(","))
+        }
+        Value::Array(items) => format!("[{}]", items.iter().map(canonical).collect::<Vec<_>>().join(",")),
+        plain => plain.to_string(),
+    }
+}

@@ -1,0 +1,73 @@
+//! The folder of one process below `tmp/`, locked while the process lives, swept by others when it is dead.
+
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::disk::{make_dir, refused};
+use crate::error::Result;
+
+/// `tmp/<pid>.<n>/` with its lock `tmp/<pid>.<n>.lock`; the kernel frees the lock when the process dies.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    dir: PathBuf,
+    lock_path: PathBuf,
+    _lock: File,
+    next: AtomicU64,
+}
+
+impl Workspace {
+    /// Sweeps what dead processes left, then opens a folder of its own.
+    pub(super) fn open(tmp: &Path) -> Result<Self> {
+        make_dir(tmp)?;
+        sweep(tmp);
+        let mut n = 0_u64;
+        loop {
+            let name = format!("{}.{n}", std::process::id());
+            let lock_path = tmp.join(format!("{name}.lock"));
+            n += 1;
+            let lock = match File::create_new(&lock_path) {
+                Ok(lock) => lock,
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
+                Err(e) => return Err(refused(&lock_path, "write", &e)),
+            };
+            // A sweeper may have come between creating and locking; then the name is gone or held: take another.
+            if lock.try_lock().is_err() || !lock_path.exists() {
+                continue;
+            }
+            let dir = tmp.join(&name);
+            make_dir(&dir)?;
+            return Ok(Self { dir, lock_path, _lock: lock, next: AtomicU64::new(0) });
+        }
+    }
+
+    /// A path that nobody else uses.
+    pub(super) fn fresh(&self) -> PathBuf {
+        self.dir.join(self.next.fetch_add(1, Ordering::Relaxed).to_string())
+    }
+}
+
+impl Drop for Workspace {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.dir);
+        let _ = fs::remove_file(&self.lock_path);
+    }
+}
+
+/// Removes the folders whose owner is dead, that is, whose lock can be had. What cannot be removed stays: it harms nobody.
+fn sweep(tmp: &Path) {
+    let Ok(entries) = fs::read_dir(tmp) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.extension().is_none_or(|extension| extension != "lock") {
+            continue;
+        }
+        let Ok(lock) = File::open(&path) else { continue };
+        match lock.try_lock() {
+            Ok(()) => {
+                let _ = fs::remove_dir_all(path.with_extension(""));
+                let _ = fs::remove_file(&path);
+            }
+            Err(TryLockError::WouldBlock | TryLockError::Error(_)) => (),
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Tables to Parquet files: chunks in, one file out, in bounded memory and with bytes that do not depend on the chunks.
+
+use arrow::array::RecordBatch;
+use arrow::compute::concat_batches;
+use arrow::datatypes::SchemaRef;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{KeyValue, SortingColumn};
+use parquet::file::properties::WriterProperties;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::actions::TableRef;
+use super::check;
+use super::content::ContentHasher;
+use super::disk::refused;
+use super::frame::Frame;
+use super::key::FileHash;
+use super::schema::TableSchema;
+use super::workspace::Workspace;
+use crate::error::{Error, Result};
+
+/// Rows of a row group: a few MB of a recording, so that readers can skip and writers stay small.
+const GROUP_ROWS: usize = 1 << 16;
+
+/// Writes one table chunk by chunk; keys ascend within and across chunks.
+pub struct TableWriter {
+    schema: &'static TableSchema,
+    path: PathBuf,
+    workspace: Arc<Workspace>,
+    open: Option<Open>,
+}
+
+/// A table's finished file, not yet published. Dropped, it leaves nothing.
+#[derive(Debug)]
+pub struct FinishedFile {
+    table: TableRef,
+    path: PathBuf,
+    _workspace: Arc<Workspace>,
+}
+
+struct Open {
+    writer: ArrowWriter<HashingFile>,
+    arrow_schema: SchemaRef,
+    content: ContentHasher,
+    waiting: Vec<RecordBatch>,
+    last: Option<RecordBatch>,
+    rows: u64,
+}
+
+impl TableWriter {
+    pub(super) fn new(schema: &'static TableSchema, workspace: Arc<Workspace>) -> Self {
+        Self { schema, path: workspace.fresh(), workspace, open: None }
+    }
+
+    /// Appends a chunk; a table without rows still needs one empty chunk.
+    pub fn push(&mut self, chunk: &Frame) -> Result<()> {
+        if chunk.kind() != self.schema.name {
+            return Err(Error::Bug(format!("a chunk of table {} for a table of {}", chunk.kind(), self.schema.name)));
+        }
+        if self.open.is_none() {
+            self.open = Some(Open::new(self.schema, chunk, &self.path)?);
+        }
+        let Some(open) = &mut self.open else { return Ok(()) };
+        open.push(self.schema, chunk, &self.path)
+    }
+
+    pub fn rows(&self) -> u64 {
+        self.open.as_ref().map_or(0, |open| open.rows)
+    }
+
+    /// Closes the file and makes it durable.
+    pub fn finish(self) -> Result<FinishedFile> {
+        let open = self.open.ok_or_else(|| Error::Bug(format!("table {}: finished without a chunk", self.schema.name)))?;
+        let table = open.finish(self.schema, &self.path)?;
+        Ok(FinishedFile { table, path: self.path, _workspace: self.workspace })
+    }
+}
+
+impl FinishedFile {
+    pub fn table(&self) -> &TableRef {
+        &self.table
+    }
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for FinishedFile {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+impl Open {
+    fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
+        let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
+        let sink = HashingFile { file: BufWriter::with_capacity(1 << 18, file), hasher: blake3::Hasher::new(), bytes: 0 };
+        let arrow_schema = chunk.arrow_schema();
+        let writer = ArrowWriter::try_new(sink, arrow_schema.clone(), Some(properties(schema, &arrow_schema)?));
+        let writer = writer.map_err(|e| parquet_refused(path, e))?;
+        Ok(Self { writer, arrow_schema, content: ContentHasher::new(schema), waiting: Vec::new(), last: None, rows: 0 })
+    }
+
+    fn push(&mut self, schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<()> {
+        if chunk.arrow_schema() != self.arrow_schema {
+            return Err(Error::Bug(format!("table {}: chunks with different columns", schema.name)));
+        }
+        self.content.push(chunk);
+        let batch = chunk.batch();
+        if batch.num_rows() == 0 {
+            return Ok(());
+        }
+        if let Some(last) = &self.last
+            && !check::compare_keys(schema, last, batch)?(0, 0).is_lt()
+        {
+            let (before, after) = (check::key_of(schema, last, 0), check::key_of(schema, batch, 0));
+            return Err(Error::Bug(format!("table {}: key {after} after {before}; keys ascend across chunks", schema.name)));
+        }
+        self.last = Some(batch.slice(batch.num_rows() - 1, 1));
+        self.rows += batch.num_rows() as u64;
+        self.waiting.push(batch.clone());
+        let waiting: usize = self.waiting.iter().map(RecordBatch::num_rows).sum();
+        if waiting >= GROUP_ROWS { self.write_groups(path) } else { Ok(()) }
+    }
+
+    /// Writes whole row groups from what is waiting, so that their borders do not depend on the chunks.
+    fn write_groups(&mut self, path: &Path) -> Result<()> {
+        let all = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
+        let whole = all.num_rows() / GROUP_ROWS * GROUP_ROWS;
+        for start in (0..whole).step_by(GROUP_ROWS) {
+            self.write(&all.slice(start, GROUP_ROWS), path)?;
+        }
+        let rest = all.slice(whole, all.num_rows() - whole);
+        self.waiting = if rest.num_rows() > 0 { vec![rest] } else { Vec::new() };
+        Ok(())
+    }
+
+    fn write(&mut self, batch: &RecordBatch, path: &Path) -> Result<()> {
+        self.writer.write(batch).map_err(|e| parquet_refused(path, e))
+    }
+
+    fn finish(mut self, schema: &'static TableSchema, path: &Path) -> Result<TableRef> {
+        if !self.waiting.is_empty() {
+            let rest = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
+            self.write(&rest, path)?;
+        }
+        let table_hash = self.content.finish();
+        self.writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
+        let sink = self.writer.into_inner().map_err(|e| parquet_refused(path, e))?;
+        let (file_hash, bytes) = sink.close().map_err(|e| refused(path, "write", &e))?;
+        Ok(TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes })
+    }
+}
+
+/// Everything that shapes the bytes, so that equal tables make equal files. Schema, key and units are plain key-values besides,
+/// for readers that do not see Arrow's field metadata.
+fn properties(schema: &TableSchema, arrow_schema: &SchemaRef) -> Result<WriterProperties> {
+    let index = |name: &String| {
+        arrow_schema.index_of(name).map(|i| SortingColumn { column_idx: i as i32, descending: false, nulls_first: false })
+    };
+    let sorting = schema.sort.iter().map(index).collect::<Result<Vec<_>, _>>().map_err(|e| Error::Bug(e.to_string()))?;
+    let unit = |field: &Arc<arrow::datatypes::Field>| {
+        field.metadata().get("unit").map(|unit| (field.name().clone(), unit.clone().into()))
+    };
+    let units: serde_json::Map<String, serde_json::Value> = arrow_schema.fields().iter().filter_map(unit).collect();
+    let key_values = [
+        ("calib.schema", schema.id()),
+        ("calib.description", schema.description.clone()),
+        ("calib.primary_key", schema.primary_key.join(",")),
+        ("calib.units", super::key::canonical(&units.into())),
+    ];
+    let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
+    Ok(WriterProperties::builder()
+        .set_compression(Compression::ZSTD(level))
+        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .set_sorting_columns(Some(sorting))
+        .set_key_value_metadata(Some(key_values.map(|(key, value)| KeyValue::new(key.into(), value)).into()))
+        .build())
+}
+
+/// The disk's own words, where there are any.
+pub(super) fn parquet_refused(path: &Path, error: ParquetError) -> Error {
+    if let ParquetError::External(source) = &error
+        && let Some(io) = source.downcast_ref::<io::Error>()
+    {
+        return refused(path, "write", io);
+    }
+    Error::store(path.display().to_string(), format!("cannot write: {error}"))
+}
+
+/// A file whose bytes are hashed on their way.
+struct HashingFile {
+    file: BufWriter<File>,
+    hasher: blake3::Hasher,
+    bytes: u64,
+}
+
+impl Write for HashingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.file.write(bytes)?;
+        self.hasher.update(&bytes[..n]);
+        self.bytes += n as u64;
+        Ok(n)
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl HashingFile {
+    fn close(self) -> io::Result<(FileHash, u64)> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        file.sync_all()?;
+        Ok((FileHash::of_hasher(&self.hasher), self.bytes))
+    }
+}
