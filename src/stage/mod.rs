@@ -1,8 +1,7 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
 use crate::error::Result;
-use crate::store::frame::Frame;
-use crate::table::Table;
+use crate::table::{Frame, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::io::Read;
@@ -92,7 +91,7 @@ macro_rules! reads {
                 vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY } ),* ]
             }
             #[allow(unused_mut, unused_variables)]
-            fn take(frames: Vec<Vec<(String, crate::store::frame::Frame)>>) -> crate::error::Result<Self> {
+            fn take(frames: Vec<Vec<(String, crate::table::Frame)>>) -> crate::error::Result<Self> {
                 let mut frames = frames.into_iter();
                 Ok(Self { $( $field: <$ty as crate::stage::PortValue>::take(frames.next().expect("one entry per port"))?, )* })
             }

@@ -4,7 +4,7 @@
 //! is written by hand.
 
 use crate::error::Result;
-use crate::store::frame::Frame;
+pub use crate::store::frame::Frame;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {

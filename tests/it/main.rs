@@ -2,3 +2,6 @@
 
 mod effects;
 mod fixture;
+mod layers;
+mod store;
+mod tables;
