@@ -1,5 +1,11 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
+mod report;
+mod validate;
+
+pub use report::{Report, ReportReads};
+pub use validate::{Validate, ValidateReads};
+
 use crate::error::Result;
 use crate::table::{Frame, Table};
 use schemars::JsonSchema;

@@ -1,7 +1,9 @@
 //! Position error by step and set; held-out and training rows apart.
 
 crate::table::rows! { "statistics",
-    /// Statistics of the error length, one (step, set) a row; key (`order`, `set`).
+    /// Statistics of the error length, one (step, set, held out) a row; key (`order`, `set`, `held_out`).
+    ///
+    /// A set of which a step used only some rows makes two rows: what was held out is never averaged with what was fitted.
     pub struct Statistics of StatisticsRow {
         /// Place of the step in the pipeline, from 0.
         order: i64,
@@ -10,16 +12,21 @@ crate::table::rows! { "statistics",
         /// False: training rows, the error is flattered.
         held_out: bool,
         points: i64,
+        /// Arithmetic mean of the error length.
         mean_mm: f64,
+        /// Sample standard deviation of the error length (divisor points - 1); 0 for a single point.
         std_mm: f64,
+        /// Root mean square of the error length (divisor points).
         rms_mm: f64,
+        /// Linear between order statistics, like `p95_mm`.
         median_mm: f64,
         p95_mm: f64,
         max_mm: f64,
+        /// Root mean square of the residual along one axis of the tracker's frame, its mean not removed.
         rms_x_mm: f64,
         rms_y_mm: f64,
         rms_z_mm: f64,
-        /// Expected rms from the measurement noise alone.
+        /// Expected rms from the measurement noise alone: root mean square of `noise_mm`.
         noise_rms_mm: f64,
     }
 }

@@ -1,0 +1,256 @@
+//! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
+
+use super::distribution::{self, cumulative, histogram};
+use super::number::{count, mm};
+use super::workspace::{Colours, VIEWS, scatter};
+use super::Tables;
+use crate::error::{Error, Result};
+use crate::table::{Prediction, Statistics, StatisticsRow};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The steps in pipeline order, each with the colour it has in all pictures.
+pub(super) struct Steps(BTreeMap<i64, String>);
+
+impl Steps {
+    pub fn new(statistics: &Statistics) -> Self {
+        Self(statistics.0.iter().map(|row| (row.order, row.step.clone())).collect())
+    }
+    fn last(&self) -> Option<i64> {
+        self.0.last_key_value().map(|(order, _)| *order)
+    }
+    fn colour(&self, order: i64) -> String {
+        // Colours of the steps between the first and the last repeat after five.
+        if Some(order) == self.last() { "s-last".into() } else { format!("s{}", if order == 0 { 0 } else { 1 + (order - 1) % 5 }) }
+    }
+    /// Colour of a step by name; a step without predictions has the first one's.
+    pub fn colour_of(&self, step: &str) -> String {
+        let order = self.0.iter().rev().find(|(_, name)| *name == step).map_or(0, |(order, _)| *order);
+        self.colour(order)
+    }
+}
+
+#[derive(Serialize)]
+pub(super) struct Errors {
+    verdict: Verdict,
+    /// Sets still held out after the last step, the verdict's first; then those that a later step was fitted to.
+    held_out: Vec<Block>,
+    training: Vec<Block>,
+    pictures: Vec<Picture>,
+    legend: Vec<(String, String)>,
+}
+
+#[derive(Serialize)]
+struct Verdict {
+    /// `better`, `worse` or `unknown`: the class of its colour.
+    kind: &'static str,
+    sentence: String,
+    before: Option<(String, String)>,
+    after: Option<(String, String)>,
+    facts: Vec<(&'static str, String)>,
+    others: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Block {
+    set: String,
+    note: Option<&'static str>,
+    rows: Vec<Row>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    step: String,
+    colour: String,
+    points: String,
+    /// mean, std, p95, max, rms, median, rms x, y, z, noise.
+    values: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Picture {
+    set: String,
+    points: String,
+    histogram: String,
+    cumulative: String,
+}
+
+impl Errors {
+    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
+        let rows = &tables.statistics.0;
+        let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.last() && r.held_out).collect();
+        if let Some(wished) = wished
+            && !last.iter().any(|row| row.set == wished)
+        {
+            let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
+            return Err(Error::spec(
+                "with.set",
+                format!("`{wished}` is no set held out after the last step; allowed: {}", allowed.join(", ")),
+            ));
+        }
+        last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));
+        let kept: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
+        let later = sets(rows, true).into_iter().filter(|set| !kept.contains(set));
+        let block = |set: &str, held_out: bool, note| Block {
+            set: set.into(),
+            note,
+            rows: rows.iter().filter(|r| r.set == set && r.held_out == held_out).map(|r| row(r, steps)).collect(),
+        };
+        let held_out = kept.iter().map(|set| block(set, true, None));
+        let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
+        Ok(Self {
+            verdict: verdict(rows, &last),
+            held_out: held_out.chain(used).collect(),
+            training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
+            pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
+            legend: steps.0.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
+        })
+    }
+}
+
+/// Names of sets of this kind, in the order of their first row.
+fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
+    let mut names = Vec::new();
+    for row in rows.iter().filter(|row| row.held_out == held_out) {
+        if !names.contains(&row.set.as_str()) {
+            names.push(row.set.as_str());
+        }
+    }
+    names
+}
+
+fn row(row: &StatisticsRow, steps: &Steps) -> Row {
+    let values = [
+        row.mean_mm,
+        row.std_mm,
+        row.p95_mm,
+        row.max_mm,
+        row.rms_mm,
+        row.median_mm,
+        row.rms_x_mm,
+        row.rms_y_mm,
+        row.rms_z_mm,
+        row.noise_rms_mm,
+    ];
+    Row {
+        step: row.step.clone(),
+        colour: steps.colour(row.order),
+        points: count(row.points),
+        values: values.into_iter().map(mm).collect(),
+    }
+}
+
+/// The first step with held-out rows of the same set as `after`.
+fn before<'a>(rows: &'a [StatisticsRow], after: &StatisticsRow) -> Option<&'a StatisticsRow> {
+    rows.iter().filter(|r| r.held_out && r.set == after.set && r.order < after.order).min_by_key(|r| r.order)
+}
+
+fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
+    let Some(after) = last.first() else {
+        return Verdict {
+            kind: "unknown",
+            sentence: "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
+                       the model was fitted to, and flatter it."
+                .into(),
+            before: None,
+            after: None,
+            facts: Vec::new(),
+            others: Vec::new(),
+        };
+    };
+    let before_row = before(rows, after);
+    let points = format!("{} points of the set \u{201c}{}\u{201d}, to which nothing was fitted", count(after.points), after.set);
+    let (kind, sentence) = match before_row {
+        Some(before) if after.mean_mm < before.mean_mm => (
+            "better",
+            format!(
+                "The mean position error fell from {} mm to {} mm on {points}.",
+                mm(before.mean_mm),
+                mm(after.mean_mm)
+            ),
+        ),
+        Some(before) => (
+            "worse",
+            format!(
+                "The calibration did not help: the mean position error went from {} mm to {} mm on {points}.",
+                mm(before.mean_mm),
+                mm(after.mean_mm)
+            ),
+        ),
+        None => ("unknown", format!("The mean position error is {} mm on {points}.", mm(after.mean_mm))),
+    };
+    let uneven = before_row.filter(|before| before.points != after.points).map(|before| {
+        format!("Before, the set had {} held-out points; the two means are not of the same points.", count(before.points))
+    });
+    let other = |row: &&StatisticsRow| {
+        let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
+        format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
+    };
+    Verdict {
+        kind,
+        sentence,
+        before: before_row.map(|before| (before.step.clone(), mm(before.mean_mm))),
+        after: Some((after.step.clone(), mm(after.mean_mm))),
+        facts: vec![
+            ("95 % of points within", mm(after.p95_mm)),
+            ("worst point", mm(after.max_mm)),
+            ("rms", mm(after.rms_mm)),
+            ("rms of measurement noise alone", mm(after.noise_rms_mm)),
+        ],
+        others: uneven.into_iter().chain(last.iter().skip(1).map(other)).collect(),
+    }
+}
+
+fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
+    let rows = tables.statistics.0.iter().filter(|row| row.held_out && row.set == set.set);
+    let errors: Vec<distribution::Errors> = rows
+        .map(|row| {
+            let table = tables.prediction.iter().flat_map(|table| &table.0);
+            let of_row = table.filter(|p| p.step == row.step && p.set == row.set && p.held_out);
+            let mut sorted_mm: Vec<f64> = of_row.map(|p| p.error_mm).collect();
+            sorted_mm.sort_by(f64::total_cmp);
+            distribution::Errors { step: row.step.clone(), colour: steps.colour(row.order), sorted_mm, mean_mm: row.mean_mm }
+        })
+        .filter(|errors| !errors.sorted_mm.is_empty())
+        .collect();
+    Picture {
+        set: set.set.clone(),
+        points: count(set.points),
+        histogram: histogram(&errors, &format!("Histogram of the position error after each step, set {}", set.set)),
+        cumulative: cumulative(&errors, &format!("Cumulative position error after each step, set {}", set.set)),
+    }
+}
+
+/// The error over the workspace before the first and after the last step.
+#[derive(Serialize)]
+pub(super) struct Workspace {
+    legend: Vec<(String, String)>,
+    panels: Vec<Panel>,
+}
+
+#[derive(Serialize)]
+struct Panel {
+    name: String,
+    remark: String,
+    svg: String,
+}
+
+impl Workspace {
+    /// Nothing where nothing was predicted.
+    pub fn new(prediction: &[Prediction]) -> Option<Self> {
+        let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
+        let first = filled.next()?;
+        let last = filled.next_back();
+        let colours = Colours::new(first, last.unwrap_or(first));
+        let mut panels = Vec::new();
+        for view in VIEWS {
+            for table in std::iter::once(first).chain(last) {
+                let step = table.0.first().map_or("", |row| &row.step);
+                let name = format!("{} after \u{201c}{step}\u{201d}", view.name);
+                let (svg, remark) = scatter(view, table, [first, last.unwrap_or(first)], &colours, &name);
+                panels.push(Panel { name, remark, svg });
+            }
+        }
+        Some(Self { legend: colours.legend(), panels })
+    }
+}

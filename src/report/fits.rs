@@ -1,0 +1,137 @@
+//! How the fits went: convergence, what the data could see, training.
+
+use super::Tables;
+use super::course::{Line, course, spectrum};
+use super::errors::Steps;
+use super::number::{count, mm, significant};
+use crate::table::{FitRow, ObservabilityRow, TrainingRow};
+use serde::Serialize;
+
+#[derive(Serialize)]
+pub(super) struct Section {
+    fits: Vec<FitView>,
+    courses: Option<String>,
+    legend: Vec<(String, String)>,
+    seen: Vec<Seen>,
+    trainings: Vec<TrainingView>,
+}
+
+/// The last iteration of a step.
+#[derive(Serialize)]
+struct FitView {
+    step: String,
+    iterations: String,
+    rms: String,
+    cost: String,
+    gradient: String,
+    step_norm: String,
+    stop: String,
+}
+
+#[derive(Serialize)]
+struct Seen {
+    step: String,
+    /// Quantity, value, meaning.
+    quantities: Vec<(String, String, String)>,
+    spectrum: Option<String>,
+}
+
+#[derive(Serialize)]
+struct TrainingView {
+    step: String,
+    phase: String,
+    last: String,
+    evaluations: String,
+    train: String,
+    check: Option<String>,
+    svg: String,
+}
+
+impl Section {
+    pub fn new(tables: &Tables, steps: &Steps) -> Self {
+        let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| row.step.clone());
+        let lines: Vec<Line> = fits
+            .iter()
+            .map(|(step, rows)| Line {
+                colour: steps.colour_of(step),
+                points: rows.iter().map(|row| [row.iteration as f64, row.rms_mm]).collect(),
+            })
+            .collect();
+        let trainings =
+            groups(tables.training.iter().flat_map(|t| &t.0), |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
+        let seen = groups(tables.observability.iter().flat_map(|t| &t.0), |row: &ObservabilityRow| row.step.clone());
+        Self {
+            courses: (!lines.is_empty())
+                .then(|| course(&lines, "iteration", "rms over the rows of the fit, mm", "Convergence of the fits")),
+            legend: fits.iter().map(|(step, _)| (steps.colour_of(step), step.clone())).collect(),
+            fits: fits.iter().filter_map(|(step, rows)| Some(fit(step, rows.last()?))).collect(),
+            seen: seen.into_iter().map(|(step, rows)| see(step, &rows)).collect(),
+            trainings: trainings.into_iter().filter_map(|((step, phase), rows)| training(step, phase, &rows)).collect(),
+        }
+    }
+}
+
+/// Rows by a key, in the order in which the keys first come.
+fn groups<'a, R, K: PartialEq>(rows: impl Iterator<Item = &'a R>, key: impl Fn(&R) -> K) -> Vec<(K, Vec<&'a R>)> {
+    let mut groups: Vec<(K, Vec<&R>)> = Vec::new();
+    for row in rows {
+        let key = key(row);
+        match groups.iter_mut().find(|group| group.0 == key) {
+            Some(group) => group.1.push(row),
+            None => groups.push((key, vec![row])),
+        }
+    }
+    groups
+}
+
+fn fit(step: &str, last: &FitRow) -> FitView {
+    FitView {
+        step: step.into(),
+        iterations: count(last.iteration),
+        rms: mm(last.rms_mm),
+        cost: significant(last.cost, 6),
+        gradient: significant(last.gradient, 2),
+        step_norm: significant(last.step_norm, 2),
+        stop: last.stop.clone().unwrap_or_else(|| "not stated".into()),
+    }
+}
+
+fn see(step: String, rows: &[&ObservabilityRow]) -> Seen {
+    let values: Vec<(i64, f64)> =
+        rows.iter().filter(|row| row.quantity == "singular_value").map(|row| (row.index, row.value)).collect();
+    let rank = rows.iter().find(|row| row.quantity == "rank").map(|row| row.value as i64);
+    let others = rows.iter().filter(|row| row.quantity != "singular_value");
+    Seen {
+        spectrum: (!values.is_empty()).then(|| spectrum(&values, rank, &format!("Singular values of the step {step}"))),
+        quantities: others
+            .map(|row| {
+                let whole = row.value.fract() == 0.0 && row.value.abs() < 1e6;
+                let value = if whole { count(row.value as i64) } else { significant(row.value, 4) };
+                let name = if row.index == 0 { row.quantity.clone() } else { format!("{} {}", row.quantity, row.index) };
+                (name, value, row.meaning.clone())
+            })
+            .collect(),
+        step,
+    }
+}
+
+fn training(step: String, phase: String, rows: &[&TrainingRow]) -> Option<TrainingView> {
+    let last = rows.last()?;
+    let line = |colour: &str, value: fn(&TrainingRow) -> Option<f64>| Line {
+        colour: colour.into(),
+        points: rows.iter().filter_map(|row| Some([row.generation as f64, value(row)?])).collect(),
+    };
+    let lines: Vec<Line> = [line("train", |row| Some(row.train_rms_mm)), line("check", |row| row.check_rms_mm)]
+        .into_iter()
+        .filter(|line| !line.points.is_empty())
+        .collect();
+    Some(TrainingView {
+        svg: course(&lines, "generation", "rms of the position error, mm", &format!("Training of {step}, {phase}")),
+        last: count(last.generation),
+        evaluations: count(last.evaluations),
+        train: mm(last.train_rms_mm),
+        check: last.check_rms_mm.map(mm),
+        step,
+        phase,
+    })
+}

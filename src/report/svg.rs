@@ -1,0 +1,94 @@
+//! A minimal SVG writer: elements with a class, coordinates to a tenth of a unit, text escaped. Colours are the style sheet's.
+
+use std::fmt::Write as _;
+
+pub(super) type Point = [f64; 2];
+
+/// A picture under construction, in user units (about a CSS pixel on a wide screen).
+pub(super) struct Svg {
+    width: f64,
+    height: f64,
+    body: String,
+}
+
+impl Svg {
+    pub fn new(width: f64, height: f64) -> Self {
+        Self { width, height, body: String::new() }
+    }
+    pub fn line(&mut self, class: &str, from: Point, to: Point) {
+        self.path(class, &[from, to]);
+    }
+    /// An open line through the points.
+    pub fn path(&mut self, class: &str, points: &[Point]) {
+        let _ = write!(self.body, "<path class=\"{class}\" d=\"");
+        for (i, point) in points.iter().enumerate() {
+            let _ = write!(self.body, "{}{} {}", if i == 0 { 'M' } else { 'L' }, tenth(point[0]), tenth(point[1]));
+        }
+        self.body.push_str("\"/>\n");
+    }
+    pub fn rect(&mut self, class: &str, corner: Point, size: Point) {
+        let _ = writeln!(
+            self.body,
+            "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
+            tenth(corner[0]),
+            tenth(corner[1]),
+            tenth(size[0]),
+            tenth(size[1])
+        );
+    }
+    pub fn circle(&mut self, class: &str, centre: Point, radius: f64) {
+        let _ = writeln!(
+            self.body,
+            "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
+            tenth(centre[0]),
+            tenth(centre[1]),
+            tenth(radius)
+        );
+    }
+    /// Text at its baseline; the class says how it is anchored.
+    pub fn text(&mut self, class: &str, at: Point, text: &str) {
+        let _ = writeln!(
+            self.body,
+            "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>",
+            tenth(at[0]),
+            tenth(at[1]),
+            escape(text)
+        );
+    }
+    /// The `svg` element; `title` is what a screen reader says.
+    pub fn finish(self, title: &str) -> String {
+        format!(
+            "<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\">\n<title>{}</title>\n{}</svg>",
+            tenth(self.width),
+            tenth(self.height),
+            escape(title),
+            self.body
+        )
+    }
+}
+
+fn tenth(value: f64) -> String {
+    let text = format!("{value:.1}");
+    match text.strip_suffix(".0").unwrap_or(&text) {
+        "-0" => "0".into(),
+        short => short.into(),
+    }
+}
+
+/// Text as XML: markup is quoted, and control characters, which XML cannot hold at all, are replaced.
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            '\t' | '\n' => out.push(' '),
+            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}

@@ -1,0 +1,103 @@
+//! `validate`: statistics of the position error after every step, held-out and training rows apart.
+
+use crate::error::{Error, Result};
+use crate::stage::{Context, Labelled, Stage, reads, writes};
+use crate::table::{Prediction, PredictionRow, Statistics, StatisticsRow};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Has no settings: what is held out follows from the split and the steps.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Validate {}
+
+reads! {
+    pub struct ValidateReads {
+        prediction: Vec<Labelled<Prediction>>,
+    }
+}
+writes! {
+    pub struct ValidateWrites {
+        statistics: Statistics,
+    }
+}
+
+impl Stage for Validate {
+    const NAME: &'static str = "validate";
+    const SUMMARY: &'static str = "States the position error after every step, on held-out and training rows apart";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = ValidateReads;
+    type Writes = ValidateWrites;
+
+    fn run(&self, reads: ValidateReads, context: &Context) -> Result<ValidateWrites> {
+        if reads.prediction.is_empty() {
+            return Err(Error::spec(
+                context.id,
+                "nothing to validate: no earlier stage writes `prediction` (identify, stiffness and learn do)",
+            ));
+        }
+        let mut statistics = Statistics::default();
+        for (order, step) in (0..).zip(&reads.prediction) {
+            for ((name, set, held_out), rows) in groups(step)? {
+                statistics.0.push(describe(order, name, set, held_out, &rows));
+            }
+        }
+        if !statistics.0.iter().any(|row| row.held_out) {
+            context.services.warn("no held-out rows: only the training error can be stated, and it flatters".into());
+        }
+        Ok(ValidateWrites { statistics })
+    }
+}
+
+type Groups<'a> = BTreeMap<(&'a str, &'a str, bool), Vec<&'a PredictionRow>>;
+
+/// Rows by (step, set, held out), in that order; fails where a table tells of several steps.
+fn groups(step: &Labelled<Prediction>) -> Result<Groups<'_>> {
+    let mut groups = Groups::new();
+    for row in &step.table.0 {
+        groups.entry((&row.step, &row.set, row.held_out)).or_default().push(row);
+    }
+    let mut names = groups.keys().map(|key| key.0);
+    if let Some(first) = names.next()
+        && let Some(other) = names.find(|name| *name != first)
+    {
+        return Err(Error::Bug(format!("stage {}: one prediction table with two steps, {first} and {other}", step.stage)));
+    }
+    Ok(groups)
+}
+
+/// The statistics of a group of at least one row.
+fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&PredictionRow]) -> StatisticsRow {
+    let mut error: Vec<f64> = rows.iter().map(|row| row.error_mm).collect();
+    error.sort_by(f64::total_cmp);
+    let count = error.len() as f64;
+    let mean = error.iter().sum::<f64>() / count;
+    let spread: f64 = error.iter().map(|e| (e - mean).powi(2)).sum();
+    let rms = |value: fn(&PredictionRow) -> f64| (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / count).sqrt();
+    StatisticsRow {
+        order,
+        step: step.into(),
+        set: set.into(),
+        held_out,
+        points: rows.len() as i64,
+        mean_mm: mean,
+        std_mm: if rows.len() > 1 { (spread / (count - 1.0)).sqrt() } else { 0.0 },
+        rms_mm: rms(|row| row.error_mm),
+        median_mm: quantile(&error, 0.5),
+        p95_mm: quantile(&error, 0.95),
+        max_mm: quantile(&error, 1.0),
+        rms_x_mm: rms(|row| row.dx_mm),
+        rms_y_mm: rms(|row| row.dy_mm),
+        rms_z_mm: rms(|row| row.dz_mm),
+        noise_rms_mm: rms(|row| row.noise_mm),
+    }
+}
+
+/// Linear between order statistics (Hyndman and Fan's type 7, the default of numpy, R and polars' `linear`).
+fn quantile(sorted: &[f64], fraction: f64) -> f64 {
+    let place = fraction * (sorted.len() - 1) as f64;
+    let below = sorted[place.floor() as usize];
+    let above = sorted[place.ceil() as usize];
+    below + (above - below) * place.fract()
+}
