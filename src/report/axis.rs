@@ -43,9 +43,6 @@ impl Scale {
     pub fn over(self, from: f64, to: f64) -> Self {
         Self { from, to, ..self }
     }
-    pub fn is_log(&self) -> bool {
-        self.log
-    }
     /// Where a value is drawn; what lies outside is drawn on the edge.
     pub fn at(&self, value: f64) -> f64 {
         let share = if self.log {
@@ -54,14 +51,6 @@ impl Scale {
             (value - self.lower) / (self.upper - self.lower)
         };
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
-    }
-    /// The value at a share of the axis from its lower end.
-    pub fn value(&self, share: f64) -> f64 {
-        if self.log {
-            self.lower * (self.upper / self.lower).powf(share)
-        } else {
-            self.lower + share * (self.upper - self.lower)
-        }
     }
     /// Round values within the scale, about `wanted` of them.
     pub fn ticks(&self, wanted: usize) -> Vec<f64> {

@@ -1,9 +1,9 @@
 //! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
 
+use super::Tables;
 use super::distribution::{self, cumulative, histogram};
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
-use super::Tables;
 use crate::error::{Error, Result};
 use crate::table::{Prediction, Statistics, StatisticsRow};
 use serde::Serialize;
@@ -21,7 +21,11 @@ impl Steps {
     }
     fn colour(&self, order: i64) -> String {
         // Colours of the steps between the first and the last repeat after five.
-        if Some(order) == self.last() { "s-last".into() } else { format!("s{}", if order == 0 { 0 } else { 1 + (order - 1) % 5 }) }
+        if Some(order) == self.last() {
+            "s-last".into()
+        } else {
+            format!("s{}", if order == 0 { 0 } else { 1 + (order - 1) % 5 })
+        }
     }
     /// Colour of a step by name; a step without predictions has the first one's.
     pub fn colour_of(&self, step: &str) -> String {
@@ -163,11 +167,7 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
     let (kind, sentence) = match before_row {
         Some(before) if after.mean_mm < before.mean_mm => (
             "better",
-            format!(
-                "The mean position error fell from {} mm to {} mm on {points}.",
-                mm(before.mean_mm),
-                mm(after.mean_mm)
-            ),
+            format!("The mean position error fell from {} mm to {} mm on {points}.", mm(before.mean_mm), mm(after.mean_mm)),
         ),
         Some(before) => (
             "worse",

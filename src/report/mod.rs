@@ -14,9 +14,7 @@ mod svg;
 mod workspace;
 
 use crate::error::{Error, Result};
-use crate::table::{
-    Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Robot, Split, Statistics, Training,
-};
+use crate::table::{Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Robot, Split, Statistics, Training};
 use serde::Serialize;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
@@ -83,6 +81,6 @@ pub fn html(tables: &Tables, wishes: &Wishes) -> Result<String> {
     environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
     environment
         .add_template("report.html", include_str!("report.html"))
-        .and_then(|()| environment.get_template("report.html")?.render(&page))
+        .and_then(|()| environment.get_template("report.html")?.render(minijinja::value::Serde(&page)))
         .map_err(|e| Error::Bug(format!("report template: {e:#}")))
 }

@@ -47,13 +47,8 @@ impl Svg {
     }
     /// Text at its baseline; the class says how it is anchored.
     pub fn text(&mut self, class: &str, at: Point, text: &str) {
-        let _ = writeln!(
-            self.body,
-            "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>",
-            tenth(at[0]),
-            tenth(at[1]),
-            escape(text)
-        );
+        let _ =
+            writeln!(self.body, "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>", tenth(at[0]), tenth(at[1]), escape(text));
     }
     /// The `svg` element; `title` is what a screen reader says.
     pub fn finish(self, title: &str) -> String {

@@ -12,13 +12,15 @@ const CLASSES: usize = 7;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
     pub name: &'static str,
-    axes: [(&'static str, fn(&PredictionRow) -> f64, fn(&PredictionRow) -> f64); 2],
+    axes: [Axis; 2],
 }
 
 type Column = fn(&PredictionRow) -> f64;
-const X: (&str, Column, Column) = ("X", |row| row.x_mm, |row| row.dx_mm);
-const Y: (&str, Column, Column) = ("Y", |row| row.y_mm, |row| row.dy_mm);
-const Z: (&str, Column, Column) = ("Z", |row| row.z_mm, |row| row.dz_mm);
+/// Name, position and residual along one axis.
+type Axis = (&'static str, Column, Column);
+const X: Axis = ("X", |row| row.x_mm, |row| row.dx_mm);
+const Y: Axis = ("Y", |row| row.y_mm, |row| row.dy_mm);
+const Z: Axis = ("Z", |row| row.z_mm, |row| row.dz_mm);
 pub(super) const VIEWS: [View; 2] = [View { name: "X-Y", axes: [X, Y] }, View { name: "X-Z", axes: [X, Z] }];
 
 /// Classes of error with their colours: upper edges in mm, ascending, the last one open.
@@ -38,9 +40,9 @@ impl Colours {
         let lower = quantile(after, 0.4).max(upper * 1e-6);
         let count = CLASSES - 1;
         let digits: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
-        let edges = digits.into_iter().map(|digits| descending(upper, digits, count));
-        let fitting = edges.clone().find(|edges| edges.last().is_some_and(|edge| *edge <= lower));
-        let mut edges = fitting.or_else(|| edges.last()).unwrap_or_default();
+        let mut tries = digits.into_iter().map(|digits| descending(upper, digits, count));
+        let fitting = tries.clone().find(|edges| edges.last().is_some_and(|edge| *edge <= lower));
+        let mut edges = fitting.or_else(|| tries.next_back()).unwrap_or_default();
         edges.reverse();
         Self { edges }
     }
@@ -71,7 +73,13 @@ fn descending(upper: f64, digits: &[f64], count: usize) -> Vec<f64> {
 }
 
 /// One view: the points of one step, framed by all points of both steps, and how much its vectors are magnified.
-pub(super) fn scatter(view: View, rows: &Prediction, frame: [&Prediction; 2], colours: &Colours, title: &str) -> (String, String) {
+pub(super) fn scatter(
+    view: View,
+    rows: &Prediction,
+    frame: [&Prediction; 2],
+    colours: &Colours,
+    title: &str,
+) -> (String, String) {
     const WIDTH: f64 = 420.0;
     let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 300.0 };
     let extent = |axis: usize| {
@@ -103,7 +111,11 @@ pub(super) fn scatter(view: View, rows: &Prediction, frame: [&Prediction; 2], co
         let from = [x.at(at[0]), y.at(at[1])];
         let to = [x.at(at[0] + residual[0] * magnified), y.at(at[1] + residual[1] * magnified)];
         svg.line(&format!("vector e{class}"), from, to);
-        svg.circle(&format!("dot e{class}{}", if row.held_out { "" } else { " fitted" }), from, if row.held_out { 2.6 } else { 1.8 });
+        svg.circle(
+            &format!("dot e{class}{}", if row.held_out { "" } else { " fitted" }),
+            from,
+            if row.held_out { 2.6 } else { 1.8 },
+        );
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, &format!("{}, mm", view.axes[0].0));

@@ -5,3 +5,4 @@ mod fixture;
 mod layers;
 mod store;
 mod tables;
+mod report;

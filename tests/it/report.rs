@@ -1,0 +1,205 @@
+//! `validate` and `report`: statistics against hand-made numbers, and a document that is whole, safe and the same every time.
+
+mod tables;
+
+use calib::stage::{Context, Labelled, Report, ReportReads, Services, Sink, Source, Stage, Validate, ValidateReads};
+use calib::table::*;
+use tables::{point, tables};
+
+struct Silent;
+impl Services for Silent {
+    fn open(&self, _: &calib::stage::RawFile) -> calib::error::Result<Source> {
+        Err(calib::error::Error::Bug("no files here".into()))
+    }
+    fn sink(&self, _: &'static str) -> calib::error::Result<Box<dyn Sink>> {
+        Err(calib::error::Error::Bug("no sinks here".into()))
+    }
+    fn begin(&self, _: &str, _: Option<u64>, _: &str) {}
+    fn advance(&self, _: u64, _: &str) {}
+    fn note(&self, _: String) {}
+    fn warn(&self, _: String) {}
+}
+
+fn context() -> Context<'static> {
+    Context { id: "report", seed: 7, jobs: 1, services: &Silent }
+}
+
+fn validate(tables: Vec<Prediction>) -> Statistics {
+    let prediction = tables.into_iter().map(|table| Labelled { stage: "identify".into(), table }).collect();
+    Validate {}.run(ValidateReads { prediction }, &context()).expect("statistics").statistics
+}
+
+fn near(found: f64, expected: f64) {
+    assert!((found - expected).abs() < 1e-12, "{found} is not {expected}");
+}
+
+#[test]
+fn statistics_of_four_points_are_those_of_pencil_and_paper() {
+    // Errors 1, 2, 3, 6: mean 3, sum of squared deviations 14, sum of squares 50.
+    let rows = [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0], [6.0, 0.0, 0.0]];
+    let rows = rows.into_iter().zip(0..).map(|(residual, k)| point(k, "geometry", "validate", true, residual)).collect();
+    let statistics = validate(vec![Prediction(rows)]);
+    let [row] = statistics.0.as_slice() else { panic!("one row expected: {statistics:?}") };
+    assert_eq!((row.order, row.step.as_str(), row.set.as_str(), row.held_out, row.points), (0, "geometry", "validate", true, 4));
+    near(row.mean_mm, 3.0);
+    near(row.std_mm, (14.0f64 / 3.0).sqrt());
+    near(row.rms_mm, 12.5f64.sqrt());
+    near(row.median_mm, 2.5);
+    near(row.p95_mm, 3.0 + 3.0 * 0.85);
+    near(row.max_mm, 6.0);
+    near(row.rms_x_mm, (37.0f64 / 4.0).sqrt());
+    near(row.rms_y_mm, 1.0);
+    near(row.rms_z_mm, 1.5);
+    near(row.noise_rms_mm, 0.00125f64.sqrt());
+}
+
+#[test]
+fn a_set_of_which_part_was_fitted_makes_two_rows_and_two_tables_of_one_stage_two_steps() {
+    let nominal = (0..4).map(|k| point(k, "nominal", "all", true, [1.0, 0.0, 0.0])).collect();
+    let geometry = (0..4).map(|k| point(k, "geometry", "all", k == 3, [0.1 * (k + 1) as f64, 0.0, 0.0])).collect();
+    let statistics = validate(vec![Prediction(nominal), Prediction(geometry)]);
+    let found: Vec<_> = statistics.0.iter().map(|r| (r.order, r.step.as_str(), r.held_out, r.points)).collect();
+    assert_eq!(found, [(0, "nominal", true, 4), (1, "geometry", false, 3), (1, "geometry", true, 1)]);
+    near(statistics.0[1].mean_mm, 0.2);
+    near(statistics.0[2].mean_mm, 0.4);
+    near(statistics.0[2].std_mm, 0.0);
+    let frame = statistics.to_frame().expect("the schema allows both rows");
+    assert_eq!(Statistics::from_frame(&frame).expect("read back"), statistics);
+}
+
+#[test]
+fn nothing_to_validate_is_an_error_of_the_pipeline() {
+    let error = Validate {}.run(ValidateReads { prediction: Vec::new() }, &context()).err().expect("refused");
+    assert_eq!(error.exit_code(), 2);
+}
+
+fn html(settings: Report, reads: ReportReads) -> String {
+    let document = settings.run(reads, &context()).expect("a report").document;
+    assert_eq!(document.0.len(), 1);
+    assert_eq!(document.0[0].name, "report.html");
+    assert_eq!(document.0[0].media_type, "text/html");
+    document.0[0].content.clone()
+}
+
+/// Every inline picture, parsed as XML.
+fn pictures(html: &str) -> usize {
+    let mut count = 0;
+    for part in html.split("<svg ").skip(1) {
+        let body = part.split("</svg>").next().expect("split gives one part");
+        let text = format!("<svg {body}</svg>");
+        let svg = roxmltree::Document::parse(&text).unwrap_or_else(|e| panic!("picture {count}: {e}\n{text}"));
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+        assert!(svg.root_element().children().any(|child| child.has_tag_name("title")));
+        count += 1;
+    }
+    count
+}
+
+#[test]
+fn a_report_stands_alone_and_its_pictures_are_sound() {
+    let page = html(Report::default(), tables("Heavy 6R, cell 4"));
+    for foreign in ["http://", "https://", "src=", "href=", "<script", "@import", "url("] {
+        assert!(!page.contains(foreign), "the report refers to something outside itself: {foreign}");
+    }
+    // Two held-out sets with two pictures each, four views, one spectrum, one convergence, two trainings.
+    assert_eq!(pictures(&page), 12);
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report.html");
+    std::fs::write(&path, &page).expect("a copy to look at");
+}
+
+#[test]
+fn the_first_sentence_states_the_held_out_means_of_the_statistics() {
+    let reads = tables("Heavy 6R, cell 4");
+    let mean = |order: i64, set: &str| {
+        let row = reads.statistics.0.iter().find(|r| r.order == order && r.set == set && r.held_out).expect("a row");
+        format!("{:.3}", row.mean_mm)
+    };
+    let expected = |set: &str| format!("The mean position error fell from {} mm to {} mm on", mean(0, set), mean(3, set));
+    let (largest, wished) = (expected("check"), expected("unloaded_check"));
+    assert!(html(Report::default(), tables("Heavy 6R, cell 4")).contains(&largest), "{largest}");
+    let settings = Report { set: Some("unloaded_check".into()), title: None };
+    assert!(html(settings, tables("Heavy 6R, cell 4")).contains(&wished), "{wished}");
+}
+
+#[test]
+fn a_wished_set_that_is_not_held_out_is_refused_with_the_allowed_ones() {
+    let settings = Report { set: Some("learn".into()), title: None };
+    let error = settings.run(tables("Heavy 6R, cell 4"), &context()).err().expect("refused");
+    assert_eq!(error.exit_code(), 2);
+    let text = error.to_string();
+    assert!(text.starts_with("report.with.set: `learn`") && text.ends_with("check, unloaded_check"), "{text}");
+}
+
+#[test]
+fn hostile_names_are_shown_and_not_run() {
+    const HOSTILE: &str = "<script>alert(1)</script>\u{1}&\"'";
+    let mut reads = tables(HOSTILE);
+    for table in &mut reads.prediction {
+        for row in &mut table.table.0 {
+            row.set = HOSTILE.into();
+            row.step = format!("{}{HOSTILE}", row.step);
+        }
+    }
+    reads.statistics = validate(reads.prediction.iter().map(|labelled| labelled.table.clone()).collect());
+    reads.parameters.0[0].name = HOSTILE.into();
+    reads.parameters.0[0].status = "\" onmouseover=\"alert(1)".into();
+    reads.parameters.0[0].remark = Some(HOSTILE.into());
+    reads.fit[0].table.0[7].step = HOSTILE.into();
+    reads.training[0].table.0[0].phase = HOSTILE.into();
+    reads.observability[0].table.0[9].step = HOSTILE.into();
+    reads.rejected[0].table.0[0].text = HOSTILE.into();
+    reads.intake[0].table.0[0].file = HOSTILE.into();
+    reads.split.0[0].set = HOSTILE.into();
+    let page = html(Report { title: Some(HOSTILE.into()), set: None }, reads);
+    assert!(!page.contains("<script"), "markup from a name came through");
+    assert!(!page.contains("\" onmouseover=\""), "an attribute from a name came through");
+    assert!(page.contains("&lt;script&gt;alert(1)"));
+    assert!(pictures(&page) > 10);
+}
+
+#[test]
+fn the_same_tables_give_the_same_bytes() {
+    let make = || html(Report::default(), tables("Heavy 6R, cell 4"));
+    assert_eq!(make(), make());
+}
+
+#[test]
+fn what_was_rejected_is_counted_whole_and_listed_to_the_fiftieth() {
+    let page = html(Report::default(), tables("Heavy 6R, cell 4"));
+    assert!(page.contains("61 rows were read and not used"));
+    assert_eq!(page.matches("2026-11-02T09:14").count(), 50);
+    let mut reads = tables("Heavy 6R, cell 4");
+    reads.intake[0].table.0[0].accepted = 499;
+    assert!(html(Report::default(), reads).contains("does not add up"));
+}
+
+#[test]
+fn empty_tables_make_a_report_that_says_so() {
+    let mut reads = tables("");
+    reads.prediction = Vec::new();
+    reads.statistics = Statistics::default();
+    reads.parameters = Parameters::default();
+    reads.robot = Robot::default();
+    reads.recording = Recording::default();
+    reads.split = Split::default();
+    (reads.intake, reads.rejected, reads.fit) = (Vec::new(), Vec::new(), Vec::new());
+    (reads.observability, reads.training) = (Vec::new(), Vec::new());
+    let page = html(Report::default(), reads);
+    assert_eq!(pictures(&page), 0);
+    for sentence in ["No point was held out", "identified no parameters", "No row was rejected", "No file was read"] {
+        assert!(page.contains(sentence), "{sentence}");
+    }
+}
+
+#[test]
+fn one_point_without_error_still_draws() {
+    let mut reads = tables("Heavy 6R, cell 4");
+    let one = Prediction(vec![point(0, "nominal", "check", true, [0.0; 3])]);
+    reads.statistics = validate(vec![one.clone()]);
+    reads.prediction = vec![Labelled { stage: "identify".into(), table: one }];
+    reads.fit[0].table.0.truncate(1);
+    reads.fit[0].table.0[0].rms_mm = 0.0;
+    let page = html(Report::default(), reads);
+    assert!(pictures(&page) >= 6);
+    assert!(page.contains("The mean position error is 0.000 mm on 1 points") || page.contains("on the one point"));
+}
