@@ -1,6 +1,8 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
+pub mod ingest;
 mod report;
+pub mod split;
 mod validate;
 
 pub use report::{Report, ReportReads};

@@ -1,0 +1,127 @@
+//! `ingest`: from raw delimited files to one recording; what is not used goes to `rejected` with file, line and reason.
+//!
+//! Files are read twice: first to judge rows and find duplicates and partners, then to write; so nothing is written of a
+//! file that is refused, and memory stays bounded. Per file, accepted + rejected = read.
+
+mod arm;
+mod bind;
+mod check;
+mod layout;
+mod lines;
+mod number;
+mod pair;
+mod reading;
+mod row;
+mod scan;
+mod verdict;
+mod write;
+
+pub use layout::{
+    ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
+};
+
+use crate::error::Result;
+use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
+use crate::table::{Intake, IntakeRow, Recording, Rejected, Robot};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Reads raw files into a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ingest {
+    /// The raw files; the first one leads: its order is that of the recording.
+    pub files: Vec<FileLayout>,
+    /// How several files belong together.
+    #[serde(default)]
+    pub join: Option<Join>,
+    /// What becomes of rows whose point id occurs more than once in a file.
+    #[serde(default)]
+    pub duplicates: Duplicates,
+    /// What becomes of rows with a joint beyond the robot's limits.
+    #[serde(default)]
+    pub limits: Limits,
+    /// A file of which more than this share of rows is rejected is an error.
+    #[serde(default = "half")]
+    pub max_rejected_fraction: f64,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+reads! {
+    pub struct IngestReads {
+        robot: Robot,
+    }
+}
+
+writes! {
+    pub struct IngestWrites {
+        recording: StreamedTable<Recording>,
+        rejected: StreamedTable<Rejected>,
+        intake: Intake,
+    }
+}
+
+impl Stage for Ingest {
+    const NAME: &'static str = "ingest";
+    const SUMMARY: &'static str = "raw delimited files -> recording, with every rejected row and its reason";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = IngestReads;
+    type Writes = IngestWrites;
+
+    fn check(&self) -> Vec<crate::error::Fault> {
+        check::faults(self)
+    }
+    fn files(&self) -> Vec<(String, RawFile)> {
+        self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
+    }
+    fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
+        let faults = self.check();
+        if !faults.is_empty() {
+            return Err(crate::error::Error::Spec(faults));
+        }
+        let arm = arm::Arm::of(&reads.robot)?;
+        let scan = |(index, layout)| scan::scan(self, index, layout, &arm, context);
+        let mut scans = self.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
+        let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
+        verdict::judge(self, &scans, &fates, &arm, context)?;
+        let names = names(&scans);
+        let decided = write::Decided { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
+        let (recording, rejected) = write::write(&decided, context)?;
+        Ok(IngestWrites { recording, rejected, intake: intake(&decided, context) })
+    }
+}
+
+/// The files' own names, made different where two are the same: a folder is no part of a table.
+fn names(scans: &[scan::Scan]) -> Vec<String> {
+    let own = |scan: &scan::Scan| {
+        Path::new(&scan.label).file_name().map_or_else(|| scan.label.clone(), |name| name.to_string_lossy().into_owned())
+    };
+    let all: Vec<String> = scans.iter().map(own).collect();
+    let numbered = all.iter().enumerate().map(|(index, name)| {
+        let earlier = all.iter().take(index).filter(|other| *other == name).count();
+        if earlier == 0 { name.clone() } else { format!("{name} ({})", earlier + 1) }
+    });
+    numbered.collect()
+}
+
+fn intake(decided: &write::Decided, context: &Context) -> Intake {
+    let mut rows: Vec<IntakeRow> = Vec::new();
+    for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
+        let accepted = verdict::accepted(scan, fate);
+        let rejected = scan.read - accepted;
+        context.services.note(format!("{name}: {} rows read, {accepted} used, {rejected} rejected", scan.read));
+        rows.push(IntakeRow {
+            file: name.clone(),
+            lines: scan.lines as i64,
+            read: scan.read as i64,
+            accepted: accepted as i64,
+            rejected: rejected as i64,
+        });
+    }
+    rows.sort_by(|a, b| a.file.cmp(&b.file));
+    Intake(rows)
+}

@@ -1,0 +1,230 @@
+//! From the columns that the settings name to the columns that a file has.
+
+use super::arm::Arm;
+use super::layout::{ColumnRef, FileLayout, PerJoint, Slot};
+use crate::error::{Error, Fault, Result, nearest};
+use crate::units::{Quantity, Unit};
+
+/// Names in an error message; a header of thousands must not fill the screen.
+const SHOWN: usize = 60;
+
+/// Where a file's quantities stand, resolved against its header.
+pub(super) struct Binding {
+    /// Fields of a row.
+    pub width: usize,
+    pub id: Option<Text>,
+    pub usage: Option<Text>,
+    pub sequence: Option<usize>,
+    pub cells: Vec<Cell>,
+    /// Numbers that are the same in every row, SI.
+    pub constants: Vec<(usize, f64)>,
+    /// Optional columns that the file does not have, for a note.
+    pub missing: Vec<String>,
+}
+
+/// Text from a column, or for every row the same.
+pub(super) enum Text {
+    Column { column: usize, optional: bool },
+    Value(String),
+}
+
+/// A column of numbers.
+pub(super) struct Cell {
+    pub slot: Slot,
+    /// Place of the slot in a row's numbers.
+    pub index: usize,
+    pub column: usize,
+    pub unit: Unit,
+    pub optional: bool,
+    /// The column, as people call it: `x_mm`, or `column 4`.
+    pub name: String,
+}
+
+impl Binding {
+    /// Slots that this file fills.
+    pub(super) fn slots(&self) -> Vec<usize> {
+        self.cells.iter().map(|cell| cell.index).chain(self.constants.iter().map(|constant| constant.0)).collect()
+    }
+}
+
+/// The names of a file's columns, if it has a header, else how many there are.
+pub(super) struct Head {
+    pub label: String,
+    /// Line of the header, or of the first data row.
+    pub line: u64,
+    pub width: usize,
+    pub names: Option<Vec<String>>,
+}
+
+struct Binder<'a> {
+    head: &'a Head,
+    binding: Binding,
+    faults: Vec<Fault>,
+}
+
+/// Resolves every mapped column, or reports all that are missing.
+pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Binding> {
+    let binding = Binding {
+        width: head.width,
+        id: None,
+        usage: None,
+        sequence: None,
+        cells: Vec::new(),
+        constants: Vec::new(),
+        missing: Vec::new(),
+    };
+    let mut binder = Binder { head, binding, faults: Vec::new() };
+    let columns = &layout.columns;
+    for (name, text) in [("point_id", &columns.point_id), ("usage", &columns.usage)] {
+        let Some(text) = text else { continue };
+        let value = text.value.clone().map(Text::Value);
+        let bound = value.or_else(|| {
+            let column = binder.column(text.column.as_ref()?, name, text.optional)?;
+            Some(Text::Column { column, optional: text.optional })
+        });
+        if name == "usage" { binder.binding.usage = bound } else { binder.binding.id = bound }
+    }
+    if let Some(sequence) = &columns.sequence {
+        binder.binding.sequence = binder.column(&sequence.column, "sequence", false);
+    }
+    for (name, scalar, _, slot) in columns.scalars() {
+        let unit = unit(scalar.unit.as_deref())?;
+        let index = slot.index(arm.joints());
+        if let Some(value) = scalar.value {
+            binder.binding.constants.push((index, unit.to_si(value)));
+        } else if let Some(reference) = &scalar.column
+            && let Some(column) = binder.column(reference, name, scalar.optional)
+        {
+            let name = binder.name(column);
+            binder.binding.cells.push(Cell { slot, index, column, unit, optional: scalar.optional, name });
+        }
+    }
+    for mapped in columns.per_joint() {
+        binder.joints(&mapped, arm)?;
+    }
+    if binder.faults.is_empty() {
+        Ok(binder.binding)
+    } else {
+        let found = binder.found();
+        if let Some(last) = binder.faults.last_mut() {
+            last.message.push_str(&found);
+        }
+        Err(Error::Data(binder.faults))
+    }
+}
+
+fn unit(symbol: Option<&str>) -> Result<Unit> {
+    let Some(symbol) = symbol else { return Ok(Unit::One) };
+    Unit::parse(symbol).ok_or_else(|| Error::Bug(format!("unchecked unit {symbol}")))
+}
+
+impl Binder<'_> {
+    fn fault(&mut self, message: String) {
+        self.faults.push(Fault::new(format!("{}:{}", self.head.label, self.head.line), message));
+    }
+    fn name(&self, column: usize) -> String {
+        let name = self.head.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());
+        name.cloned().unwrap_or_else(|| format!("column {}", column + 1))
+    }
+    fn find(&self, reference: &ColumnRef) -> Vec<usize> {
+        match reference {
+            ColumnRef::Number(number) => {
+                (*number as usize).checked_sub(1).filter(|index| *index < self.head.width).into_iter().collect()
+            }
+            ColumnRef::Name(name) => {
+                let names = self.head.names.iter().flatten().enumerate();
+                names.filter(|(_, found)| *found == name.trim()).map(|(index, _)| index).collect()
+            }
+        }
+    }
+    fn column(&mut self, reference: &ColumnRef, quantity: &str, optional: bool) -> Option<usize> {
+        let found = self.find(reference);
+        match found.as_slice() {
+            [column] => return Some(*column),
+            [] if optional => self.binding.missing.push(format!("no {reference}; `{quantity}` is left out")),
+            [] => {
+                let hint = self.hint(reference);
+                self.fault(format!("no {reference}, mapped to `{quantity}`{hint}"));
+            }
+            [first, second, ..] => {
+                let (first, second) = (first + 1, second + 1);
+                self.fault(format!(
+                    "{reference}, mapped to `{quantity}`, stands twice in the header ({first} and {second}); name it by number"
+                ));
+            }
+        }
+        None
+    }
+    fn hint(&self, reference: &ColumnRef) -> String {
+        match (reference, &self.head.names) {
+            (ColumnRef::Name(name), Some(names)) => nearest(name, names.iter().map(String::as_str))
+                .map(|near| format!("; did you mean `{near}`?"))
+                .unwrap_or_default(),
+            _ => format!("; the file has {} columns", self.head.width),
+        }
+    }
+    /// What stands in the header, for the last fault of the list.
+    fn found(&self) -> String {
+        let Some(names) = &self.head.names else { return String::new() };
+        let shown: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
+        let more = if names.len() > SHOWN { format!(" and {} more", names.len() - SHOWN) } else { String::new() };
+        let mut text = format!("; found: {}{more}", shown.join(", "));
+        if let [only] = names.as_slice()
+            && let Some(mark) = [";", "\t", ",", "|"].into_iter().find(|mark| only.contains(mark))
+        {
+            let mark = if mark == "\t" { "tab" } else { mark };
+            text.push_str(&format!(" (one column; `delimiter: \"{mark}\"`?)"));
+        } else if names.iter().all(|name| name.replace(',', ".").parse::<f64>().is_ok()) {
+            text.push_str(" (all numbers; `header: false`?)");
+        }
+        text
+    }
+    fn joints(&mut self, mapped: &PerJoint, arm: &Arm) -> Result<()> {
+        let PerJoint { name, columns: joints, quantity, slot } = *mapped;
+        let count = arm.joints();
+        let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
+            (Some(list), _) => list.clone(),
+            (None, Some(pattern)) => {
+                (1..=count).map(|joint| ColumnRef::Name(pattern.replace("{j}", &joint.to_string()))).collect()
+            }
+            (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
+        };
+        if references.len() != count {
+            self.fault(format!("`{name}` lists {} columns; the robot has {count} joints", references.len()));
+            return Ok(());
+        }
+        if let Some(pattern) = &joints.column {
+            let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
+            if !self.find(&next).is_empty() {
+                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {count} joints only"));
+                return Ok(());
+            }
+        }
+        let there = references.iter().filter(|reference| !self.find(reference).is_empty()).count();
+        if there == 0 && joints.optional {
+            let first = references.first().map(ToString::to_string).unwrap_or_default();
+            self.binding.missing.push(format!("no {first} and so on; `{name}` is left out"));
+            return Ok(());
+        }
+        if there > 0 && there < count {
+            self.fault(format!("`{name}` has {there} of its columns; the robot has {count} joints"));
+        }
+        for (joint, reference) in references.iter().enumerate() {
+            let linear = quantity == Quantity::Angle && arm.prismatic.get(joint).copied().unwrap_or(false);
+            let symbol = if linear { &joints.linear_unit } else { &joints.unit };
+            if symbol.is_none() && quantity != Quantity::Number {
+                let (kind, setting) = if linear { ("prismatic", "linear_unit") } else { ("revolute", "unit") };
+                self.fault(format!("joint {} is {kind}; say `{setting}` for `{name}`", joint + 1));
+                continue;
+            }
+            let unit = unit(symbol.as_deref())?;
+            if let Some(column) = self.column(reference, name, false) {
+                let slot = slot(joint);
+                let cell =
+                    Cell { slot, index: slot.index(count), column, unit, optional: joints.optional, name: self.name(column) };
+                self.binding.cells.push(cell);
+            }
+        }
+        Ok(())
+    }
+}

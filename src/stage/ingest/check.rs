@@ -1,0 +1,250 @@
+//! Faults of the settings that types cannot express, each with its place below `with`.
+
+use super::Ingest;
+use super::layout::{ColumnRef, Duplicates, FileLayout, Join, JointColumns, ScalarColumn};
+use crate::error::{Fault, nearest};
+use crate::units::{Quantity, Unit};
+
+const NEEDED: [&str; 4] = ["q", "x", "y", "z"];
+
+/// All faults at once.
+pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if settings.files.is_empty() {
+        faults.push(Fault::new("files", "no file; name at least one"));
+        return faults;
+    }
+    if !(settings.max_rejected_fraction > 0.0 && settings.max_rejected_fraction <= 1.0) {
+        faults.push(Fault::new("max_rejected_fraction", "allowed: above 0 and up to 1"));
+    }
+    for (index, file) in settings.files.iter().enumerate() {
+        file_faults(file, &format!("files[{index}]"), &mut faults);
+    }
+    together(settings, &mut faults);
+    faults
+}
+
+fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    if delimiter(&file.delimiter).is_none() {
+        let message = format!("delimiter `{}`; allowed: one ASCII character, `tab` or `whitespace`", file.delimiter);
+        faults.push(Fault::new(format!("{place}.delimiter"), message));
+    }
+    if file.comment.as_deref() == Some("") {
+        faults.push(Fault::new(format!("{place}.comment"), "an empty text; every line would be a comment"));
+    }
+    if !file.header && file.skip_below_header > 0 {
+        faults.push(Fault::new(format!("{place}.skip_below_header"), "there is no header; use `skip`"));
+    }
+    let columns = &file.columns;
+    if columns.names().is_empty() {
+        faults.push(Fault::new(format!("{place}.columns"), "no quantity is mapped"));
+    }
+    for (name, text) in [("point_id", &columns.point_id), ("usage", &columns.usage)] {
+        let Some(text) = text else { continue };
+        let place = format!("{place}.columns.{name}");
+        one_of(text.column.is_some(), text.value.is_some(), "`column` or `value`", &place, faults);
+        if name == "point_id" && text.value.is_some() {
+            faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
+        }
+        column(text.column.as_ref(), file, &place, faults);
+    }
+    if let Some(sequence) = &columns.sequence {
+        column(Some(&sequence.column), file, &format!("{place}.columns.sequence"), faults);
+    }
+    for (name, scalar, quantity, _) in columns.scalars() {
+        scalar_faults(scalar, quantity, file, &format!("{place}.columns.{name}"), faults);
+        if NEEDED.contains(&name) && scalar.optional {
+            faults.push(Fault::new(format!("{place}.columns.{name}.optional"), "no recording without a position"));
+        }
+    }
+    for mapped in columns.per_joint() {
+        joint_faults(mapped.columns, mapped.quantity, file, &format!("{place}.columns.{}", mapped.name), faults);
+    }
+    let sigmas = [&columns.sigma_x, &columns.sigma_y, &columns.sigma_z].iter().filter(|sigma| sigma.is_some()).count();
+    if sigmas == 1 || sigmas == 2 {
+        faults.push(Fault::new(format!("{place}.columns"), "map all of sigma_x, sigma_y, sigma_z, or none"));
+    }
+}
+
+fn scalar_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    one_of(scalar.column.is_some(), scalar.value.is_some(), "`column` or `value`", place, faults);
+    column(scalar.column.as_ref(), file, place, faults);
+    unit(scalar.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
+    if scalar.value.is_some_and(|value| !value.is_finite()) {
+        faults.push(Fault::new(format!("{place}.value"), "not a finite number"));
+    }
+}
+
+fn joint_faults(joints: &JointColumns, quantity: Quantity, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    one_of(
+        joints.column.is_some(),
+        joints.columns.is_some(),
+        "`column` (a pattern with {j}) or `columns` (a list)",
+        place,
+        faults,
+    );
+    match &joints.column {
+        Some(pattern) if !pattern.contains("{j}") => {
+            let message =
+                format!("`{pattern}` has no {{j}} for the joint's number; e.g. `q{{j}}_deg`, or list them in `columns`");
+            faults.push(Fault::new(format!("{place}.column"), message));
+        }
+        Some(_) if !file.header => {
+            faults.push(Fault::new(format!("{place}.column"), "there is no header with names; list numbers in `columns`"));
+        }
+        _ => {}
+    }
+    for (index, entry) in joints.columns.iter().flatten().enumerate() {
+        column(Some(entry), file, &format!("{place}.columns[{index}]"), faults);
+    }
+    match quantity {
+        Quantity::Angle => {
+            if joints.unit.is_some() || joints.linear_unit.is_none() {
+                unit(joints.unit.as_deref(), Quantity::Angle, &format!("{place}.unit"), faults);
+            }
+            if joints.linear_unit.is_some() {
+                unit(joints.linear_unit.as_deref(), Quantity::Length, &format!("{place}.linear_unit"), faults);
+            }
+            if joints.optional {
+                faults.push(Fault::new(format!("{place}.optional"), "no recording without joint positions"));
+            }
+        }
+        Quantity::Number => {
+            if joints.unit.is_some() {
+                faults.push(Fault::new(format!("{place}.unit"), "a direction (1, -1, 0) has no unit"));
+            }
+        }
+        other => unit(joints.unit.as_deref(), other, &format!("{place}.unit"), faults),
+    }
+    if quantity != Quantity::Angle && joints.linear_unit.is_some() {
+        faults.push(Fault::new(format!("{place}.linear_unit"), "for the positions `q` of prismatic joints only"));
+    }
+}
+
+fn one_of(first: bool, second: bool, names: &str, place: &str, faults: &mut Vec<Fault>) {
+    if first == second {
+        faults.push(Fault::new(place, format!("say {names}, one of them")));
+    }
+}
+
+fn column(column: Option<&ColumnRef>, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    match column {
+        Some(ColumnRef::Number(0)) => faults.push(Fault::new(place, "columns count from 1")),
+        Some(ColumnRef::Name(name)) if !file.header => {
+            faults.push(Fault::new(place, format!("there is no header with `{name}` in it; give the column's number from 1")));
+        }
+        _ => {}
+    }
+}
+
+fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<Fault>) {
+    let allowed = Unit::symbols(quantity);
+    let list = allowed.join(", ");
+    match symbol {
+        None => faults.push(Fault::new(place, format!("no unit; allowed: {list}"))),
+        Some(symbol) => match Unit::parse(symbol) {
+            Some(unit) if unit.quantity() == quantity => {}
+            Some(_) => faults.push(Fault::new(place, format!("`{symbol}` is the unit of another quantity; allowed: {list}"))),
+            None => {
+                let hint = nearest(symbol, allowed).map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
+                faults.push(Fault::new(place, format!("unknown unit `{symbol}`; allowed: {list}{hint}")));
+            }
+        },
+    }
+}
+
+/// Faults of the files taken together.
+fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
+    let files = &settings.files;
+    let Some(join) = &settings.join else {
+        if files.len() > 1 {
+            let message = "several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
+            faults.push(Fault::new("join", message));
+        } else {
+            complete(files, "files[0].columns", faults);
+        }
+        return;
+    };
+    if let Join::Append {} = join {
+        for (index, file) in files.iter().enumerate() {
+            complete(std::slice::from_ref(file), &format!("files[{index}].columns"), faults);
+        }
+        return;
+    }
+    let [first, second] = files.as_slice() else {
+        faults.push(Fault::new("join", format!("joins two files, not {}", files.len())));
+        return;
+    };
+    complete(files, "files", faults);
+    let key = match join {
+        Join::Id {} => Some("point_id"),
+        Join::Time { .. } => Some("time"),
+        _ => None,
+    };
+    for name in second.columns.names() {
+        if first.columns.names().contains(&name) && Some(name) != key {
+            faults.push(Fault::new(format!("files[1].columns.{name}"), "mapped in both files; map it in one"));
+        }
+    }
+    if second.columns.sequence.is_some() {
+        faults.push(Fault::new("files[1].columns.sequence", "rows keep the order of the first file; map it there"));
+    }
+    for (index, file) in files.iter().enumerate() {
+        let Some(key) = key else { continue };
+        let place = format!("files[{index}].columns.{key}");
+        if !file.columns.names().contains(&key) {
+            faults.push(Fault::new(place, format!("not mapped; the files are joined by {key}")));
+        } else if optional_key(file, key) {
+            faults.push(Fault::new(place, "the files are joined by it: a column that is not optional"));
+        }
+    }
+    match join {
+        Join::Id {} if settings.duplicates == Duplicates::Keep => {
+            faults.push(Fault::new("duplicates", "`keep` cannot go with a join by id; allowed: reject, first, last"));
+        }
+        Join::Time { tolerance_s, offset_s } => {
+            if !(tolerance_s.is_finite() && *tolerance_s >= 0.0) {
+                faults.push(Fault::new("join.tolerance_s", "allowed: 0 and above"));
+            }
+            if !offset_s.is_finite() {
+                faults.push(Fault::new("join.offset_s", "not a finite number"));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn optional_key(file: &FileLayout, key: &str) -> bool {
+    let id = file.columns.point_id.as_ref().is_some_and(|id| id.optional);
+    let time = file.columns.time.as_ref().is_some_and(|time| time.optional || time.column.is_none());
+    if key == "time" { time } else { id }
+}
+
+fn complete(files: &[FileLayout], place: &str, faults: &mut Vec<Fault>) {
+    let mapped: Vec<&str> = files.iter().flat_map(|file| file.columns.names()).collect();
+    let missing: Vec<&str> = NEEDED.into_iter().filter(|name| !mapped.contains(name)).collect();
+    if !missing.is_empty() {
+        faults.push(Fault::new(place, format!("not mapped: {}", missing.join(", "))));
+    }
+}
+
+/// What separates fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Delimiter {
+    Byte(u8),
+    Whitespace,
+}
+
+/// The delimiter that a person wrote, or `None` for what is not allowed.
+pub(super) fn delimiter(text: &str) -> Option<Delimiter> {
+    match (text, text.as_bytes()) {
+        ("tab", _) => Some(Delimiter::Byte(b'\t')),
+        ("whitespace", _) => Some(Delimiter::Whitespace),
+        (_, [byte])
+            if byte.is_ascii() && !byte.is_ascii_alphanumeric() && !matches!(byte, b'"' | b'\n' | b'\r' | b'.' | b'-' | b'+') =>
+        {
+            Some(Delimiter::Byte(*byte))
+        }
+        _ => None,
+    }
+}

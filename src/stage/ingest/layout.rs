@@ -1,0 +1,331 @@
+//! What a person says about a raw file: how it is written, and which column holds which quantity in which unit.
+//!
+//! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
+
+use crate::stage::RawFile;
+use crate::units::Quantity;
+use schemars::JsonSchema;
+use serde::de::{self, Deserializer, Unexpected, Visitor};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// One raw file of delimited text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FileLayout {
+    /// Path of the file: UTF-8 text (with or without a byte-order mark), rows ending in LF or CRLF.
+    pub file: RawFile,
+    /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
+    #[serde(default = "comma")]
+    pub delimiter: String,
+    /// The decimal mark of the numbers.
+    #[serde(default)]
+    pub decimal: Decimal,
+    /// Whether a row of column names stands above the data.
+    #[serde(default = "yes")]
+    pub header: bool,
+    /// Lines to skip above the header (above the data where there is no header).
+    #[serde(default)]
+    pub skip: u64,
+    /// Lines to skip between header and data, e.g. a row of units.
+    #[serde(default)]
+    pub skip_below_header: u64,
+    /// Lines that begin with this text are skipped, e.g. `#`.
+    #[serde(default)]
+    pub comment: Option<String>,
+    /// Which column holds which quantity.
+    pub columns: Columns,
+}
+
+fn comma() -> String {
+    ",".into()
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// The decimal mark.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Decimal {
+    /// `0.365`
+    #[default]
+    Point,
+    /// `0,365`
+    Comma,
+}
+
+/// A column by its name in the header, or by its number from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ColumnRef {
+    /// Number from 1.
+    Number(u32),
+    /// Name in the header, as it stands there (blanks around it do not count).
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for ColumnRef {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // By hand, so that the message says what is allowed.
+        deserializer.deserialize_any(NameOrNumber)
+    }
+}
+
+struct NameOrNumber;
+
+impl Visitor<'_> for NameOrNumber {
+    type Value = ColumnRef;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a column, or its number from 1")
+    }
+    fn visit_str<E: de::Error>(self, name: &str) -> Result<ColumnRef, E> {
+        Ok(ColumnRef::Name(name.into()))
+    }
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<ColumnRef, E> {
+        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Unsigned(number), &self))
+    }
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnRef, E> {
+        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Signed(number), &self))
+    }
+}
+
+impl fmt::Display for ColumnRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "column {number}"),
+            Self::Name(name) => write!(f, "column `{name}`"),
+        }
+    }
+}
+
+/// A column of text, or the same text for every row of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TextColumn {
+    /// Name or number of the column.
+    #[serde(default)]
+    pub column: Option<ColumnRef>,
+    /// The text of every row, instead of a column.
+    #[serde(default)]
+    pub value: Option<String>,
+    /// The column may be missing from the file, and its cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// A column of whole numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CountColumn {
+    /// Name or number of the column.
+    pub column: ColumnRef,
+}
+
+/// A column of numbers, or the same number for every row of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScalarColumn {
+    /// Name or number of the column.
+    #[serde(default)]
+    pub column: Option<ColumnRef>,
+    /// The number of every row, instead of a column.
+    #[serde(default)]
+    pub value: Option<f64>,
+    /// Unit of the file's numbers, e.g. `mm`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// The column may be missing from the file, and its cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// Columns of numbers, one for each joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointColumns {
+    /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`.
+    #[serde(default)]
+    pub column: Option<String>,
+    /// Names or numbers of the columns from the first joint to the last, instead of a pattern.
+    #[serde(default)]
+    pub columns: Option<Vec<ColumnRef>>,
+    /// Unit of the file's numbers; for positions that of the revolute joints, e.g. `deg`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// Unit of the positions of prismatic joints, e.g. `mm`.
+    #[serde(default)]
+    pub linear_unit: Option<String>,
+    /// The columns may be missing from the file, and their cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// Which column holds which quantity; what is not named here is not read.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Columns {
+    /// Name of the point; without it rows are called `row 17`.
+    pub point_id: Option<TextColumn>,
+    /// Order of the recording, strictly increasing; without it the number of the data row, from 1.
+    pub sequence: Option<CountColumn>,
+    /// What the recording itself says a row is for, e.g. `fit` or `validate`.
+    pub usage: Option<TextColumn>,
+    /// When the row was recorded.
+    pub time: Option<ScalarColumn>,
+    /// Mass at the tool.
+    pub payload: Option<ScalarColumn>,
+    /// Temperature of the arm or of the room.
+    pub temperature: Option<ScalarColumn>,
+    /// Measured point, x in the tracker's frame.
+    pub x: Option<ScalarColumn>,
+    /// Measured point, y in the tracker's frame.
+    pub y: Option<ScalarColumn>,
+    /// Measured point, z in the tracker's frame.
+    pub z: Option<ScalarColumn>,
+    /// Standard deviation of x.
+    pub sigma_x: Option<ScalarColumn>,
+    /// Standard deviation of y.
+    pub sigma_y: Option<ScalarColumn>,
+    /// Standard deviation of z.
+    pub sigma_z: Option<ScalarColumn>,
+    /// Joint positions.
+    pub q: Option<JointColumns>,
+    /// Motor currents.
+    pub current: Option<JointColumns>,
+    /// Direction of the last move of each joint: 1, -1 or 0; no unit.
+    pub direction: Option<JointColumns>,
+}
+
+/// How two files become one recording. Rows keep the order of the first file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Join {
+    /// Rows of equal `point_id`.
+    Id {},
+    /// Rows nearest in `time`, each being the nearest of the other.
+    Time {
+        /// Largest difference, s.
+        tolerance_s: f64,
+        /// Clock of the second file minus clock of the first, s.
+        #[serde(default)]
+        offset_s: f64,
+    },
+    /// The n-th data row of one file belongs to the n-th of the other.
+    Order {},
+    /// No join: one file continues the other, each with all quantities. Any number of files.
+    Append {},
+}
+
+/// What becomes of rows whose `point_id` occurs more than once in a file.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Duplicates {
+    /// None is used: nobody can say which is right.
+    #[default]
+    Reject,
+    /// The first usable one is used.
+    First,
+    /// The last usable one is used.
+    Last,
+    /// All are used, e.g. where a point is measured repeatedly (not with a join by id).
+    Keep,
+}
+
+/// What becomes of rows with a joint beyond the robot's limits.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Limits {
+    /// Used, with a warning that counts them; most rows beyond the limits is an error.
+    #[default]
+    Warn,
+    /// Rejected.
+    Reject,
+    /// Used without a word.
+    Ignore,
+}
+
+/// Where the quantities of a row live in its list of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Slot {
+    Time,
+    Payload,
+    Temperature,
+    Position(usize),
+    Sigma(usize),
+    Q(usize),
+    Current(usize),
+    Direction(usize),
+}
+
+impl Slot {
+    /// Numbers in a row of a robot with so many joints.
+    pub(super) fn count(joints: usize) -> usize {
+        9 + 3 * joints
+    }
+    pub(super) fn index(self, joints: usize) -> usize {
+        match self {
+            Self::Time => 0,
+            Self::Payload => 1,
+            Self::Temperature => 2,
+            Self::Position(axis) => 3 + axis,
+            Self::Sigma(axis) => 6 + axis,
+            Self::Q(joint) => 9 + joint,
+            Self::Current(joint) => 9 + joints + joint,
+            Self::Direction(joint) => 9 + 2 * joints + joint,
+        }
+    }
+}
+
+/// Columns that are mapped for every joint.
+pub(super) struct PerJoint<'a> {
+    /// The setting.
+    pub name: &'static str,
+    pub columns: &'a JointColumns,
+    /// For positions that of a revolute joint.
+    pub quantity: Quantity,
+    pub slot: fn(usize) -> Slot,
+}
+
+impl Columns {
+    /// The mapped single numbers: setting, column, quantity, slot.
+    pub(super) fn scalars(&self) -> Vec<(&'static str, &ScalarColumn, Quantity, Slot)> {
+        [
+            ("time", &self.time, Quantity::Time, Slot::Time),
+            ("payload", &self.payload, Quantity::Mass, Slot::Payload),
+            ("temperature", &self.temperature, Quantity::Temperature, Slot::Temperature),
+            ("x", &self.x, Quantity::Length, Slot::Position(0)),
+            ("y", &self.y, Quantity::Length, Slot::Position(1)),
+            ("z", &self.z, Quantity::Length, Slot::Position(2)),
+            ("sigma_x", &self.sigma_x, Quantity::Length, Slot::Sigma(0)),
+            ("sigma_y", &self.sigma_y, Quantity::Length, Slot::Sigma(1)),
+            ("sigma_z", &self.sigma_z, Quantity::Length, Slot::Sigma(2)),
+        ]
+        .into_iter()
+        .filter_map(|(name, column, quantity, slot)| column.as_ref().map(|column| (name, column, quantity, slot)))
+        .collect()
+    }
+    /// The mapped numbers per joint.
+    pub(super) fn per_joint(&self) -> Vec<PerJoint<'_>> {
+        let listed = [
+            ("q", &self.q, Quantity::Angle, Slot::Q as fn(usize) -> Slot),
+            ("current", &self.current, Quantity::Current, Slot::Current),
+            ("direction", &self.direction, Quantity::Number, Slot::Direction),
+        ];
+        let mapped = listed.into_iter().filter_map(|(name, columns, quantity, slot)| {
+            columns.as_ref().map(|columns| PerJoint { name, columns, quantity, slot })
+        });
+        mapped.collect()
+    }
+    /// Names of all mapped quantities.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let mut names: Vec<&'static str> = Vec::new();
+        names.extend(self.point_id.as_ref().map(|_| "point_id"));
+        names.extend(self.sequence.as_ref().map(|_| "sequence"));
+        names.extend(self.usage.as_ref().map(|_| "usage"));
+        names.extend(self.scalars().iter().map(|mapped| mapped.0));
+        names.extend(self.per_joint().iter().map(|mapped| mapped.name));
+        names
+    }
+}

@@ -1,0 +1,270 @@
+//! Rows of a delimited file as they stand: exact line numbers, quoted fields, bounded memory.
+//!
+//! A quoted field may hold the delimiter, line ends and `""` for a quote. Empty lines and comments are no rows.
+
+use super::check::{Delimiter, delimiter};
+use super::layout::FileLayout;
+use crate::error::{Error, Result};
+use crate::stage::Source;
+use std::io::{BufRead, BufReader, Read};
+use std::ops::Range;
+
+/// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
+const LONGEST: usize = 1 << 20;
+
+/// Reads one file from its first line to its last.
+pub(super) struct Lines {
+    reader: BufReader<Box<dyn Read + Send>>,
+    label: String,
+    delimiter: Delimiter,
+    comment: Option<Vec<u8>>,
+    /// Physical lines read so far.
+    pub lines: u64,
+    /// Bytes read so far.
+    pub bytes: u64,
+}
+
+/// One row; reused from row to row.
+#[derive(Default)]
+pub(super) struct Record {
+    /// Line where it begins, from 1.
+    pub line: u64,
+    /// The bytes as they stand, without the line end.
+    text: Vec<u8>,
+    unquoted: Vec<u8>,
+    quoted: bool,
+    fields: Vec<Range<usize>>,
+}
+
+impl Record {
+    pub(super) fn len(&self) -> usize {
+        self.fields.len()
+    }
+    /// A field without the blanks around it.
+    pub(super) fn field(&self, index: usize) -> Option<&[u8]> {
+        let bytes = if self.quoted { &self.unquoted } else { &self.text };
+        self.fields.get(index).and_then(|range| bytes.get(range.clone())).map(<[u8]>::trim_ascii)
+    }
+    pub(super) fn is_blank(&self, from: usize) -> bool {
+        (from..self.len()).all(|index| self.field(index).is_some_and(<[u8]>::is_empty))
+    }
+    /// The row for people, cut at 200 characters.
+    pub(super) fn text(&self) -> String {
+        String::from_utf8_lossy(self.text.get(..self.text.len().min(1000)).unwrap_or_default()).chars().take(200).collect()
+    }
+}
+
+impl Lines {
+    /// Opens a file and skips what stands above header and data; `None` where nothing is left.
+    pub(super) fn open(source: Source, layout: &FileLayout) -> Result<Self> {
+        let delimiter = delimiter(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
+        let comment = layout.comment.as_ref().map(|text| text.as_bytes().to_vec());
+        let reader = BufReader::with_capacity(1 << 16, source.reader);
+        let mut lines = Self { reader, label: source.label, delimiter, comment, lines: 0, bytes: 0 };
+        lines.byte_order_mark()?;
+        lines.skip(layout.skip)?;
+        Ok(lines)
+    }
+    fn byte_order_mark(&mut self) -> Result<()> {
+        // A reader may hand out fewer bytes than asked: the first buffer is at least one read, marks are at most 4 bytes.
+        let head = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
+        if head.starts_with(b"PAR1") {
+            return Err(Error::data(&self.label, "is a Parquet file; allowed: delimited text in UTF-8"));
+        }
+        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
+            return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark)"));
+        }
+        if head.starts_with(&[0xef, 0xbb, 0xbf]) {
+            self.reader.consume(3);
+            self.bytes += 3;
+        }
+        Ok(())
+    }
+    /// Skips physical lines.
+    pub(super) fn skip(&mut self, count: u64) -> Result<()> {
+        let mut text = Vec::new();
+        for _ in 0..count {
+            text.clear();
+            if !self.line(&mut text)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+    /// Appends one physical line without its end; false at the end of the file.
+    fn line(&mut self, text: &mut Vec<u8>) -> Result<bool> {
+        let room = LONGEST.saturating_sub(text.len()) as u64;
+        let read = (&mut self.reader).take(room).read_until(b'\n', text).map_err(|error| failed(&self.label, &error))?;
+        if read == 0 && room > 0 {
+            return Ok(false);
+        }
+        self.bytes += read as u64;
+        self.lines += 1;
+        if text.last() == Some(&b'\n') {
+            text.pop();
+            if text.last() == Some(&b'\r') {
+                text.pop();
+            }
+        } else if read as u64 == room {
+            let message = "a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed";
+            return Err(Error::data(format!("{}:{}", self.label, self.lines), message));
+        } else if text.last() == Some(&b'\r') {
+            text.pop();
+        }
+        Ok(true)
+    }
+    /// The next row; false at the end of the file.
+    pub(super) fn next(&mut self, record: &mut Record) -> Result<bool> {
+        loop {
+            record.text.clear();
+            if !self.line(&mut record.text)? {
+                return Ok(false);
+            }
+            record.line = self.lines;
+            let comment = self.comment.as_ref().is_some_and(|mark| record.text.starts_with(mark));
+            // A line of delimiters alone is a blank row, also where the delimiter is a tab.
+            let delimited = matches!(self.delimiter, Delimiter::Byte(byte) if byte != b' ' && record.text.contains(&byte));
+            if comment || (record.text.trim_ascii().is_empty() && !delimited) {
+                continue;
+            }
+            record.fields.clear();
+            record.quoted = record.text.contains(&b'"');
+            if !record.quoted {
+                split(&record.text, self.delimiter, &mut record.fields);
+                return Ok(true);
+            }
+            while !unquote(record, self.delimiter) {
+                record.text.push(b'\n');
+                if !self.line(&mut record.text)? {
+                    return Err(Error::data(format!("{}:{}", self.label, record.line), "a quoted field is not closed"));
+                }
+            }
+            return Ok(true);
+        }
+    }
+}
+
+fn failed(label: &str, error: &std::io::Error) -> Error {
+    Error::store(label, format!("could not be read: {error}"))
+}
+
+/// Fields of a row without quotes.
+fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) {
+    let mut start = 0;
+    match delimiter {
+        Delimiter::Byte(delimiter) => {
+            for (index, byte) in text.iter().enumerate() {
+                if *byte == delimiter {
+                    fields.push(start..index);
+                    start = index + 1;
+                }
+            }
+            fields.push(start..text.len());
+        }
+        Delimiter::Whitespace => {
+            let mut inside = false;
+            for (index, byte) in text.iter().enumerate() {
+                let blank = matches!(byte, b' ' | b'\t');
+                if inside && blank {
+                    fields.push(start..index);
+                } else if !inside && !blank {
+                    start = index;
+                }
+                inside = !blank;
+            }
+            if inside {
+                fields.push(start..text.len());
+            }
+        }
+    }
+}
+
+/// Fields of a row with quotes; false where a quote is still open at the end.
+fn unquote(record: &mut Record, delimiter: Delimiter) -> bool {
+    record.fields.clear();
+    record.unquoted.clear();
+    let (mut start, mut inside, mut fresh) = (0, false, true);
+    let mut bytes = record.text.iter().copied().peekable();
+    while let Some(byte) = bytes.next() {
+        let ends = !inside
+            && match delimiter {
+                Delimiter::Byte(delimiter) => byte == delimiter,
+                Delimiter::Whitespace => matches!(byte, b' ' | b'\t'),
+            };
+        if inside && byte == b'"' {
+            if bytes.peek() == Some(&b'"') {
+                bytes.next();
+                record.unquoted.push(b'"');
+            } else {
+                inside = false;
+            }
+        } else if ends {
+            if delimiter != Delimiter::Whitespace || !fresh {
+                record.fields.push(start..record.unquoted.len());
+            }
+            start = record.unquoted.len();
+            fresh = true;
+        } else if fresh && byte == b'"' {
+            inside = true;
+            fresh = false;
+        } else {
+            // Blanks before a quote do not make it part of the text.
+            fresh = fresh && !inside && matches!(byte, b' ' | b'\t');
+            record.unquoted.push(byte);
+        }
+    }
+    if delimiter != Delimiter::Whitespace || !fresh {
+        record.fields.push(start..record.unquoted.len());
+    }
+    !inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Vec<(u64, Vec<String>)> {
+        let layout = FileLayout {
+            file: Default::default(),
+            delimiter: delimiter.into(),
+            decimal: Default::default(),
+            header: true,
+            skip: 0,
+            skip_below_header: 0,
+            comment: comment.map(Into::into),
+            columns: Default::default(),
+        };
+        let source = Source { label: "a.csv".into(), reader: Box::new(std::io::Cursor::new(text.to_string())), size: None };
+        let mut lines = Lines::open(source, &layout).unwrap();
+        let (mut record, mut rows) = (Record::default(), Vec::new());
+        while lines.next(&mut record).unwrap() {
+            let fields = (0..record.len()).map(|index| String::from_utf8_lossy(record.field(index).unwrap()).into()).collect();
+            rows.push((record.line, fields));
+        }
+        rows
+    }
+
+    fn row(line: u64, fields: &[&str]) -> (u64, Vec<String>) {
+        (line, fields.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn line_numbers_survive_crlf_comments_and_empty_lines() {
+        let text = "\u{feff}a,b\r\n\r\n# no row\r\n1,2\r\n\n3, 4";
+        assert_eq!(rows(text, ",", Some("#")), [row(1, &["a", "b"]), row(4, &["1", "2"]), row(6, &["3", "4"])]);
+    }
+
+    #[test]
+    fn quoted_fields_hold_delimiters_quotes_and_line_ends() {
+        let text = "\"a;\"\"b\"\"\";2\n \"x\ny\" ;3\n4;5;\n;;\n";
+        let expected = [row(1, &["a;\"b\"", "2"]), row(2, &["x\ny", "3"]), row(4, &["4", "5", ""]), row(5, &["", "", ""])];
+        assert_eq!(rows(text, ";", None), expected);
+    }
+
+    #[test]
+    fn runs_of_blanks_separate_where_whitespace_does() {
+        let text = "  a\t b  \n1   \"two words\"  3\n";
+        assert_eq!(rows(text, "whitespace", None), [row(1, &["a", "b"]), row(2, &["1", "two words", "3"])]);
+        assert_eq!(rows("a\tb\n\t\n", "tab", None), [row(1, &["a", "b"]), row(2, &["", ""])]);
+    }
+}

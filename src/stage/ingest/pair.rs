@@ -1,0 +1,194 @@
+//! Duplicates within a file, and partners across two.
+
+use super::layout::{Duplicates, Join};
+use super::scan::{Key, Scan};
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+
+/// No partner.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Where the other row with the same id stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Twin {
+    pub file: u32,
+    pub line: u32,
+}
+
+/// What the files together decide about the usable rows of one of them.
+#[derive(Default)]
+pub(super) struct Fate {
+    /// Rows given up as duplicates, by data row.
+    pub twins: BTreeMap<u32, Twin>,
+    /// For a join, the data row of the other file for each data row of this one, from 1; [`NONE`] where there is none.
+    pub partner: Option<Vec<u32>>,
+}
+
+/// Decides for all files. Files that continue each other share their ids.
+pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<Fate> {
+    let mut fates: Vec<Fate> = scans.iter().map(|_| Fate::default()).collect();
+    if let Some(Join::Append {}) | None = join {
+        let mut keys = Vec::new();
+        for scan in scans.iter_mut() {
+            if keys.is_empty() {
+                keys = std::mem::take(&mut scan.keys);
+            } else {
+                keys.append(&mut scan.keys);
+            }
+        }
+        single(&mut keys, duplicates, &mut fates);
+        return fates;
+    }
+    for scan in scans.iter_mut() {
+        single(&mut scan.keys, duplicates, &mut fates);
+    }
+    if let ([first, second], [one, other]) = (scans, fates.as_mut_slice()) {
+        let pairs = match join {
+            Some(Join::Id {}) => by_id(&first.keys, &second.keys),
+            Some(Join::Time { tolerance_s, offset_s }) => {
+                let times = |scan: &Scan, fate: &Fate, offset: f64| -> Vec<(f64, u32)> {
+                    let rows = scan.times.iter().filter(|(_, number)| !fate.twins.contains_key(number));
+                    rows.map(|(time, number)| (time - offset, *number)).collect()
+                };
+                by_time(times(first, one, 0.0), times(second, other, *offset_s), *tolerance_s)
+            }
+            _ => {
+                let usable = |scan: &Scan, fate: &Fate, number: u32| {
+                    scan.usable.get(number as usize - 1).copied().unwrap_or(false) && !fate.twins.contains_key(&number)
+                };
+                let rows = 1..=first.read.min(second.read) as u32;
+                rows.filter(|n| usable(first, one, *n) && usable(second, other, *n)).map(|n| (n, n)).collect()
+            }
+        };
+        let mut partner = vec![NONE; first.read as usize];
+        let mut back = vec![NONE; second.read as usize];
+        for (a, b) in pairs {
+            partner[a as usize - 1] = b;
+            back[b as usize - 1] = a;
+        }
+        one.partner = Some(partner);
+        other.partner = Some(back);
+    }
+    fates
+}
+
+/// Sorts keys by id and leaves one of each id, or none.
+fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
+    keys.sort_unstable();
+    let mut dropped = Vec::new();
+    for same in keys.chunk_by(|a, b| (a.hash, a.check) == (b.hash, b.check)) {
+        let ([first, .., last], keep) = (same, duplicates) else {
+            continue;
+        };
+        let stays = match keep {
+            Duplicates::Reject => None,
+            Duplicates::Last => Some(last),
+            _ => Some(first),
+        };
+        for key in same.iter().filter(|key| Some(*key) != stays) {
+            let twin = stays.unwrap_or(if key == first { last } else { first });
+            if let Some(fate) = fates.get_mut(key.file as usize) {
+                fate.twins.insert(key.number, Twin { file: twin.file, line: twin.line });
+            }
+            dropped.push(*key);
+        }
+    }
+    // In the order of `keys`.
+    let mut dropped = dropped.into_iter().peekable();
+    keys.retain(|key| dropped.next_if_eq(key).is_none());
+}
+
+/// Pairs of rows with one id; both lists sorted, every id once.
+fn by_id(first: &[Key], second: &[Key]) -> Vec<(u32, u32)> {
+    let (mut a, mut b) = (first.iter().peekable(), second.iter().peekable());
+    let mut pairs = Vec::new();
+    while let (Some(left), Some(right)) = (a.peek(), b.peek()) {
+        match (left.hash, left.check).cmp(&(right.hash, right.check)) {
+            Ordering::Less => drop(a.next()),
+            Ordering::Greater => drop(b.next()),
+            Ordering::Equal => {
+                pairs.push((left.number, right.number));
+                a.next();
+                b.next();
+            }
+        }
+    }
+    pairs
+}
+
+/// Pairs of rows that are each other's nearest in time, not further apart than the tolerance. Of equally near rows the
+/// earlier in the file counts.
+fn by_time(mut first: Vec<(f64, u32)>, mut second: Vec<(f64, u32)>, tolerance: f64) -> Vec<(u32, u32)> {
+    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    first.sort_unstable_by(order);
+    second.sort_unstable_by(order);
+    let towards = nearest(&first, &second);
+    let back = nearest(&second, &first);
+    let mut pairs = Vec::new();
+    for (index, (time, number)) in first.iter().enumerate() {
+        let Some(other) = towards.get(index).copied().flatten() else { continue };
+        let mutual = back.get(other).copied().flatten() == Some(index);
+        if let (true, Some((their, partner))) = (mutual, second.get(other))
+            // Clock arithmetic in floating point must not lose a row that lies on the tolerance.
+            && (time - their).abs() <= tolerance + 1e-9 * (1.0 + time.abs())
+        {
+            pairs.push((*number, *partner));
+        }
+    }
+    pairs
+}
+
+/// For each time of `from` the index of the nearest in `to`; both sorted.
+fn nearest(from: &[(f64, u32)], to: &[(f64, u32)]) -> Vec<Option<usize>> {
+    // Of equal times the first stands for all: clocks that stand still must not cost a search of all rows for each row.
+    let heads: Vec<usize> = (0..to.len()).filter(|index| *index == 0 || to[index - 1].0 != to[*index].0).collect();
+    let mut start = 0;
+    from.iter()
+        .map(|(time, _)| {
+            while heads.get(start).is_some_and(|head| to[*head].0 < *time) {
+                start += 1;
+            }
+            let around = [start.checked_sub(1), Some(start)].into_iter().flatten().filter_map(|index| heads.get(index).copied());
+            around.min_by(|a, b| (to[*a].0 - time).abs().total_cmp(&(to[*b].0 - time).abs()).then(to[*a].1.cmp(&to[*b].1)))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(times: &[f64]) -> Vec<(f64, u32)> {
+        times.iter().zip(1..).map(|(time, number)| (*time, number)).collect()
+    }
+
+    #[test]
+    fn rows_pair_with_their_mutual_nearest_in_time_only() {
+        let pairs = by_time(times(&[1.0, 2.0, 2.2, 9.0]), times(&[0.9, 2.15, 5.0]), 0.25);
+        assert_eq!(pairs, [(1, 1), (3, 2)]);
+        assert_eq!(by_time(times(&[1.0]), times(&[1.5]), 0.5), [(1, 1)]);
+        assert_eq!(by_time(times(&[1.0]), times(&[1.6]), 0.5), []);
+        assert_eq!(by_time(times(&[]), times(&[1.6]), 0.5), []);
+    }
+
+    #[test]
+    fn clocks_that_stand_still_pair_one_row_in_linear_time() {
+        let still = times(&vec![2.0e13; 200_000]);
+        assert_eq!(by_time(still.clone(), still, 1.0), [(1, 1)]);
+    }
+
+    #[test]
+    fn of_equal_ids_one_or_none_stays() {
+        let key = |hash, number| Key { hash, check: 0, file: 0, number, line: number + 1 };
+        let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
+        let stays = |duplicates| {
+            let (mut keys, mut fates) = (keys.clone(), [Fate::default()]);
+            single(&mut keys, duplicates, &mut fates);
+            let twins: Vec<(u32, u32)> = fates[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
+            (keys.iter().map(|key| key.number).collect::<Vec<_>>(), twins)
+        };
+        assert_eq!(stays(Duplicates::Reject), (vec![2], vec![(1, 5), (3, 2), (4, 2)]));
+        assert_eq!(stays(Duplicates::First), (vec![2, 1], vec![(3, 2), (4, 2)]));
+        assert_eq!(stays(Duplicates::Last), (vec![2, 4], vec![(1, 5), (3, 5)]));
+    }
+}

@@ -1,0 +1,251 @@
+//! One row read as quantities, or the reason why not.
+
+use super::arm::Arm;
+use super::bind::{Binding, Text};
+use super::layout::{Decimal, Limits, Slot};
+use super::lines::Record;
+use super::number::{self, Fault};
+
+/// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
+const SLACK: f64 = 1e-6;
+
+/// More than one and a half turns is no position of a joint in rad, but a common one in degrees.
+const TURNS: f64 = 3.0 * std::f64::consts::PI;
+
+/// Why a row is not used; the stable word in the table `rejected`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reason {
+    Blank,
+    NotANumber,
+    NotText,
+    ShortRow,
+    LongRow,
+    LostBeam,
+    OutOfRange,
+    OutOfOrder,
+    DuplicateId,
+    Unmatched,
+}
+
+impl Reason {
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Blank => "blank",
+            Self::NotANumber => "not_a_number",
+            Self::NotText => "not_text",
+            Self::ShortRow => "short_row",
+            Self::LongRow => "long_row",
+            Self::LostBeam => "lost_beam",
+            Self::OutOfRange => "out_of_range",
+            Self::OutOfOrder => "out_of_order",
+            Self::DuplicateId => "duplicate_id",
+            Self::Unmatched => "unmatched",
+        }
+    }
+}
+
+/// A row that is not used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Refusal {
+    pub reason: Reason,
+    pub detail: String,
+}
+
+fn refuse<T>(reason: Reason, detail: String) -> Result<T, Refusal> {
+    Err(Refusal { reason, detail })
+}
+
+/// The quantities of one row; reused from row to row.
+#[derive(Default)]
+pub(super) struct Row {
+    /// Number of the data row in its file, from 1.
+    pub number: u64,
+    pub line: u64,
+    /// Empty where there is none.
+    pub id: String,
+    pub usage: String,
+    pub sequence: Option<i64>,
+    /// SI, by [`Slot::index`]; NaN where missing.
+    pub values: Vec<f64>,
+    /// The first joint beyond its limits, from 0.
+    pub beyond: Option<usize>,
+    /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
+    pub turned: Option<(usize, f64)>,
+}
+
+/// Reads rows of one file.
+pub(super) struct RowReader<'a> {
+    pub binding: Binding,
+    pub decimal: Decimal,
+    pub limits: Limits,
+    pub arm: &'a Arm,
+    /// Of the last usable row.
+    pub last_sequence: Option<i64>,
+}
+
+impl RowReader<'_> {
+    /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
+    pub(super) fn read(&mut self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
+        row.id.clear();
+        row.usage.clear();
+        row.sequence = None;
+        row.beyond = None;
+        row.turned = None;
+        row.line = record.line;
+        row.values.clear();
+        row.values.resize(Slot::count(self.arm.joints()), f64::NAN);
+        if record.is_blank(0) {
+            return refuse(Reason::Blank, "the whole row is blank".into());
+        }
+        let width = self.binding.width;
+        let complete = record.len() >= width;
+        text(&self.binding.id, record, "point_id", complete, &mut row.id)?;
+        if !complete {
+            return refuse(Reason::ShortRow, format!("{} fields; allowed: {width}", record.len()));
+        }
+        if !record.is_blank(width) {
+            return refuse(Reason::LongRow, format!("{} fields; allowed: {width}", record.len()));
+        }
+        text(&self.binding.usage, record, "usage", true, &mut row.usage)?;
+        for (index, value) in &self.binding.constants {
+            if let Some(slot) = row.values.get_mut(*index) {
+                *slot = *value;
+            }
+        }
+        self.numbers(record, row)?;
+        self.plausible(row)?;
+        if let Some(column) = self.binding.sequence {
+            row.sequence = Some(self.sequence(record.field(column).unwrap_or_default())?);
+        }
+        Ok(())
+    }
+
+    fn numbers(&self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
+        for cell in &self.binding.cells {
+            let text = record.field(cell.column).unwrap_or_default();
+            let shown = || String::from_utf8_lossy(text).chars().take(40).collect::<String>();
+            let value = match number::parse(text, self.decimal) {
+                Ok(value) => cell.unit.to_si(value),
+                Err(Fault::Blank) if cell.optional => continue,
+                Err(Fault::Blank) => return refuse(Reason::Blank, format!("{} is blank", cell.name)),
+                Err(Fault::Text) => {
+                    return refuse(Reason::NotANumber, format!("{}: `{}` is not a number", cell.name, shown()));
+                }
+                Err(Fault::Comma) => {
+                    let detail =
+                        format!("{}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", cell.name, shown());
+                    return refuse(Reason::NotANumber, detail);
+                }
+                Err(Fault::Point) => {
+                    let detail =
+                        format!("{}: `{}` has a decimal point; allowed: `decimal: point` in the settings", cell.name, shown());
+                    return refuse(Reason::NotANumber, detail);
+                }
+                Err(Fault::NotFinite) => {
+                    return refuse(Reason::NotANumber, format!("{}: `{}` is not a finite number", cell.name, shown()));
+                }
+            };
+            if let Slot::Q(joint) = cell.slot
+                && self.arm.prismatic.get(joint) == Some(&false)
+                && value.abs() > TURNS
+            {
+                row.turned.get_or_insert((joint, value));
+            }
+            let [lower, upper] = range(cell.slot, self.arm);
+            let direction = matches!(cell.slot, Slot::Direction(_)) && ![-1.0, 0.0, 1.0].contains(&value);
+            if !(lower..=upper).contains(&value) || direction {
+                let unit = cell.unit;
+                let allowed = if direction {
+                    "1, -1 or 0".to_string()
+                } else {
+                    format!("{} to {} {unit}", round(unit.from_si(lower)), round(unit.from_si(upper)))
+                };
+                return refuse(Reason::OutOfRange, format!("{}: `{}`; allowed: {allowed}", cell.name, shown()));
+            }
+            if let Some(slot) = row.values.get_mut(cell.index) {
+                *slot = value;
+            }
+        }
+        Ok(())
+    }
+
+    fn plausible(&self, row: &mut Row) -> Result<(), Refusal> {
+        let joints = self.arm.joints();
+        let (point, first) = (Slot::Position(0).index(joints), Slot::Q(0).index(joints));
+        if row.values.get(point..point + 3).is_some_and(|point| point.iter().all(|axis| *axis == 0.0)) {
+            return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
+        }
+        let q = row.values.get(first..first + joints).unwrap_or_default();
+        for (joint, (q, [lower, upper])) in q.iter().zip(&self.arm.limits).enumerate() {
+            if *q < lower - SLACK || *q > upper + SLACK {
+                row.beyond = Some(joint);
+                if self.limits == Limits::Reject {
+                    let (scale, unit) =
+                        if self.arm.prismatic.get(joint) == Some(&true) { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
+                    let detail = format!(
+                        "joint {} at {:.4} {unit}; allowed: {:.4} to {:.4} {unit}",
+                        joint + 1,
+                        q * scale,
+                        lower * scale,
+                        upper * scale
+                    );
+                    return refuse(Reason::OutOfRange, detail);
+                }
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn sequence(&mut self, text: &[u8]) -> Result<i64, Refusal> {
+        let shown = String::from_utf8_lossy(text);
+        if text.is_empty() {
+            return refuse(Reason::Blank, "sequence is blank".into());
+        }
+        let Ok(value) = shown.parse::<i64>() else {
+            return refuse(Reason::NotANumber, format!("sequence: `{shown}` is not a whole number"));
+        };
+        if let Some(last) = self.last_sequence
+            && value <= last
+        {
+            return refuse(Reason::OutOfOrder, format!("sequence {value} does not follow {last}"));
+        }
+        self.last_sequence = Some(value);
+        Ok(value)
+    }
+}
+
+/// What a recording may hold, SI; the same as in its schema, so that a single row cannot spoil the table.
+fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
+    match slot {
+        Slot::Time => [f64::MIN, f64::MAX],
+        Slot::Payload => [0.0, 1e4],
+        Slot::Temperature => [-60.0, 200.0],
+        Slot::Position(_) => [-200.0, 200.0],
+        Slot::Sigma(_) => [0.0, 1.0],
+        Slot::Q(joint) if arm.prismatic.get(joint) == Some(&true) => [-200.0, 200.0],
+        Slot::Q(_) => [-20.0, 20.0],
+        Slot::Current(_) => [-1e4, 1e4],
+        Slot::Direction(_) => [-1.0, 1.0],
+    }
+}
+
+fn round(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+fn text(source: &Option<Text>, record: &Record, name: &str, complete: bool, into: &mut String) -> Result<(), Refusal> {
+    match source {
+        Some(Text::Value(value)) => into.push_str(value),
+        Some(Text::Column { column, optional }) => {
+            let bytes = record.field(*column).unwrap_or_default();
+            match std::str::from_utf8(bytes) {
+                Ok("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
+                Ok(text) => into.push_str(text),
+                Err(_) => return refuse(Reason::NotText, format!("{name} is not UTF-8 text")),
+            }
+        }
+        None => {}
+    }
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! First reading of a file: which rows are usable, and what is needed to find duplicates and partners.
+//!
+//! Memory: 24 bytes a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all; the second
+//! file of a join is held with its numbers.
+
+use super::Ingest;
+use super::arm::Arm;
+use super::layout::{FileLayout, Join, Slot};
+use super::reading::{Pace, Reading};
+use super::row::{Reason, Refusal, Row};
+use crate::error::{Error, Result};
+use crate::stage::Context;
+use std::collections::BTreeMap;
+
+/// What is remembered of a point id: 96 bits of its hash (two ids in 10^7 are confused once in 10^14 files) and its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key {
+    pub hash: u64,
+    pub check: u32,
+    /// Index of the file.
+    pub file: u32,
+    /// Data row in its file, from 1.
+    pub number: u32,
+    pub line: u32,
+}
+
+/// How many rows were refused for a reason, and the first of them.
+#[derive(Debug, Clone)]
+pub(super) struct Count {
+    pub rows: u64,
+    pub first_line: u64,
+    pub first_detail: String,
+}
+
+pub(super) type Tally = BTreeMap<Reason, Count>;
+
+/// Counts one refusal.
+pub(super) fn tally(counts: &mut Tally, line: u64, refusal: &Refusal) {
+    let new = || Count { rows: 0, first_line: line, first_detail: refusal.detail.clone() };
+    counts.entry(refusal.reason).or_insert_with(new).rows += 1;
+}
+
+/// Rows that say something odd about the whole file, with the first of them.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Odd {
+    pub rows: u64,
+    pub first: Option<(u64, usize, f64)>,
+}
+
+impl Odd {
+    fn count(&mut self, line: u64, joint: usize, value: f64) {
+        self.rows += 1;
+        self.first.get_or_insert((line, joint, value));
+    }
+}
+
+/// The numbers and texts of the second file of a join, by data row.
+#[derive(Default)]
+pub(super) struct Packed {
+    pub slots: Vec<usize>,
+    pub values: Vec<f64>,
+    pub ids: Vec<String>,
+    pub usage: Vec<String>,
+}
+
+impl Packed {
+    fn push(&mut self, row: &Row) {
+        self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
+    }
+}
+
+/// What the first reading found.
+pub(super) struct Scan {
+    pub label: String,
+    pub lines: u64,
+    pub read: u64,
+    pub tally: Tally,
+    pub keys: Vec<Key>,
+    /// Time and number of usable rows, for a join by time.
+    pub times: Vec<(f64, u32)>,
+    /// Usable data rows, for a join.
+    pub usable: Vec<bool>,
+    pub packed: Option<Packed>,
+    pub slots: Vec<usize>,
+    /// Revolute joints beyond one and a half turns.
+    pub turns: Odd,
+    pub beyond: Odd,
+    /// Largest angle of a revolute joint, rad.
+    pub largest: f64,
+}
+
+impl Scan {
+    pub(super) fn refused(&self) -> u64 {
+        self.tally.values().map(|count| count.rows).sum()
+    }
+    pub(super) fn used(&self) -> u64 {
+        self.read - self.refused()
+    }
+}
+
+/// Reads file `index` of the settings once.
+pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &Arm, context: &Context) -> Result<Scan> {
+    let source = context.services.open(&layout.file)?;
+    let size = source.size;
+    let mut reading = Reading::open(source, layout, arm, settings.limits)?;
+    let label = reading.label.clone();
+    context.services.begin(&format!("reading {label}"), size, "bytes");
+    for missing in &reading.binding().missing {
+        context.services.note(format!("{label}: {missing}"));
+    }
+    let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
+    let slots = reading.binding().slots();
+    let packed = (joined && index == 1).then(|| Packed { slots: slots.clone(), ..Packed::default() });
+    let mut scan = Scan {
+        label,
+        lines: 0,
+        read: 0,
+        tally: Tally::new(),
+        keys: Vec::new(),
+        times: Vec::new(),
+        usable: Vec::new(),
+        packed,
+        slots,
+        turns: Odd::default(),
+        beyond: Odd::default(),
+        largest: 0.0,
+    };
+    let keyed = layout.columns.point_id.is_some() && settings.duplicates != super::layout::Duplicates::Keep;
+    let timed = matches!(settings.join, Some(Join::Time { .. }));
+    // By id, both rows have the same one.
+    let named = layout.columns.point_id.is_some() && !matches!(settings.join, Some(Join::Id {}));
+    let mut pace = Pace::new(context);
+    while let Some(judged) = reading.next()? {
+        let row = &reading.row;
+        if let Some((joint, angle)) = row.turned {
+            scan.turns.count(row.line, joint, angle);
+        }
+        match &judged {
+            Ok(()) => {
+                if keyed && !row.id.is_empty() {
+                    scan.keys.push(key(row, index, &scan.label)?);
+                }
+                if timed {
+                    let time = row.values.get(Slot::Time.index(arm.joints())).copied().unwrap_or(f64::NAN);
+                    scan.times.push((time, narrow(row.number, &scan.label)?));
+                }
+                scan.odd(row, arm);
+            }
+            Err(refusal) => tally(&mut scan.tally, row.line, refusal),
+        }
+        if joined {
+            scan.usable.push(judged.is_ok());
+        }
+        if let Some(packed) = &mut scan.packed {
+            packed.push(row);
+            if named {
+                packed.ids.push(row.id.clone());
+            }
+            if layout.columns.usage.is_some() {
+                packed.usage.push(row.usage.clone());
+            }
+        }
+        pace.row(reading.lines.bytes);
+    }
+    context.services.advance(reading.lines.bytes, "");
+    scan.lines = reading.lines.lines;
+    scan.read = reading.row.number;
+    if scan.read == 0 {
+        return Err(Error::data(scan.label, "has a header but no data row"));
+    }
+    Ok(scan)
+}
+
+fn narrow(number: u64, label: &str) -> Result<u32> {
+    u32::try_from(number).map_err(|_| Error::data(label, "more than 4294967295 rows"))
+}
+
+fn key(row: &Row, file: usize, label: &str) -> Result<Key> {
+    let digest = blake3::hash(row.id.as_bytes());
+    let mut bytes = digest.as_bytes().iter().copied();
+    let hash = bytes.by_ref().take(8).fold(0u64, |hash, byte| hash << 8 | u64::from(byte));
+    let check = bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte));
+    Ok(Key { hash, check, file: file as u32, number: narrow(row.number, label)?, line: narrow(row.line, label)? })
+}
+
+impl Scan {
+    fn odd(&mut self, row: &Row, arm: &Arm) {
+        let first = Slot::Q(0).index(arm.joints());
+        let q = row.values.get(first..first + arm.joints()).unwrap_or_default();
+        for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
+            self.largest = self.largest.max(value.abs());
+        }
+        if let Some(joint) = row.beyond {
+            self.beyond.count(row.line, joint, q.get(joint).copied().unwrap_or(f64::NAN));
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What is wrong with a file as a whole: errors for the owner of the measurements, before any table is written.
+
+use super::Ingest;
+use super::arm::Arm;
+use super::layout::{Columns, Limits};
+use super::pair::{Fate, NONE};
+use super::row::Reason;
+use super::scan::{Count, Scan};
+use crate::error::{Error, Fault, Result};
+use crate::stage::Context;
+
+/// Beyond this largest angle, deg, a file in degrees is believed to be one.
+const SMALL_IN_DEGREES: f64 = 6.5;
+
+/// Rows of a file that become part of the recording.
+pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
+    match &fate.partner {
+        Some(partner) => partner.iter().filter(|partner| **partner != NONE).count() as u64,
+        None => scan.used() - fate.twins.len() as u64,
+    }
+}
+
+/// Fails where a file cannot be what the settings say it is; warns where it is odd.
+pub(super) fn judge(settings: &Ingest, scans: &[Scan], fates: &[Fate], arm: &Arm, context: &Context) -> Result<()> {
+    let mut faults = Vec::new();
+    for ((scan, fate), layout) in scans.iter().zip(fates).zip(&settings.files) {
+        let angles = implausible(scan, &layout.columns, settings.limits);
+        let fault = angles.or_else(|| too_many_rejected(settings, scan, fate));
+        if fault.is_none() {
+            warn(scan, &layout.columns, settings.limits, arm, context);
+        }
+        faults.extend(fault);
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+}
+
+fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> {
+    let unit = columns.q.as_ref()?.unit.as_deref().unwrap_or("rad");
+    let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
+    if scan.turns.rows * 2 > judged
+        && let Some((line, joint, value)) = scan.turns.first
+    {
+        let (shown, advice) = if unit == "rad" {
+            (value, "allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`")
+        } else {
+            (value.to_degrees(), "allowed: up to 540 deg")
+        };
+        let shown_unit = if unit == "rad" { "rad" } else { "deg" };
+        let message = format!(
+            "`q` is declared in {unit}, but {} of {judged} rows hold a joint beyond one and a half turns, here joint {} at {shown:.4} {shown_unit}; {advice}",
+            scan.turns.rows,
+            joint + 1
+        );
+        return Some(Fault::new(format!("{}:{line}", scan.label), message));
+    }
+    if limits == Limits::Warn
+        && scan.beyond.rows * 2 > judged
+        && let Some((line, joint, value)) = scan.beyond.first
+    {
+        let degrees = if unit == "deg" { "" } else { "; if the file holds degrees, say `unit: deg`" };
+        let message = format!(
+            "{} of {judged} rows are beyond the robot's joint limits, here joint {} at {value:.4} rad or m; allowed: the unit and order of columns that the file has, or `limits: ignore`{degrees}",
+            scan.beyond.rows,
+            joint + 1
+        );
+        return Some(Fault::new(format!("{}:{line}", scan.label), message));
+    }
+    None
+}
+
+fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Fault> {
+    let accepted = accepted(scan, fate);
+    let rejected = scan.read - accepted;
+    if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
+        return None;
+    }
+    let twins = fate.twins.len() as u64;
+    let mut counts = scan.tally.clone();
+    for (reason, rows, detail) in [
+        (Reason::DuplicateId, twins, "point ids that occur more than once"),
+        (Reason::Unmatched, scan.used() - accepted - twins, "no partner in the other file"),
+    ] {
+        if rows > 0 {
+            counts.insert(reason, Count { rows, first_line: 0, first_detail: detail.into() });
+        }
+    }
+    let mut reasons: Vec<_> = counts.iter().collect();
+    reasons.sort_by_key(|(_, count)| std::cmp::Reverse(count.rows));
+    let listed: Vec<String> = reasons
+        .iter()
+        .map(|(reason, count)| {
+            let place = if count.first_line == 0 { String::new() } else { format!("line {}: ", count.first_line) };
+            format!("{} {} ({place}{})", count.rows, reason.word(), count.first_detail)
+        })
+        .collect();
+    let share =
+        if accepted == 0 { "no row is left".to_string() } else { format!("{rejected} of {} rows are rejected", scan.read) };
+    let allowed = settings.max_rejected_fraction * 100.0;
+    Some(Fault::new(&scan.label, format!("{share}; allowed: up to {allowed} %. Reasons: {}", listed.join("; "))))
+}
+
+fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Context) {
+    if limits == Limits::Warn
+        && let Some((line, joint, value)) = scan.beyond.first
+    {
+        let [lower, upper] = arm.limits.get(joint).copied().unwrap_or([f64::NAN; 2]);
+        context.services.warn(format!(
+            "{}: {} rows have a joint beyond the robot's limits and are used; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
+            scan.label,
+            scan.beyond.rows,
+            joint + 1
+        ));
+    }
+    let degrees = columns.q.as_ref().is_some_and(|q| q.unit.as_deref() == Some("deg"));
+    if degrees && scan.largest > 0.0 && scan.largest.to_degrees() < SMALL_IN_DEGREES && scan.used() >= 10 {
+        context.services.warn(format!(
+            "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",
+            scan.label,
+            scan.largest.to_degrees()
+        ));
+    }
+}

@@ -1,0 +1,269 @@
+//! Second reading: the recording in chunks, and every row that is not part of it with its reason.
+
+use super::arm::Arm;
+use super::layout::{FileLayout, Join, Slot};
+use super::pair::{Fate, NONE};
+use super::reading::{Pace, Reading};
+use super::row::{Reason, Refusal, Row};
+use super::scan::Scan;
+use super::{Ingest, verdict};
+use crate::error::{Error, Result};
+use crate::stage::{Context, Sink, StreamedTable};
+use crate::table::{Recording, Rejected, RejectedRow, Table};
+
+/// Rows of the recording in memory at once.
+const CHUNK: usize = 1 << 16;
+/// Rejected rows in memory at once, where they come in order.
+const REJECTED_CHUNK: usize = 1 << 12;
+
+/// What all files give and decide together.
+pub(super) struct Decided<'a> {
+    pub settings: &'a Ingest,
+    pub arm: &'a Arm,
+    pub scans: &'a [Scan],
+    pub fates: &'a [Fate],
+    /// Names of the files in tables.
+    pub names: &'a [String],
+}
+
+/// Writes the streamed tables.
+pub(super) fn write(decided: &Decided, context: &Context) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
+    let joined = decided.fates.iter().any(|fate| fate.partner.is_some());
+    let leading = if joined { 1 } else { decided.scans.len() };
+    let rows = decided.scans.iter().zip(decided.fates).take(leading).map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
+    context.services.begin("writing the recording", Some(rows), "rows");
+    let mut recording = Chunks::new(decided, context)?;
+    let mut rejected = Rejections::new(decided.names, context)?;
+    for (index, layout) in decided.settings.files.iter().enumerate() {
+        file(decided, index, layout, (index < leading).then_some(&mut recording), &mut rejected, context)?;
+    }
+    Ok((recording.finish()?, rejected.finish()?))
+}
+
+fn file(
+    decided: &Decided,
+    index: usize,
+    layout: &FileLayout,
+    mut recording: Option<&mut Chunks>,
+    rejected: &mut Rejections,
+    context: &Context,
+) -> Result<()> {
+    let (Some(scan), Some(fate), Some(name)) = (decided.scans.get(index), decided.fates.get(index), decided.names.get(index))
+    else {
+        return Err(Error::Bug(format!("file {index} was not scanned")));
+    };
+    let source = context.services.open(&layout.file)?;
+    let mut reading = Reading::open(source, layout, decided.arm, decided.settings.limits)?;
+    let mut pace = Pace::new(context);
+    let mut accepted = 0;
+    while let Some(judged) = reading.next()? {
+        match judged.and_then(|()| decided.outcome(index, fate, &reading.row)) {
+            Ok(partner) => {
+                accepted += 1;
+                if let Some(chunks) = &mut recording {
+                    chunks.push(&reading.row, partner, &scan.label, decided)?;
+                    pace.row(chunks.written);
+                }
+            }
+            Err(refusal) => rejected.push(RejectedRow {
+                file: name.clone(),
+                line: reading.row.line as i64,
+                point_id: (!reading.row.id.is_empty()).then(|| reading.row.id.clone()),
+                reason: refusal.reason.word().into(),
+                detail: refusal.detail,
+                text: reading.record.text(),
+            })?,
+        }
+    }
+    if let Some(chunks) = recording {
+        chunks.before += reading.row.number;
+    }
+    if (reading.row.number, accepted) != (scan.read, verdict::accepted(scan, fate)) {
+        return Err(Error::data(&scan.label, "changed while it was read; run again"));
+    }
+    Ok(())
+}
+
+impl Decided<'_> {
+    /// The partner of a usable row in a join, or why it is not used after all.
+    fn outcome(&self, index: usize, fate: &Fate, row: &Row) -> Result<Option<usize>, Refusal> {
+        if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
+            let there =
+                if twin.file as usize == index { String::new() } else { format!(" of {}", self.name(twin.file as usize)) };
+            let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
+            return Err(Refusal { reason: Reason::DuplicateId, detail });
+        }
+        let Some(partner) = &fate.partner else { return Ok(None) };
+        match partner.get((row.number - 1) as usize) {
+            Some(partner) if *partner != NONE => Ok(Some(*partner as usize)),
+            _ => Err(Refusal { reason: Reason::Unmatched, detail: self.lonely(index, row) }),
+        }
+    }
+    fn name(&self, index: usize) -> &str {
+        self.names.get(index).map_or("", String::as_str)
+    }
+    fn lonely(&self, index: usize, row: &Row) -> String {
+        let other = self.name(1 - index.min(1));
+        match &self.settings.join {
+            Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
+            Some(Join::Time { tolerance_s, .. }) => {
+                let time = row.values.get(Slot::Time.index(self.arm.joints())).copied().unwrap_or(f64::NAN);
+                format!("no row of {other} is its partner within {tolerance_s} s of {time} s")
+            }
+            _ => format!("data row {} of {other} is missing or rejected", row.number),
+        }
+    }
+}
+
+/// The recording, chunk by chunk.
+struct Chunks<'a> {
+    sink: Box<dyn Sink + 'a>,
+    joints: usize,
+    prismatic: Vec<bool>,
+    /// Slots that some file fills: only those become columns.
+    has: Vec<bool>,
+    chunk: Recording,
+    merged: Vec<f64>,
+    last_sequence: Option<i64>,
+    written: u64,
+    /// Data rows of the files before this one.
+    before: u64,
+}
+
+impl<'a> Chunks<'a> {
+    fn new(decided: &Decided, context: &Context<'a>) -> Result<Self> {
+        let joints = decided.arm.joints();
+        let mut has = vec![false; Slot::count(joints)];
+        for slot in decided.scans.iter().flat_map(|scan| &scan.slots) {
+            if let Some(has) = has.get_mut(*slot) {
+                *has = true;
+            }
+        }
+        let sink = context.services.sink(Recording::KIND)?;
+        let prismatic = decided.arm.prismatic.clone();
+        let mut chunks = Self {
+            sink,
+            joints,
+            prismatic,
+            has,
+            chunk: Recording::default(),
+            merged: Vec::new(),
+            last_sequence: None,
+            written: 0,
+            before: 0,
+        };
+        chunks.chunk = chunks.empty();
+        Ok(chunks)
+    }
+    fn has(&self, slot: Slot) -> bool {
+        self.has.get(slot.index(self.joints)).copied().unwrap_or(false)
+    }
+    fn empty(&self) -> Recording {
+        Recording {
+            joints: self.joints,
+            prismatic: self.prismatic.clone(),
+            position_sigma: self.has(Slot::Sigma(0)).then(Vec::new),
+            time: self.has(Slot::Time).then(Vec::new),
+            payload: self.has(Slot::Payload).then(Vec::new),
+            temperature: self.has(Slot::Temperature).then(Vec::new),
+            current: self.has(Slot::Current(0)).then(Vec::new),
+            direction: self.has(Slot::Direction(0)).then(Vec::new),
+            ..Recording::default()
+        }
+    }
+    fn push(&mut self, row: &Row, partner: Option<usize>, label: &str, decided: &Decided) -> Result<()> {
+        self.merged.clone_from(&row.values);
+        let packed = decided.scans.get(1).and_then(|scan| scan.packed.as_ref());
+        let other = partner.and_then(|number| number.checked_sub(1)).zip(packed);
+        let mut texts = (row.id.as_str(), row.usage.as_str());
+        if let Some((index, packed)) = other {
+            let width = packed.slots.len();
+            let values = packed.values.get(index * width..(index + 1) * width).unwrap_or_default();
+            for (slot, value) in packed.slots.iter().zip(values) {
+                // Mapped in both files, for a join by time: the time of a row is that of the file that leads.
+                if let Some(merged) = self.merged.get_mut(*slot).filter(|merged| merged.is_nan()) {
+                    *merged = *value;
+                }
+            }
+            if let Some(id) = packed.ids.get(index) {
+                texts.0 = id;
+            }
+            if let Some(usage) = packed.usage.get(index) {
+                texts.1 = usage;
+            }
+        }
+        let number = self.before + row.number;
+        let sequence = row.sequence.unwrap_or(number as i64);
+        if let Some(last) = self.last_sequence.replace(sequence)
+            && sequence <= last
+        {
+            // Within a file such a row is refused: this is the first row of a file that continues another.
+            let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
+            return Err(Error::data(format!("{label}:{}", row.line), message));
+        }
+        let id = if texts.0.is_empty() { format!("row {number}") } else { texts.0.to_string() };
+        let usage = (!texts.1.is_empty()).then(|| texts.1.to_string());
+        self.store(sequence, id, usage);
+        if self.chunk.rows() >= CHUNK {
+            self.flush()?;
+        }
+        Ok(())
+    }
+    fn store(&mut self, sequence: i64, id: String, usage: Option<String>) {
+        let joints = self.joints;
+        let (values, chunk) = (&self.merged, &mut self.chunk);
+        let one = |slot: Slot| values[slot.index(joints)];
+        let axes = |slot: fn(usize) -> Slot| [one(slot(0)), one(slot(1)), one(slot(2))];
+        let all = |slot: fn(usize) -> Slot| (0..joints).map(move |joint| values[slot(joint).index(joints)]);
+        chunk.sequence.push(sequence);
+        chunk.point_id.push(id);
+        chunk.usage.push(usage);
+        chunk.q.extend(all(Slot::Q));
+        chunk.position.push(axes(Slot::Position));
+        chunk.position_sigma.iter_mut().for_each(|column| column.push(axes(Slot::Sigma)));
+        chunk.time.iter_mut().for_each(|column| column.push(one(Slot::Time)));
+        chunk.payload.iter_mut().for_each(|column| column.push(one(Slot::Payload)));
+        chunk.temperature.iter_mut().for_each(|column| column.push(one(Slot::Temperature)));
+        chunk.current.iter_mut().for_each(|column| column.extend(all(Slot::Current)));
+        chunk.direction.iter_mut().for_each(|column| column.extend(all(Slot::Direction)));
+        self.written += 1;
+    }
+    fn flush(&mut self) -> Result<()> {
+        let empty = self.empty();
+        let full = std::mem::replace(&mut self.chunk, empty);
+        self.sink.push(full.to_frame()?)
+    }
+    fn finish(mut self) -> Result<StreamedTable<Recording>> {
+        if self.chunk.rows() > 0 {
+            self.flush()?;
+        }
+        Ok(StreamedTable::new(self.sink.finish()?))
+    }
+}
+
+/// The rejected rows, in the order of the table's key.
+struct Rejections<'a> {
+    sink: Box<dyn Sink + 'a>,
+    rows: Vec<RejectedRow>,
+    /// The files are read in the order of their names.
+    ordered: bool,
+}
+
+impl<'a> Rejections<'a> {
+    fn new(names: &[String], context: &Context<'a>) -> Result<Self> {
+        Ok(Self { sink: context.services.sink(Rejected::KIND)?, rows: Vec::new(), ordered: names.is_sorted() })
+    }
+    fn push(&mut self, row: RejectedRow) -> Result<()> {
+        self.rows.push(row);
+        if self.ordered && self.rows.len() >= REJECTED_CHUNK { self.flush() } else { Ok(()) }
+    }
+    fn flush(&mut self) -> Result<()> {
+        self.rows.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
+        self.sink.push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
+    }
+    fn finish(mut self) -> Result<StreamedTable<Rejected>> {
+        // Also where nothing was rejected: a table without rows has its columns.
+        self.flush()?;
+        Ok(StreamedTable::new(self.sink.finish()?))
+    }
+}

@@ -1,0 +1,309 @@
+//! `split`: which rows of the recording serve what. Every row belongs to exactly one named set.
+//!
+//! Neighbouring rows with the same joints are repeats of one pose: blocks and random choice keep them together, since a pose
+//! that was seen in training is no test.
+
+use crate::error::{Error, Fault, Result};
+use crate::stage::{Context, Stage, reads, writes};
+use crate::table::{Recording, Split, SplitRow};
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+use rand::seq::SliceRandom;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// How rows are dealt out to sets.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+pub enum SplitBy {
+    /// Every n-th row in the order of recording goes to `set`, the others to `rest`. Repeats of a pose are not kept together.
+    Every {
+        /// One of how many rows, from 2.
+        n: u64,
+        /// Which one, from 0 to n - 1; the last if not given.
+        #[serde(default)]
+        offset: Option<u64>,
+        /// The set of every n-th row.
+        #[serde(default = "validate")]
+        set: String,
+        /// The set of the other rows.
+        #[serde(default = "fit")]
+        rest: String,
+    },
+    /// Stretches of the recording go to the sets in turn.
+    Blocks {
+        /// Number of stretches of about equal length.
+        #[serde(default)]
+        count: Option<u64>,
+        /// Rows of a stretch, instead of their number.
+        #[serde(default)]
+        length: Option<u64>,
+        /// Sets in the order in which stretches are dealt to them; a set may occur more than once: `[fit, fit, fit, validate]`.
+        sets: Vec<String>,
+    },
+    /// A fraction of the rows, drawn by the pipeline's seed, goes to `set`, the others to `rest`.
+    Random {
+        /// Between 0 and 1; to the nearest pose.
+        fraction: f64,
+        /// The set of the drawn rows.
+        #[serde(default = "validate")]
+        set: String,
+        /// The set of the other rows.
+        #[serde(default = "fit")]
+        rest: String,
+    },
+    /// The recording's own `usage` labels.
+    Usage {
+        /// Set of each label, `{training: fit, test: validate}`; without it the labels are the names of the sets.
+        #[serde(default)]
+        sets: Option<BTreeMap<String, String>>,
+        /// Set of the rows without a label; without it such rows are an error.
+        #[serde(default)]
+        blank: Option<String>,
+    },
+    /// The first so many rows, the next so many, and so on, in the order of recording.
+    Order {
+        /// Sets with their numbers of rows; the last may leave its number out and takes what is left.
+        sets: Vec<Stretch>,
+    },
+}
+
+/// So many rows for one set.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stretch {
+    /// Name of the set.
+    pub set: String,
+    /// Number of rows.
+    #[serde(default)]
+    pub rows: Option<u64>,
+}
+
+fn validate() -> String {
+    "validate".into()
+}
+
+fn fit() -> String {
+    "fit".into()
+}
+
+reads! {
+    pub struct SplitReads {
+        recording: Recording,
+    }
+}
+
+writes! {
+    pub struct SplitWrites {
+        split: Split,
+    }
+}
+
+impl Stage for SplitBy {
+    const NAME: &'static str = "split";
+    const SUMMARY: &'static str = "recording -> named sets of rows: every n-th, blocks, random, by usage, by order";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = SplitReads;
+    type Writes = SplitWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for name in self.names() {
+            if name.trim().is_empty() {
+                faults.push(Fault::new("", "a set without a name"));
+            }
+        }
+        match self {
+            Self::Every { n, offset, set, rest } => {
+                if *n < 2 {
+                    faults.push(Fault::new("n", "allowed: 2 and above"));
+                }
+                if offset.is_some_and(|offset| offset >= *n) {
+                    faults.push(Fault::new("offset", format!("allowed: 0 to {}", n.saturating_sub(1))));
+                }
+                two(set, rest, &mut faults);
+            }
+            Self::Blocks { count, length, sets } => {
+                if count.is_some() == length.is_some() {
+                    faults.push(Fault::new("", "say `count` or `length`, one of them"));
+                }
+                if *count == Some(0) || *length == Some(0) {
+                    faults.push(Fault::new(if count.is_some() { "count" } else { "length" }, "allowed: 1 and above"));
+                }
+                if sets.is_empty() {
+                    faults.push(Fault::new("sets", "name at least one set"));
+                }
+            }
+            Self::Random { fraction, set, rest } => {
+                if !(*fraction > 0.0 && *fraction < 1.0) {
+                    faults.push(Fault::new("fraction", "allowed: above 0 and below 1"));
+                }
+                two(set, rest, &mut faults);
+            }
+            Self::Usage { sets, .. } => {
+                if sets.as_ref().is_some_and(BTreeMap::is_empty) {
+                    faults.push(Fault::new("sets", "map at least one label, or leave it out"));
+                }
+            }
+            Self::Order { sets } => {
+                let last = sets.len().saturating_sub(1);
+                if sets.is_empty() {
+                    faults.push(Fault::new("sets", "name at least one set"));
+                }
+                for (index, stretch) in sets.iter().enumerate() {
+                    if stretch.rows == Some(0) || (stretch.rows.is_none() && index < last) {
+                        faults.push(Fault::new(
+                            format!("sets[{index}].rows"),
+                            "allowed: 1 and above; only the last may leave it out",
+                        ));
+                    }
+                }
+            }
+        }
+        faults
+    }
+
+    fn run(&self, reads: SplitReads, context: &Context) -> Result<SplitWrites> {
+        let faults = self.check();
+        if !faults.is_empty() {
+            return Err(Error::Spec(faults));
+        }
+        let recording = &reads.recording;
+        let sets = self.deal(recording, context.seed)?;
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for set in &sets {
+            *counts.entry(set).or_default() += 1;
+        }
+        for name in self.names() {
+            if !counts.contains_key(name) {
+                return Err(Error::data("split", format!("set `{name}` gets none of the {} rows", recording.rows())));
+            }
+        }
+        let listed: Vec<String> = counts.iter().map(|(set, rows)| format!("{set} {rows}")).collect();
+        context.services.note(format!("rows: {}", listed.join(", ")));
+        let rows = sets.into_iter().zip(&recording.sequence).zip(&recording.point_id);
+        let row = |((set, sequence), point_id): ((String, &i64), &String)| SplitRow {
+            sequence: *sequence,
+            point_id: point_id.clone(),
+            set,
+        };
+        Ok(SplitWrites { split: Split(rows.map(row).collect()) })
+    }
+}
+
+fn two(set: &str, rest: &str, faults: &mut Vec<Fault>) {
+    if set == rest {
+        faults.push(Fault::new("rest", format!("both sets are called `{set}`")));
+    }
+}
+
+impl SplitBy {
+    /// Sets that must not stay empty.
+    fn names(&self) -> BTreeSet<&str> {
+        match self {
+            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } => [set.as_str(), rest].into(),
+            Self::Blocks { sets, .. } => sets.iter().map(String::as_str).collect(),
+            Self::Usage { .. } => BTreeSet::new(),
+            Self::Order { sets } => sets.iter().map(|stretch| stretch.set.as_str()).collect(),
+        }
+    }
+
+    /// The set of each row.
+    fn deal(&self, recording: &Recording, seed: u64) -> Result<Vec<String>> {
+        let rows = recording.rows();
+        match self {
+            Self::Every { n, offset, set, rest } => {
+                let offset = offset.unwrap_or(n - 1);
+                Ok((0..rows as u64).map(|row| if row % n == offset { set.clone() } else { rest.clone() }).collect())
+            }
+            Self::Blocks { count, length, sets } => {
+                let mut dealt = Vec::with_capacity(rows);
+                for pose in poses(recording) {
+                    // A pose belongs to the block in which it begins.
+                    let block = match (count, length) {
+                        (Some(count), _) => (pose.start as u128 * u128::from(*count) / rows.max(1) as u128) as usize,
+                        (None, length) => pose.start / length.unwrap_or(1).max(1) as usize,
+                    };
+                    let set = sets.get(block % sets.len().max(1)).cloned().unwrap_or_default();
+                    dealt.resize(pose.end, set);
+                }
+                Ok(dealt)
+            }
+            Self::Random { fraction, set, rest } => {
+                let mut poses = poses(recording);
+                poses.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+                let wanted = (fraction * rows as f64).round() as usize;
+                let (mut dealt, mut drawn) = (vec![rest.clone(); rows], 0);
+                for pose in poses {
+                    // Half of a pose beyond the wanted number is nearer to it than half of a pose below.
+                    if drawn + pose.len().div_ceil(2) > wanted {
+                        continue;
+                    }
+                    drawn += pose.len();
+                    dealt.iter_mut().take(pose.end).skip(pose.start).for_each(|dealt| dealt.clone_from(set));
+                }
+                Ok(dealt)
+            }
+            Self::Usage { sets, blank } => by_usage(recording, sets.as_ref(), blank.as_deref()),
+            Self::Order { sets } => by_order(rows, sets),
+        }
+    }
+}
+
+/// Stretches of neighbouring rows with identical joints.
+fn poses(recording: &Recording) -> Vec<Range<usize>> {
+    let mut poses: Vec<Range<usize>> = Vec::new();
+    for row in 0..recording.rows() {
+        match poses.last_mut() {
+            Some(last) if recording.q(last.start) == recording.q(row) => last.end = row + 1,
+            _ => poses.push(row..row + 1),
+        }
+    }
+    poses
+}
+
+fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blank: Option<&str>) -> Result<Vec<String>> {
+    let labels: BTreeSet<&str> = recording.usage.iter().flatten().map(String::as_str).collect();
+    let found = if labels.is_empty() { "none".to_string() } else { labels.iter().copied().collect::<Vec<_>>().join(", ") };
+    let set = |(usage, row): (&Option<String>, usize)| {
+        let point = || recording.point_id.get(row).map_or("", String::as_str);
+        match (usage, sets) {
+            (Some(label), None) => Ok(label.clone()),
+            (Some(label), Some(sets)) => sets.get(label).cloned().ok_or_else(|| {
+                let mapped: Vec<&str> = sets.keys().map(String::as_str).collect();
+                Error::data(
+                    "split",
+                    format!("label `{label}` (point `{}`) has no set; mapped: {}; found: {found}", point(), mapped.join(", ")),
+                )
+            }),
+            (None, _) => blank.map(ToString::to_string).ok_or_else(|| {
+                let message = format!(
+                    "point `{}` has no usage label; found: {found}; allowed: map `usage` in ingest, or say `blank`",
+                    point()
+                );
+                Error::data("split", message)
+            }),
+        }
+    };
+    recording.usage.iter().zip(0..).map(set).collect()
+}
+
+fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
+    let mut dealt = Vec::with_capacity(rows);
+    for stretch in sets {
+        let left = rows - dealt.len();
+        let wanted = stretch.rows.map_or(left as u64, |rows| rows);
+        if wanted > left as u64 {
+            return Err(Error::data("split", format!("set `{}` wants {wanted} rows, {left} of {rows} are left", stretch.set)));
+        }
+        dealt.resize(dealt.len() + wanted as usize, stretch.set.clone());
+    }
+    if dealt.len() < rows {
+        let message =
+            format!("the sets take {} of {rows} rows; let the last one leave `rows` out, or name one more", dealt.len());
+        return Err(Error::data("split", message));
+    }
+    Ok(dealt)
+}

@@ -1,0 +1,104 @@
+//! A stand-in for the engine: runs a stage on files in memory and keeps what it writes.
+
+use calib::error::{Error, Result};
+use calib::stage::{Context, Output, RawFile, Services, Sink, Source, Stage, Streamed, Writes};
+use calib::store::frame::Frame;
+use calib::table::Table;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+type Chunks = Arc<Mutex<BTreeMap<&'static str, Vec<Frame>>>>;
+
+/// Files, and everything a stage says.
+#[derive(Default)]
+pub struct Desk {
+    files: BTreeMap<PathBuf, Vec<u8>>,
+    pub notes: Mutex<Vec<String>>,
+    pub warnings: Mutex<Vec<String>>,
+    chunks: Chunks,
+}
+
+impl Desk {
+    /// Puts a file where settings find it by name.
+    pub fn with(mut self, name: &str, content: impl Into<Vec<u8>>) -> Self {
+        self.files.insert(name.into(), content.into());
+        self
+    }
+    /// Runs a stage and gives the chunks of each table that it wrote.
+    pub fn run<S: Stage>(&self, stage: &S, reads: S::Reads) -> Result<BTreeMap<&'static str, Vec<Frame>>> {
+        self.chunks.lock().unwrap().clear();
+        let context = Context { id: "stage", seed: 7, jobs: 1, services: self };
+        let ports: Vec<&'static str> = S::Writes::ports().iter().map(|port| port.kind).collect();
+        let outputs = stage.run(reads, &context)?.give()?;
+        let mut tables = std::mem::take(&mut *self.chunks.lock().unwrap());
+        for (kind, output) in ports.into_iter().zip(outputs) {
+            match output {
+                Output::Frame(frame) => drop(tables.insert(kind, vec![frame])),
+                Output::Streamed(streamed) => assert_eq!(streamed.kind, kind),
+            }
+        }
+        Ok(tables)
+    }
+}
+
+/// The chunks of one table as Rust values.
+pub fn table<T: Table>(tables: &BTreeMap<&'static str, Vec<Frame>>) -> Vec<T> {
+    tables[T::KIND].iter().map(|frame| T::from_frame(frame).unwrap()).collect()
+}
+
+struct Keep {
+    kind: &'static str,
+    rows: u64,
+    frames: Vec<Frame>,
+    chunks: Chunks,
+}
+
+impl Sink for Keep {
+    fn push(&mut self, chunk: Frame) -> Result<()> {
+        assert_eq!(chunk.kind(), self.kind);
+        self.rows += chunk.rows() as u64;
+        self.frames.push(chunk);
+        Ok(())
+    }
+    fn finish(self: Box<Self>) -> Result<Streamed> {
+        self.chunks.lock().unwrap().insert(self.kind, self.frames);
+        Ok(Streamed { kind: self.kind, rows: self.rows, handle: Box::new(()) })
+    }
+}
+
+impl Services for Desk {
+    fn open(&self, file: &RawFile) -> Result<Source> {
+        let label = file.0.display().to_string();
+        if let Some(content) = self.files.get(&file.0) {
+            let reader = Box::new(std::io::Cursor::new(content.clone()));
+            return Ok(Source { label, reader, size: Some(content.len() as u64) });
+        }
+        let reader = std::fs::File::open(&file.0).map_err(|error| Error::data(&label, error.to_string()))?;
+        Ok(Source { label, reader: Box::new(reader), size: None })
+    }
+    fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
+        Ok(Box::new(Keep { kind, rows: 0, frames: Vec::new(), chunks: self.chunks.clone() }))
+    }
+    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
+    fn advance(&self, _done: u64, _message: &str) {}
+    fn note(&self, line: String) {
+        self.notes.lock().unwrap().push(line);
+    }
+    fn warn(&self, line: String) {
+        self.warnings.lock().unwrap().push(line);
+    }
+}
+
+/// Real recordings beside the repository, or `None` with a line that says so. In CI nothing is skipped.
+pub fn shared(folder: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("CALIB_SHARED").map(PathBuf::from);
+    let root = root.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"));
+    let path = root.join(folder);
+    if path.is_dir() {
+        return Some(path);
+    }
+    assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
+    println!("skipped: {} is missing", path.display());
+    None
+}

@@ -1,0 +1,111 @@
+//! Every row of a recording goes to exactly one set.
+
+use crate::desk::{Desk, table};
+use calib::error::{Error, Result};
+use calib::stage::Stage;
+use calib::stage::split::{SplitBy, SplitReads};
+use calib::table::{Recording, Split};
+
+/// One joint; rows with the same number are repeats of a pose.
+fn recording(poses: &[i32]) -> Recording {
+    let rows = poses.len();
+    Recording {
+        joints: 1,
+        prismatic: vec![false],
+        sequence: (0..rows as i64).map(|row| 10 + 2 * row).collect(),
+        point_id: (0..rows).map(|row| format!("P{row}")).collect(),
+        usage: vec![None; rows],
+        q: poses.iter().map(|pose| f64::from(*pose) * 0.01).collect(),
+        position: vec![[1.0, 2.0, 3.0]; rows],
+        ..Recording::default()
+    }
+}
+
+fn distinct(rows: i32) -> Recording {
+    recording(&(0..rows).collect::<Vec<_>>())
+}
+
+fn settings(yaml: &str) -> SplitBy {
+    let options = serde_saphyr::options! { strict_booleans: true };
+    serde_saphyr::from_str_with_options(yaml, options).unwrap()
+}
+
+fn sets(yaml: &str, recording: Recording) -> Result<Vec<String>> {
+    let (rows, sequence, ids) = (recording.rows(), recording.sequence.clone(), recording.point_id.clone());
+    let tables = Desk::default().run(&settings(yaml), SplitReads { recording })?;
+    let split = table::<Split>(&tables).remove(0);
+    assert_eq!(split.0.len(), rows);
+    assert!(split.0.iter().zip(sequence.iter().zip(&ids)).all(|(row, (s, id))| row.sequence == *s && row.point_id == *id));
+    Ok(split.0.into_iter().map(|row| row.set).collect())
+}
+
+fn refusal(yaml: &str, recording: Recording) -> String {
+    match sets(yaml, recording) {
+        Err(error @ Error::Data(_)) => error.to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn every_fourth_row_validates() {
+    assert_eq!(
+        sets("{by: every, n: 4}", distinct(9)).unwrap(),
+        ["fit", "fit", "fit", "validate", "fit", "fit", "fit", "validate", "fit"]
+    );
+    let named = sets("{by: every, n: 3, offset: 0, set: check, rest: learn}", distinct(4)).unwrap();
+    assert_eq!(named, ["check", "learn", "learn", "check"]);
+    assert_eq!(refusal("{by: every, n: 4}", distinct(3)), "split: set `validate` gets none of the 3 rows");
+}
+
+#[test]
+fn blocks_are_dealt_in_turn_and_break_at_poses() {
+    assert_eq!(sets("{by: blocks, length: 2, sets: [a, b]}", distinct(5)).unwrap(), ["a", "a", "b", "b", "a"]);
+    assert_eq!(sets("{by: blocks, count: 3, sets: [a, a, b]}", distinct(6)).unwrap(), ["a", "a", "a", "a", "b", "b"]);
+    let repeats = recording(&[0, 1, 1, 2, 3, 4]);
+    assert_eq!(sets("{by: blocks, length: 2, sets: [a, b]}", repeats).unwrap(), ["a", "a", "a", "b", "a", "a"]);
+}
+
+#[test]
+fn random_choice_keeps_repeats_together_and_follows_the_seed() {
+    let poses: Vec<i32> = (0..300).map(|row| row / 3).collect();
+    let first = sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap();
+    let drawn = first.iter().filter(|set| *set == "validate").count();
+    assert!((74..=76).contains(&drawn), "{drawn}");
+    assert!(first.chunks(3).all(|pose| pose.iter().all(|set| *set == pose[0])));
+    assert_eq!(sets("{by: random, fraction: 0.25}", recording(&poses)).unwrap(), first);
+}
+
+#[test]
+fn usage_labels_become_sets() {
+    let labelled = |labels: &[&str]| {
+        let mut recording = distinct(labels.len() as i32);
+        recording.usage = labels.iter().map(|label| (!label.is_empty()).then(|| label.to_string())).collect();
+        recording
+    };
+    assert_eq!(sets("{by: usage}", labelled(&["fit", "validate"])).unwrap(), ["fit", "validate"]);
+    let mapped = "{by: usage, sets: {train: fit, test: validate}, blank: rest}";
+    assert_eq!(sets(mapped, labelled(&["test", "train", ""])).unwrap(), ["validate", "fit", "rest"]);
+    let unknown = refusal(mapped, labelled(&["test", "trian"]));
+    assert_eq!(unknown, "split: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian");
+    let none = refusal("{by: usage}", labelled(&["", ""]));
+    assert_eq!(none, "split: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`");
+}
+
+#[test]
+fn counts_in_the_order_of_recording_must_fit_the_rows() {
+    let yaml = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 1}, {set: a}]}";
+    assert_eq!(sets(yaml, distinct(5)).unwrap(), ["a", "a", "b", "a", "a"]);
+    let short = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 4}]}";
+    assert_eq!(refusal(short, distinct(5)), "split: set `b` wants 4 rows, 3 of 5 are left");
+    let message = "split: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
+    assert_eq!(refusal(short, distinct(7)), message);
+}
+
+#[test]
+fn faulty_settings_are_named_by_their_place() {
+    let places = |yaml: &str| settings(yaml).check().iter().map(|fault| fault.place.clone()).collect::<Vec<_>>();
+    assert_eq!(places("{by: every, n: 1, offset: 5, set: a, rest: a}"), ["n", "offset", "rest"]);
+    assert_eq!(places("{by: blocks, length: 0, sets: []}"), ["length", "sets"]);
+    assert_eq!(places("{by: random, fraction: 1.5}"), ["fraction"]);
+    assert_eq!(places("{by: order, sets: [{set: a}, {set: b, rows: 0}]}"), ["sets[0].rows", "sets[1].rows"]);
+}
