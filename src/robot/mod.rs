@@ -2,6 +2,7 @@
 
 pub mod description;
 mod gravity;
+pub mod import;
 mod model;
 mod observation;
 

@@ -2,10 +2,12 @@
 
 pub mod ingest;
 mod report;
+mod robot;
 pub mod split;
 mod validate;
 
 pub use report::{Report, ReportReads};
+pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use validate::{Validate, ValidateReads};
 
 use crate::error::Result;

@@ -1,5 +1,11 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
 
+use crate::error::{Error, Result};
+use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use crate::units::Unit;
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
 crate::table::rows! { "robot",
     /// Bodies, one a row; key `body`: 0 the base, 1..n the joints, n+1 the tool (its mass and centre are the payload's).
     pub struct Robot of RobotRow {
@@ -35,4 +41,179 @@ crate::table::rows! { "robot",
         /// Joints that move this one, JSON `[{"by": 5, "ratio": 0.0}]`, joints from 1.
         couplings: Option<String>,
     }
+}
+
+/// A cell of the column `couplings`; `by` counts from 1.
+#[derive(Serialize, Deserialize)]
+struct CouplingCell {
+    by: usize,
+    ratio: f64,
+}
+
+impl Robot {
+    /// The rows of a description: base, joints, tool.
+    pub fn from_description(robot: &RobotDescription) -> Self {
+        let gravity = Vector3::from(robot.gravity);
+        let mut base = empty(0, &robot.name, "base");
+        [base.axis_x, base.axis_y, base.axis_z] = some((gravity.norm() > 0.0).then(|| gravity.normalize().into()));
+        base.gravity_m_s2 = Some(gravity.norm());
+
+        let mut tool = empty(robot.joints.len() + 1, "tool", "tool");
+        [tool.point_x_mm, tool.point_y_mm, tool.point_z_mm] = millimetres(Some(robot.tool));
+        tool.mass_kg = Some(robot.payload_mass);
+        [tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm] = millimetres(Some(robot.payload_centre));
+        let rotation = Matrix3::from_fn(|i, j| robot.tool_rotation[i][j]);
+        let orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        tool.orientation_w = Some(orientation.w);
+        [tool.orientation_x, tool.orientation_y, tool.orientation_z] = some(Some([orientation.i, orientation.j, orientation.k]));
+
+        let joints = robot.joints.iter().enumerate().map(|(i, joint)| joint_row(i, joint, &robot.couplings));
+        Self(std::iter::once(base).chain(joints).chain(std::iter::once(tool)).collect())
+    }
+
+    /// The description that the rows hold; fails when a body or one of its numbers is missing.
+    pub fn to_description(&self) -> Result<RobotDescription> {
+        let (Some((base, rest)), true) = (self.0.split_first(), self.0.len() > 2) else {
+            return Err(Error::data("table robot", "expected a base, at least one joint and a tool"));
+        };
+        let Some((tool, joints)) = rest.split_last() else {
+            return Err(Error::data("table robot", "has no tool"));
+        };
+        let size = need(base.gravity_m_s2, base, "gravity_m_s2")?;
+        let down = if size == 0.0 { [0.0; 3] } else { all([base.axis_x, base.axis_y, base.axis_z], base, "axis")? };
+        let q = Quaternion::new(
+            need(tool.orientation_w, tool, "orientation_w")?,
+            need(tool.orientation_x, tool, "orientation_x")?,
+            need(tool.orientation_y, tool, "orientation_y")?,
+            need(tool.orientation_z, tool, "orientation_z")?,
+        );
+        let rotation = UnitQuaternion::from_quaternion(q).to_rotation_matrix();
+        let mut couplings = Vec::new();
+        for (moved, row) in joints.iter().enumerate() {
+            couplings.extend(couplings_of(moved, row, joints.len())?);
+        }
+        Ok(RobotDescription {
+            name: base.name.clone(),
+            joints: joints.iter().map(joint).collect::<Result<_>>()?,
+            tool: metres([tool.point_x_mm, tool.point_y_mm, tool.point_z_mm], tool, "point")?,
+            tool_rotation: [0, 1, 2].map(|i| [0, 1, 2].map(|j| rotation[(i, j)])),
+            couplings,
+            payload_mass: need(tool.mass_kg, tool, "mass_kg")?,
+            payload_centre: metres([tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm], tool, "centre")?,
+            gravity: down.map(|x| x * size),
+        })
+    }
+}
+
+fn joint_row(index: usize, joint: &JointDescription, couplings: &[Coupling]) -> RobotRow {
+    let mut row = empty(index + 1, &joint.name, if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" });
+    [row.axis_x, row.axis_y, row.axis_z] = some(Some(joint.axis));
+    [row.point_x_mm, row.point_y_mm, row.point_z_mm] = millimetres(Some(joint.point));
+    let [lower, upper] = joint.limits.map_or([None; 2], |limits| limits.map(Some));
+    match joint.kind {
+        JointKind::Revolute => (row.lower_rad, row.upper_rad) = (lower, upper),
+        JointKind::Prismatic => {
+            let mm = |x: Option<f64>| x.map(|x| Unit::Millimetre.from_si(x));
+            (row.lower_mm, row.upper_mm) = (mm(lower), mm(upper));
+        }
+    }
+    row.reduction_ratio = joint.reduction_ratio;
+    row.motor_constant_nm_a = joint.motor_constant;
+    row.mass_kg = joint.mass;
+    [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm] = millimetres(joint.centre);
+    let mine = couplings.iter().filter(|c| c.moved == index);
+    let cells: Vec<_> = mine.map(|c| CouplingCell { by: c.by + 1, ratio: c.ratio }).collect();
+    if !cells.is_empty() {
+        row.couplings = Some(serde_json::to_string(&cells).expect("numbers and names serialise"));
+    }
+    row
+}
+
+fn joint(row: &RobotRow) -> Result<JointDescription> {
+    let metre = |x: Option<f64>| x.map(|x| Unit::Millimetre.to_si(x));
+    let (kind, limits) = match row.kind.as_str() {
+        "revolute" => (JointKind::Revolute, (row.lower_rad, row.upper_rad)),
+        "prismatic" => (JointKind::Prismatic, (metre(row.lower_mm), metre(row.upper_mm))),
+        other => return Err(fault(row, &format!("kind is `{other}`; expected revolute or prismatic"))),
+    };
+    let centre = [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm];
+    Ok(JointDescription {
+        name: row.name.clone(),
+        kind,
+        axis: all([row.axis_x, row.axis_y, row.axis_z], row, "axis")?,
+        point: metres([row.point_x_mm, row.point_y_mm, row.point_z_mm], row, "point")?,
+        limits: limits.0.zip(limits.1).map(|(lower, upper)| [lower, upper]),
+        reduction_ratio: row.reduction_ratio,
+        motor_constant: row.motor_constant_nm_a,
+        mass: row.mass_kg,
+        centre: if centre == [None; 3] { None } else { Some(metres(centre, row, "centre")?) },
+    })
+}
+
+fn couplings_of(moved: usize, row: &RobotRow, joints: usize) -> Result<Vec<Coupling>> {
+    let Some(text) = &row.couplings else { return Ok(Vec::new()) };
+    let cells: Vec<CouplingCell> = serde_json::from_str(text).map_err(|e| fault(row, &format!("couplings: {e}")))?;
+    (cells.into_iter())
+        .map(|cell| match cell.by.checked_sub(1).filter(|by| *by < joints) {
+            Some(by) => Ok(Coupling { moved, by, ratio: cell.ratio }),
+            None => Err(fault(row, &format!("couplings: there is no joint {}", cell.by))),
+        })
+        .collect()
+}
+
+fn empty(body: usize, name: &str, kind: &str) -> RobotRow {
+    RobotRow {
+        body: body as i64,
+        name: name.into(),
+        kind: kind.into(),
+        axis_x: None,
+        axis_y: None,
+        axis_z: None,
+        point_x_mm: None,
+        point_y_mm: None,
+        point_z_mm: None,
+        lower_rad: None,
+        upper_rad: None,
+        lower_mm: None,
+        upper_mm: None,
+        reduction_ratio: None,
+        motor_constant_nm_a: None,
+        mass_kg: None,
+        centre_x_mm: None,
+        centre_y_mm: None,
+        centre_z_mm: None,
+        orientation_w: None,
+        orientation_x: None,
+        orientation_y: None,
+        orientation_z: None,
+        gravity_m_s2: None,
+        couplings: None,
+    }
+}
+
+fn some(vector: Option<[f64; 3]>) -> [Option<f64>; 3] {
+    vector.map_or([None; 3], |vector| vector.map(Some))
+}
+
+fn millimetres(point: Option<[f64; 3]>) -> [Option<f64>; 3] {
+    some(point.map(|point| point.map(|x| Unit::Millimetre.from_si(x))))
+}
+
+fn metres(point: [Option<f64>; 3], row: &RobotRow, what: &str) -> Result<[f64; 3]> {
+    Ok(all(point, row, what)?.map(|x| Unit::Millimetre.to_si(x)))
+}
+
+fn all(vector: [Option<f64>; 3], row: &RobotRow, what: &str) -> Result<[f64; 3]> {
+    match vector {
+        [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
+        _ => Err(fault(row, &format!("has no {what}"))),
+    }
+}
+
+fn need(value: Option<f64>, row: &RobotRow, what: &str) -> Result<f64> {
+    value.ok_or_else(|| fault(row, &format!("has no {what}")))
+}
+
+fn fault(row: &RobotRow, message: &str) -> Error {
+    Error::data(format!("table robot, body {}", row.body), message)
 }

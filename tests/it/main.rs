@@ -1,11 +1,13 @@
 //! Integration tests, one module a capability.
 
+mod arms;
 mod desk;
 mod effects;
 mod fixture;
 mod ingest;
 mod layers;
 mod report;
+mod robot;
 mod split;
 mod store;
 mod tables;

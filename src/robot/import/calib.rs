@@ -1,0 +1,280 @@
+//! calib's own robot file: YAML with units, one kinematic format, and what is known of joints, links, payload and gravity.
+
+use super::dh::{self, Convention};
+use super::tree::{Faults, Node, Value};
+use super::{Chain, Imported, Text, screws, urdf};
+use crate::error::Result;
+use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use crate::units::{Quantity, Unit};
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+const FORMAT: f64 = 1.0;
+// m/s2, downwards along z, where the file says nothing.
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+// m/s2; no robot works where gravity is outside (zero, for "none", is allowed): it catches mm/s2 and g.
+const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
+// rad; ten turns: more is an angle in degrees.
+const MOST_TRAVEL: f64 = 63.0;
+const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
+
+#[derive(Clone, Copy)]
+struct Units {
+    length: Unit,
+    angle: Unit,
+}
+
+pub(super) fn read(file: Text, urdf: Option<Text>) -> Result<Imported> {
+    let node = Node::from_yaml(file.text, file.label)?;
+    let faults = Faults::new(file.label);
+    let root = Value::root(&node, &faults).map(&[
+        "calib_robot",
+        "name",
+        "units",
+        "kinematics",
+        "tool",
+        "joints",
+        "couplings",
+        "links",
+        "payload",
+        "gravity",
+    ]);
+    let format = root.get("calib_robot");
+    let version = format.number();
+    if version.is_finite() && version != FORMAT {
+        format.fault(format!("format {version} is not known to this calib; expected {FORMAT}"));
+    }
+    let units = units(root.get("units").map(&["length", "angle"]));
+    let chain = chain(root.get("kinematics").map(&FORMATS), units, urdf, &faults)?;
+    let robot = chain.map(|chain| describe(&root, chain, units));
+    faults.finish()?;
+    match robot {
+        Some(robot) => Ok(Imported { robot, notes: Vec::new() }),
+        None => Err(crate::error::Error::Bug("a robot file without kinematics had no fault".into())),
+    }
+}
+
+fn units(value: Value) -> Units {
+    let unit = |key: &str, quantity: Quantity, fallback: Unit| {
+        let allowed: Vec<_> = (Unit::symbols(quantity).into_iter()).filter_map(|s| Some((s, Unit::parse(s)?))).collect();
+        value.get(key).choice(&allowed).unwrap_or(fallback)
+    };
+    Units { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
+}
+
+/// The one kinematic format of the file, or none after a fault.
+fn chain(value: Value, units: Units, urdf: Option<Text>, faults: &Faults) -> Result<Option<Chain>> {
+    let mut given = FORMATS.into_iter().filter(|format| value.get(format).given().is_some());
+    let chain = match (given.next(), given.next()) {
+        (Some(_), Some(_)) => {
+            value.fault(format!("more than one description of the arm; expected one of {}", FORMATS.join(", ")));
+            return Ok(None);
+        }
+        (Some("screws"), _) => screws::read(&value.get("screws"), units.length),
+        (Some("dh"), _) => dh::read(&value.get("dh"), Convention::Standard, units.length, units.angle),
+        (Some("mdh"), _) => dh::read(&value.get("mdh"), Convention::Modified, units.length, units.angle),
+        (Some(_), _) => {
+            let ends = value.get("urdf").map(&["base", "tip"]);
+            let (base, tip) = (ends.get("base").text(), ends.get("tip").text());
+            let Some(urdf) = urdf else {
+                ends.fault("the URDF itself is missing; name it in the pipeline: `with: {file: robot.yaml, urdf: arm.urdf}`");
+                return Ok(None);
+            };
+            if base.is_empty() || tip.is_empty() {
+                return Ok(None);
+            }
+            let Some(chain) = faults.absorb(urdf::read(urdf, &base, &tip))? else { return Ok(None) };
+            chain
+        }
+        (None, _) => {
+            // Faults of a `kinematics` that is no map were noted when it was read.
+            if value.given().is_some() && value.keys().all(|key| FORMATS.contains(&key)) {
+                value.fault(format!("no description of the arm; expected one of {}", FORMATS.join(", ")));
+            }
+            return Ok(None);
+        }
+    };
+    if chain.joints.is_empty() {
+        value.fault("no joints; expected at least one");
+        return Ok(None);
+    }
+    Ok(Some(chain))
+}
+
+fn describe(root: &Value, chain: Chain, units: Units) -> RobotDescription {
+    let tool = tool(root.get("tool"), &chain, units);
+    let name = root.get("name").given().map_or_else(|| "robot".into(), |name| name.text());
+    let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
+        .map(|(i, joint)| JointDescription {
+            name: joint.name.clone().unwrap_or_else(|| format!("J{}", i + 1)),
+            kind: joint.kind,
+            axis: joint.axis.into(),
+            point: joint.point.into(),
+            limits: joint.limits,
+            reduction_ratio: None,
+            motor_constant: None,
+            mass: joint.body.map(|(mass, _)| mass),
+            centre: joint.body.map(|(_, centre)| centre.into()),
+        })
+        .collect();
+    if let Some(list) = root.get("joints").given() {
+        for (joint, value) in joints.iter_mut().zip(list.per_joint(chain.joints.len())) {
+            drive(joint, value, units);
+        }
+    }
+    if let Some(list) = root.get("links").given() {
+        for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
+            if value.given().is_some() {
+                let (mass, centre) = link(value, chain.joints[i].frame, units);
+                joints[i].mass = Some(mass);
+                joints[i].centre = Some(centre.into());
+            }
+        }
+    }
+    let couplings = root.get("couplings");
+    let couplings = couplings.given().map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
+    let (payload_mass, payload_centre) = payload(root.get("payload"), &tool, units);
+    RobotDescription {
+        name,
+        joints,
+        tool: tool.translation.vector.into(),
+        tool_rotation: rows(&tool.rotation),
+        couplings,
+        payload_mass,
+        payload_centre: payload_centre.into(),
+        gravity: gravity(root.get("gravity")),
+    }
+}
+
+/// The tool frame at the zero pose in the base frame: the measured point, and the orientation of the tool's axes.
+fn tool(value: Value, chain: &Chain, units: Units) -> Isometry3<f64> {
+    let on_link = chain.joints.iter().any(|joint| joint.frame.is_some());
+    if value.given().is_none() && on_link {
+        return chain.tip;
+    }
+    let value = value.map(&["point", "orientation"]);
+    let point = Vector3::from(value.get("point").vector::<3>()).map(|x| units.length.to_si(x));
+    let orientation = value.get("orientation").given().map_or_else(UnitQuaternion::identity, |o| orientation(o, units.angle));
+    chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
+}
+
+fn orientation(value: &Value, angle: Unit) -> UnitQuaternion<f64> {
+    let value = value.clone().map(&["rpy", "quaternion"]);
+    match (value.get("rpy").given(), value.get("quaternion").given()) {
+        (Some(rpy), None) => {
+            let [roll, pitch, yaw] = rpy.vector().map(|x| angle.to_si(x));
+            UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+        }
+        (None, Some(quaternion)) => {
+            let [w, x, y, z] = quaternion.vector();
+            let q = Quaternion::new(w, x, y, z);
+            // Four decimals of a unit quaternion are a unit quaternion; anything else is a slip of the pen.
+            if (q.norm() - 1.0).abs() > 1e-3 {
+                quaternion.fault(format!("has length {}; expected a unit quaternion [w, x, y, z]", q.norm()));
+            }
+            UnitQuaternion::from_quaternion(q)
+        }
+        _ => {
+            if value.given().is_some() {
+                value.fault("expected either `rpy: [roll, pitch, yaw]` or `quaternion: [w, x, y, z]`");
+            }
+            UnitQuaternion::identity()
+        }
+    }
+}
+
+/// What the file says of a joint beyond its screw.
+fn drive(joint: &mut JointDescription, value: Value, units: Units) {
+    if value.given().is_none() {
+        return;
+    }
+    let value = value.map(&["name", "limits", "reduction_ratio", "motor_constant"]);
+    if let Some(name) = value.get("name").given() {
+        joint.name = name.text();
+    }
+    if let Some(limits) = value.get("limits").given() {
+        let unit = if joint.kind == JointKind::Revolute { units.angle } else { units.length };
+        let travel = limits.vector::<2>();
+        let [lower, upper] = travel.map(|x| unit.to_si(x));
+        if lower >= upper {
+            limits.fault(format!("expected [lower, upper] with lower < upper, found [{}, {}]", travel[0], travel[1]));
+        } else if joint.kind == JointKind::Revolute && lower.abs().max(upper.abs()) > MOST_TRAVEL {
+            limits.fault(format!("[{}, {}] {unit} is more than ten turns; is it in another unit?", travel[0], travel[1]));
+        }
+        joint.limits = Some([lower, upper]);
+    }
+    let nonzero = |key: &str| {
+        let value = value.get(key);
+        value.given().map(|value| {
+            let number = value.number();
+            if number == 0.0 {
+                value.fault("expected a number other than 0");
+            }
+            number
+        })
+    };
+    joint.reduction_ratio = nonzero("reduction_ratio");
+    joint.motor_constant = nonzero("motor_constant");
+}
+
+fn link(value: Value, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
+    let value = value.map(&["mass", "centre", "frame"]);
+    let centre = Point3::from(value.get("centre").vector::<3>()).map(|x| units.length.to_si(x));
+    let of_link = value.get("frame");
+    let in_link = of_link.given().and_then(|f| f.choice(&[("base", false), ("link", true)])).unwrap_or(false);
+    let centre = match frame {
+        Some(frame) if in_link => frame * centre,
+        None if in_link => {
+            of_link.fault("screws know no link frames; expected `base`");
+            centre
+        }
+        _ => centre,
+    };
+    (value.get("mass").not_negative(), centre)
+}
+
+fn couplings(list: &Value, joints: usize) -> Vec<Coupling> {
+    let mut couplings: Vec<Coupling> = Vec::new();
+    for value in list.items() {
+        let value = value.map(&["moved", "by", "ratio"]);
+        let ratio = value.get("ratio").given().map_or(0.0, Value::number);
+        if let (Some(moved), Some(by)) = (value.get("moved").joint(joints), value.get("by").joint(joints)) {
+            if moved == by {
+                value.fault("a joint cannot move itself; expected two different joints");
+            }
+            if couplings.iter().any(|c| (c.moved, c.by) == (moved, by)) {
+                value.fault(format!("joint {} by joint {} is there twice", moved + 1, by + 1));
+            }
+            couplings.push(Coupling { moved, by, ratio });
+        }
+    }
+    couplings.sort_by_key(|c| (c.moved, c.by));
+    couplings
+}
+
+/// Rated mass, kg, and its centre, m, zero pose, base frame.
+fn payload(value: Value, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f64>) {
+    let point = Point3::from(tool.translation.vector);
+    if value.given().is_none() {
+        return (0.0, point);
+    }
+    let value = value.map(&["mass", "offset", "frame"]);
+    let offset = value.get("offset").given().map_or([0.0; 3], |offset| offset.vector());
+    let offset = Vector3::from(offset).map(|x| units.length.to_si(x));
+    let in_tool = value.get("frame").given().and_then(|f| f.choice(&[("base", false), ("tool", true)])).unwrap_or(false);
+    (value.get("mass").not_negative(), point + if in_tool { tool.rotation * offset } else { offset })
+}
+
+fn gravity(value: Value) -> [f64; 3] {
+    let Some(value) = value.given() else { return GRAVITY };
+    let gravity = value.vector();
+    let size = Vector3::from(gravity).norm();
+    if size != 0.0 && !size.is_nan() && !GRAVITY_RANGE.contains(&size) {
+        value.fault(format!("is {size} m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"));
+    }
+    gravity
+}
+
+fn rows(rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 3] {
+    let matrix: Matrix3<f64> = Rotation3::from(*rotation).into_inner();
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)]))
+}

@@ -1,0 +1,80 @@
+//! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg and Nm/A.
+
+use super::screws::direction;
+use super::tree::{Faults, Node, Value};
+use super::{Imported, Text};
+use crate::error::Result;
+use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use crate::units::Unit;
+use nalgebra::{Point3, Vector3};
+
+const KEYS: [&str; 11] = ["name", "axes", "points", "tool", "mass", "com", "ratio", "kt", "payload", "payload_com", "coupling"];
+
+pub(super) fn read(file: Text) -> Result<Imported> {
+    let node = Node::from_json(file.text, file.label)?;
+    let faults = Faults::new(file.label);
+    let root = Value::root(&node, &faults).open_map(&KEYS);
+    let axes = root.get("axes").items();
+    if root.get("axes").given().is_some() && axes.is_empty() {
+        root.get("axes").fault("no joints; expected at least one axis");
+    }
+    let n = axes.len();
+    let points = root.get("points").per_joint(n);
+    let per_joint = |key: &str| root.get(key).given().map(|list| list.per_joint(n)).unwrap_or_default();
+    let (masses, centres, ratios, constants) = (per_joint("mass"), per_joint("com"), per_joint("ratio"), per_joint("kt"));
+    let number = |list: &[Value], i: usize| list.get(i).and_then(Value::given).map(Value::number);
+    let joints = (axes.iter().enumerate())
+        .map(|(i, axis)| JointDescription {
+            name: format!("J{}", i + 1),
+            kind: JointKind::Revolute,
+            axis: direction(axis).into(),
+            point: points.get(i).map_or([f64::NAN; 3], |point| metres(point).into()),
+            limits: None,
+            reduction_ratio: number(&ratios, i),
+            motor_constant: number(&constants, i),
+            mass: masses.get(i).and_then(Value::given).map(Value::not_negative),
+            centre: centres.get(i).and_then(Value::given).map(|centre| metres(centre).into()),
+        })
+        .collect();
+    let tool = metres(&root.get("tool"));
+    let offset = root.get("payload_com").given().map_or_else(Vector3::zeros, |offset| metres(offset).coords);
+    let robot = RobotDescription {
+        name: root.get("name").given().map_or_else(|| "robot".into(), Value::text),
+        joints,
+        tool: tool.into(),
+        tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        couplings: root.get("coupling").given().map_or_else(Vec::new, |list| couplings(list, n)),
+        payload_mass: root.get("payload").given().map_or(0.0, Value::not_negative),
+        payload_centre: (tool + offset).into(),
+        gravity: [0.0, 0.0, -9.81],
+    };
+    let unused = root.keys().filter(|key| !KEYS.contains(key));
+    let notes = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();
+    faults.finish()?;
+    Ok(Imported { robot, notes })
+}
+
+fn metres(value: &Value) -> Point3<f64> {
+    Point3::from(value.vector()).map(|x| Unit::Millimetre.to_si(x))
+}
+
+/// Pairs (moved, by) of joints from 0. The layout states no ratio: the controller is taken to add none.
+fn couplings(list: &Value, joints: usize) -> Vec<Coupling> {
+    let index = |value: f64| (0..joints).find(|j| *j as f64 == value);
+    let mut couplings: Vec<_> = (list.items().iter())
+        .filter_map(|pair| {
+            let [moved, by] = pair.vector::<2>();
+            match (index(moved), index(by)) {
+                (Some(moved), Some(by)) if moved != by => Some(Coupling { moved, by, ratio: 0.0 }),
+                _ => {
+                    if !moved.is_nan() && !by.is_nan() {
+                        pair.fault(format!("expected two different joints (moved, by) counted from 0, below {joints}"));
+                    }
+                    None
+                }
+            }
+        })
+        .collect();
+    couplings.sort_by_key(|c| (c.moved, c.by));
+    couplings
+}

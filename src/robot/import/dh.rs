@@ -1,0 +1,65 @@
+//! Denavit-Hartenberg tables. Standard: T = Rz(theta) Tz(d) Tx(a) Rx(alpha), joint i about z of frame i-1.
+//! Modified (Craig, Introduction to Robotics, 3.4): T = Rx(alpha) Tx(a) Rz(theta) Tz(d), joint i about z of frame i; its row i
+//! holds alpha(i-1) and a(i-1). `theta` of a revolute and `d` of a prismatic joint are the values at joint position zero. A row of
+//! the kind `fixed` moves the frame and is no joint: a base, a track or a tool that the convention alone cannot place.
+
+use super::tree::Value;
+use super::{Chain, ChainJoint};
+use crate::robot::description::JointKind;
+use crate::units::Unit;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+/// What a row may be; none: no joint.
+const KINDS: &[(&str, Option<JointKind>)] =
+    &[("revolute", Some(JointKind::Revolute)), ("prismatic", Some(JointKind::Prismatic)), ("fixed", None)];
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Convention {
+    Standard,
+    Modified,
+}
+
+pub(super) fn read(rows: &Value, convention: Convention, length: Unit, angle: Unit) -> Chain {
+    let mut frame = Isometry3::identity();
+    let mut joints = Vec::new();
+    for row in rows.items() {
+        let row = row.map(&["kind", "theta", "d", "a", "alpha"]);
+        // What the joint itself moves is zero unless said otherwise; the rest has to be there.
+        let kind = row.get("kind").given().and_then(|kind| kind.choice(KINDS)).unwrap_or(Some(JointKind::Revolute));
+        let moved = match kind {
+            Some(JointKind::Revolute) => "theta",
+            Some(JointKind::Prismatic) => "d",
+            None => "",
+        };
+        let number = |key: &str| {
+            let value = row.get(key);
+            if key == moved && value.given().is_none() { 0.0 } else { value.number() }
+        };
+        let about_z = rotation(Vector3::z(), angle.to_si(number("theta"))) * shift(0.0, length.to_si(number("d")));
+        let about_x = rotation(Vector3::x(), angle.to_si(number("alpha"))) * shift(length.to_si(number("a")), 0.0);
+        let at_joint = if convention == Convention::Standard { frame } else { frame * about_x };
+        frame = match convention {
+            Convention::Standard => frame * about_z * about_x,
+            Convention::Modified => at_joint * about_z,
+        };
+        let Some(kind) = kind else { continue };
+        joints.push(ChainJoint {
+            name: None,
+            kind,
+            axis: at_joint * Vector3::z(),
+            point: at_joint * Point3::origin(),
+            limits: None,
+            frame: Some(frame),
+            body: None,
+        });
+    }
+    Chain { joints, tip: frame }
+}
+
+fn rotation(axis: Vector3<f64>, angle: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(axis * angle))
+}
+
+fn shift(along_x: f64, along_z: f64) -> Isometry3<f64> {
+    Isometry3::translation(along_x, 0.0, along_z)
+}

@@ -1,0 +1,59 @@
+//! Robot files -> [`RobotDescription`]: calib's own YAML (screws, DH, modified DH, or a URDF beside it) and the practice layout.
+//!
+//! Every format ends in one chain at the zero pose in the base frame. All faults of a file are reported at once, each with
+//! its path (`robot.yaml: joints[2].limits`, counted from 0 as in the YAML) or its line (`arm.urdf:17`).
+
+use crate::error::Result;
+use crate::robot::description::{JointKind, RobotDescription};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+mod calib;
+mod case;
+mod dh;
+mod screws;
+mod tree;
+mod urdf;
+
+/// A file's content and the name by which messages call it.
+#[derive(Debug, Clone, Copy)]
+pub struct Text<'a> {
+    pub label: &'a str,
+    pub text: &'a str,
+}
+
+/// A robot and what its reader wants to tell the person, e.g. keys that were not used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imported {
+    pub robot: RobotDescription,
+    pub notes: Vec<String>,
+}
+
+/// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.
+pub fn read_calib(file: Text, urdf: Option<Text>) -> Result<Imported> {
+    calib::read(file, urdf)
+}
+
+/// Reads a practice `robot.json` (mm, kg, Nm/A; couplings as pairs from 0). Fails with every fault of the file.
+pub fn read_case(file: Text) -> Result<Imported> {
+    case::read(file)
+}
+
+/// What every kinematic format is brought to: joints and frames at the zero pose in the base frame, SI.
+struct Chain {
+    joints: Vec<ChainJoint>,
+    /// The frame in which the file's `tool` is given: the base for screws, the last link or tip otherwise.
+    tip: Isometry3<f64>,
+}
+
+struct ChainJoint {
+    name: Option<String>,
+    kind: JointKind,
+    axis: Vector3<f64>,
+    point: Point3<f64>,
+    /// rad or m.
+    limits: Option<[f64; 2]>,
+    /// The frame of the moved link; none where the format knows no link frames.
+    frame: Option<Isometry3<f64>>,
+    /// Mass, kg, and centre of the moved body where the format knows them.
+    body: Option<(f64, Point3<f64>)>,
+}

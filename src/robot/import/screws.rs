@@ -1,0 +1,70 @@
+//! Joint screws: an axis and a point on it, or a twist (v; w) with v = -w x point (Lynch & Park, Modern Robotics, 4.1).
+
+use super::tree::Value;
+use super::{Chain, ChainJoint};
+use crate::robot::description::JointKind;
+use crate::units::Unit;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+// A direction shorter than this carries no direction; a pitch larger than this, per unit of the screw's size, is not rounding.
+const SMALL: f64 = 1e-9;
+
+const KINDS: &[(&str, JointKind)] = &[("revolute", JointKind::Revolute), ("prismatic", JointKind::Prismatic)];
+
+pub(super) fn read(screws: &Value, length: Unit) -> Chain {
+    let joints = screws.items().into_iter().map(|screw| joint(screw, length)).collect();
+    Chain { joints, tip: Isometry3::identity() }
+}
+
+fn joint(screw: Value, length: Unit) -> ChainJoint {
+    let screw = screw.map(&["kind", "axis", "point", "twist"]);
+    let kind = screw.get("kind").given().and_then(|kind| kind.choice(KINDS));
+    let (kind, axis, point) = match screw.get("twist").given() {
+        Some(twist) => {
+            if screw.get("axis").given().is_some() || screw.get("point").given().is_some() {
+                screw.fault("has both `twist` and `axis`/`point`; expected one of the two forms");
+            }
+            let (of_twist, axis, point) = from_twist(twist);
+            if kind.is_some_and(|kind| kind != of_twist) {
+                twist.fault("contradicts `kind`: a revolute twist (v; w) has w other than 0, a prismatic one has w = 0");
+            }
+            (of_twist, axis, point)
+        }
+        None => {
+            let kind = kind.unwrap_or(JointKind::Revolute);
+            let point = screw.get("point");
+            // The place of a prismatic axis changes nothing.
+            let point = if kind == JointKind::Prismatic && point.given().is_none() { [0.0; 3] } else { point.vector() };
+            (kind, direction(&screw.get("axis")), Point3::from(point))
+        }
+    };
+    let point = point.map(|x| length.to_si(x));
+    ChainJoint { name: None, kind, axis, point, limits: None, frame: None, body: None }
+}
+
+/// A direction of any length but zero, as a unit vector.
+pub(super) fn direction(value: &Value) -> Vector3<f64> {
+    let vector = Vector3::from(value.vector::<3>());
+    if vector.norm() < SMALL {
+        value.fault("has no direction: its length is zero");
+        return Vector3::repeat(f64::NAN);
+    }
+    vector.normalize()
+}
+
+/// Kind, unit axis and the point of the axis nearest to the origin, in the file's length unit.
+fn from_twist(value: &Value) -> (JointKind, Vector3<f64>, Point3<f64>) {
+    let twist = value.vector::<6>();
+    let (v, w) = (Vector3::new(twist[0], twist[1], twist[2]), Vector3::new(twist[3], twist[4], twist[5]));
+    if w.norm() < SMALL {
+        if v.norm() < SMALL {
+            value.fault("is no screw: all six numbers are zero");
+        }
+        return (JointKind::Prismatic, v.normalize(), Point3::origin());
+    }
+    let pitch = v.dot(&w) / w.norm_squared();
+    if pitch.abs() > SMALL * (1.0 + v.norm() / w.norm()) {
+        value.fault(format!("moves {pitch} along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"));
+    }
+    (JointKind::Revolute, w.normalize(), Point3::from(w.cross(&v) / w.norm_squared()))
+}

@@ -1,0 +1,270 @@
+//! URDF: the chain from a base link to a tip link, as ROS defines it (<http://wiki.ros.org/urdf/XML>): m and rad, a joint's
+//! `origin` from the parent link's frame, its `axis` in its own. What hangs rigidly on a moved link adds to that link's mass;
+//! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
+
+use super::{Chain, ChainJoint, Text};
+use crate::error::{Error, Fault, Result, nearest};
+use crate::robot::description::JointKind;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use roxmltree::{Document, Node};
+use std::collections::BTreeMap;
+
+// A direction shorter than this carries no direction.
+const SMALL: f64 = 1e-9;
+
+struct Joint<'a> {
+    node: Node<'a, 'a>,
+    name: &'a str,
+    parent: &'a str,
+    child: &'a str,
+    origin: Isometry3<f64>,
+}
+
+struct Reader<'a> {
+    label: &'a str,
+    document: &'a Document<'a>,
+    faults: Vec<Fault>,
+}
+
+/// Reads the chain from `base` to `tip`; fails with every fault found, each with its line.
+pub(super) fn read(file: Text, base: &str, tip: &str) -> Result<Chain> {
+    let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
+    let mut reader = Reader { label: file.label, document: &document, faults: Vec::new() };
+    let chain = reader.chain(base, tip);
+    match chain {
+        Some(chain) if reader.faults.is_empty() => Ok(chain),
+        _ => Err(Error::Spec(reader.faults)),
+    }
+}
+
+impl<'a> Reader<'a> {
+    fn fault(&mut self, node: Node, message: impl Into<String>) {
+        let line = self.document.text_pos_at(node.range().start).row;
+        self.faults.push(Fault::new(format!("{}:{line}", self.label), message));
+    }
+
+    fn chain(&mut self, base: &str, tip: &str) -> Option<Chain> {
+        let root = self.document.root_element();
+        if root.tag_name().name() != "robot" {
+            self.fault(root, format!("expected a URDF, whose root is <robot>, found <{}>", root.tag_name().name()));
+            return None;
+        }
+        if root.descendants().any(|node| node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))) {
+            self.fault(root, "is a xacro file; expand it first: `xacro arm.urdf.xacro > arm.urdf`");
+            return None;
+        }
+        let mut links: BTreeMap<&str, Node> = BTreeMap::new();
+        for node in root.children().filter(|node| node.has_tag_name("link")) {
+            let name = self.attribute(node, "name")?;
+            if links.insert(name, node).is_some() {
+                self.fault(node, format!("link `{name}` is there twice"));
+            }
+        }
+        for name in [base, tip] {
+            if !links.contains_key(name) {
+                let hint =
+                    nearest(name, links.keys().copied()).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+                let all = links.keys().copied().collect::<Vec<_>>().join(", ");
+                self.fault(root, format!("no link `{name}`{hint} (links: {all})"));
+            }
+        }
+        let joints = self.joints(root, &links)?;
+        if !self.faults.is_empty() {
+            return None;
+        }
+        let path = self.path(root, &joints, base, tip)?;
+        Some(self.walk(&joints, &links, &path))
+    }
+
+    /// Every joint of the file, by the link it moves.
+    fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, Joint<'a>>> {
+        let mut joints = BTreeMap::new();
+        for node in root.children().filter(|node| node.has_tag_name("joint")) {
+            let name = self.attribute(node, "name")?;
+            let parent = self.child(node, "parent").and_then(|end| self.attribute(end, "link"))?;
+            let child = self.child(node, "child").and_then(|end| self.attribute(end, "link"))?;
+            for end in [parent, child] {
+                if !links.contains_key(end) {
+                    let hint = nearest(end, links.keys().copied()).map(|near| format!("; did you mean `{near}`?"));
+                    self.fault(
+                        node,
+                        format!("joint `{name}` refers to link `{end}`, which does not exist{}", hint.unwrap_or_default()),
+                    );
+                }
+            }
+            let origin = self.origin(node);
+            if joints.insert(child, Joint { node, name, parent, child, origin }).is_some() {
+                self.fault(node, format!("joint `{name}`: link `{child}` has two parents; expected a tree"));
+            }
+        }
+        Some(joints)
+    }
+
+    /// The joints from base to tip.
+    fn path(&mut self, root: Node, joints: &BTreeMap<&'a str, Joint<'a>>, base: &str, tip: &str) -> Option<Vec<&'a str>> {
+        let mut path = Vec::new();
+        let mut link = tip;
+        while link != base {
+            match joints.get(link) {
+                Some(joint) if path.len() < joints.len() => {
+                    path.push(joint.child);
+                    link = joint.parent;
+                }
+                Some(_) => {
+                    self.fault(root, format!("the joints from `{tip}` run in a circle; expected a tree"));
+                    return None;
+                }
+                None => {
+                    self.fault(root, format!("no chain from `{base}` to `{tip}`: the way up from `{tip}` ends at `{link}`"));
+                    return None;
+                }
+            }
+        }
+        path.reverse();
+        Some(path)
+    }
+
+    fn walk(
+        &mut self,
+        joints: &BTreeMap<&'a str, Joint<'a>>,
+        links: &BTreeMap<&'a str, Node<'a, 'a>>,
+        path: &[&'a str],
+    ) -> Chain {
+        let mut frame = Isometry3::identity();
+        let mut chain = Vec::new();
+        for link in path {
+            let joint = &joints[link];
+            frame *= joint.origin;
+            if joint.node.attribute("type") == Some("fixed") {
+                continue;
+            }
+            let Some(kind) = self.kind(joint) else { continue };
+            let axis = match joint.node.children().find(|node| node.has_tag_name("axis")) {
+                None => Vector3::x(),
+                Some(node) => Vector3::from(self.numbers(node, "xyz", [1.0, 0.0, 0.0])),
+            };
+            if axis.norm() < SMALL {
+                self.fault(joint.node, format!("joint `{}`: the axis has no direction, its length is zero", joint.name));
+            }
+            let body = self.body(joints, links, path, joint.child, frame);
+            chain.push(ChainJoint {
+                name: Some(joint.name.into()),
+                kind,
+                axis: frame * axis.normalize(),
+                point: frame * Point3::origin(),
+                limits: self.limits(joint),
+                frame: Some(frame),
+                body,
+            });
+        }
+        Chain { joints: chain, tip: frame }
+    }
+
+    fn kind(&mut self, joint: &Joint) -> Option<JointKind> {
+        let name = joint.name;
+        if let Some(mimic) = joint.node.children().find(|node| node.has_tag_name("mimic")) {
+            self.fault(mimic, format!("joint `{name}` mimics another joint; expected a serial chain of independent joints"));
+            return None;
+        }
+        match joint.node.attribute("type") {
+            Some("revolute" | "continuous") => Some(JointKind::Revolute),
+            Some("prismatic") => Some(JointKind::Prismatic),
+            other => {
+                let other = other.unwrap_or("");
+                self.fault(
+                    joint.node,
+                    format!("joint `{name}` has the type `{other}` (allowed: revolute, continuous, prismatic, fixed)"),
+                );
+                None
+            }
+        }
+    }
+
+    fn limits(&mut self, joint: &Joint<'a>) -> Option<[f64; 2]> {
+        let node = joint.node.children().find(|node| node.has_tag_name("limit"))?;
+        if joint.node.attribute("type") == Some("continuous") || !node.has_attribute("lower") && !node.has_attribute("upper") {
+            return None;
+        }
+        let [lower] = self.numbers(node, "lower", [0.0]);
+        let [upper] = self.numbers(node, "upper", [0.0]);
+        if lower > upper {
+            self.fault(node, format!("joint `{}`: expected lower <= upper, found {lower} and {upper}", joint.name));
+        }
+        Some([lower, upper])
+    }
+
+    /// Mass and centre of what moves with `link`: itself and every branch that the chain does not move on.
+    fn body(
+        &mut self,
+        joints: &BTreeMap<&'a str, Joint<'a>>,
+        links: &BTreeMap<&'a str, Node<'a, 'a>>,
+        path: &[&'a str],
+        link: &'a str,
+        frame: Isometry3<f64>,
+    ) -> Option<(f64, Point3<f64>)> {
+        let (mut mass, mut moment) = (0.0, Vector3::zeros());
+        // Every link has one parent and lies below `link`, so this ends.
+        let mut open = vec![(link, frame)];
+        while let Some((link, frame)) = open.pop() {
+            if let Some(inertial) = links[link].children().find(|node| node.has_tag_name("inertial")) {
+                let centre = frame * self.origin(inertial) * Point3::origin();
+                let own = match self.child(inertial, "mass") {
+                    Some(node) => self.numbers(node, "value", [f64::NAN])[0],
+                    None => f64::NAN,
+                };
+                if own < 0.0 {
+                    self.fault(inertial, format!("link `{link}`: expected a mass in kg, not less than 0, found {own}"));
+                }
+                mass += own;
+                moment += own * centre.coords;
+            }
+            for joint in joints.values().filter(|joint| joint.parent == link) {
+                let moves_on = path.contains(&joint.child) && joint.node.attribute("type") != Some("fixed");
+                if !moves_on {
+                    open.push((joint.child, frame * joint.origin));
+                }
+            }
+        }
+        (mass != 0.0).then(|| (mass, Point3::from(moment / mass)))
+    }
+
+    fn child(&mut self, node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+        let found = node.children().find(|child| child.has_tag_name(name));
+        if found.is_none() {
+            self.fault(node, format!("<{}> has no <{name}>", node.tag_name().name()));
+        }
+        found
+    }
+
+    fn attribute(&mut self, node: Node<'a, 'a>, name: &str) -> Option<&'a str> {
+        let found = node.attribute(name);
+        if found.is_none() {
+            self.fault(node, format!("<{}> has no attribute `{name}`", node.tag_name().name()));
+        }
+        found
+    }
+
+    fn origin(&mut self, node: Node<'a, 'a>) -> Isometry3<f64> {
+        let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else { return Isometry3::identity() };
+        let [roll, pitch, yaw] = self.numbers(origin, "rpy", [0.0; 3]);
+        let shift = Vector3::from(self.numbers(origin, "xyz", [0.0; 3]));
+        Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+    }
+
+    /// The numbers of an attribute, or `fallback` where the attribute is missing (NaN there: it may not be).
+    fn numbers<const N: usize>(&mut self, node: Node<'a, 'a>, name: &str, fallback: [f64; N]) -> [f64; N] {
+        let Some(text) = node.attribute(name) else {
+            if fallback.iter().any(|x| x.is_nan()) {
+                self.attribute(node, name);
+            }
+            return fallback;
+        };
+        let numbers: Option<Vec<f64>> =
+            text.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok()).unwrap_or_else(|| {
+            let what = if N == 1 { "a finite number".into() } else { format!("{N} finite numbers") };
+            self.fault(node, format!("<{} {name}>: expected {what}, found `{text}`", node.tag_name().name()));
+            [f64::NAN; N]
+        })
+    }
+}

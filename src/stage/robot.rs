@@ -1,0 +1,97 @@
+//! Stage `robot`: a robot file -> the `robot` table.
+
+use super::{Context, RawFile, Stage, reads, writes};
+use crate::error::{Error, Fault, Result};
+use crate::robot::import::{Text, read_calib, read_case};
+use crate::table::Robot;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+
+// Bytes; the largest URDF we know is 200 kB. A recording named here by mistake must not fill the memory.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// How the robot file is laid out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RobotFormat {
+    /// calib's own YAML.
+    #[default]
+    Calib,
+    /// `robot.json` of a practice folder.
+    Case,
+}
+
+/// Reads the robot as its owner believes it to be.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReadRobot {
+    /// The robot file.
+    pub file: RawFile,
+    /// Layout of the robot file.
+    #[serde(default)]
+    pub format: RobotFormat,
+    /// The URDF that `kinematics: {urdf: {base: .., tip: ..}}` of the robot file refers to.
+    #[serde(default)]
+    pub urdf: Option<RawFile>,
+}
+
+reads! {
+    /// Nothing.
+    pub struct RobotReads {}
+}
+writes! {
+    /// The robot.
+    pub struct RobotWrites {
+        robot: Robot,
+    }
+}
+
+impl Stage for ReadRobot {
+    const NAME: &'static str = "robot";
+    const SUMMARY: &'static str = "reads a robot file (screws, DH, modified DH, URDF, or a practice robot.json)";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = RobotReads;
+    type Writes = RobotWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        match (self.format, &self.urdf) {
+            (RobotFormat::Case, Some(_)) => vec![Fault::new("urdf", "the format `case` takes no URDF")],
+            _ => Vec::new(),
+        }
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let urdf = self.urdf.iter().map(|file| ("urdf".to_string(), file.clone()));
+        std::iter::once(("file".to_string(), self.file.clone())).chain(urdf).collect()
+    }
+
+    fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
+        let (label, text) = text(&self.file, context)?;
+        let file = Text { label: &label, text: &text };
+        let imported = match self.format {
+            RobotFormat::Case => read_case(file)?,
+            RobotFormat::Calib => {
+                let urdf = self.urdf.as_ref().map(|file| self::text(file, context)).transpose()?;
+                read_calib(file, urdf.as_ref().map(|(label, text)| Text { label, text }))?
+            }
+        };
+        for note in imported.notes {
+            context.services.warn(note);
+        }
+        Ok(RobotWrites { robot: Robot::from_description(&imported.robot) })
+    }
+}
+
+/// The label and content of a text file.
+fn text(file: &RawFile, context: &Context) -> Result<(String, String)> {
+    let source = context.services.open(file)?;
+    let mut bytes = Vec::new();
+    source.reader.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::store(&source.label, e.to_string()))?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(Error::spec(&source.label, format!("longer than {} MB; expected a robot file", MOST_BYTES >> 20)));
+    }
+    let text =
+        String::from_utf8(bytes).map_err(|_| Error::spec(&source.label, "not a text file in UTF-8; expected a robot file"))?;
+    Ok((source.label, text))
+}

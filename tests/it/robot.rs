@@ -1,0 +1,192 @@
+//! Robot files: every description of one arm is the same arm, and the same as another program's.
+
+use crate::arms::{ARMS, Arm};
+use calib::robot::RobotModel;
+use calib::robot::description::{Coupling, JointKind, RobotDescription};
+use calib::robot::import::{Imported, Text, read_calib, read_case};
+use calib::table::{Robot, Table};
+use nalgebra::{Matrix3, Vector3};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use serde_json::Value;
+use std::path::Path;
+
+// m: 1e-9 mm.
+const EXACT: f64 = 1e-12;
+
+const HEAD: &str = "calib_robot: 1\nunits: {length: mm, angle: deg}\n";
+
+fn reference(file: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/kinematics").join(file);
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn read(text: &str) -> RobotDescription {
+    read_calib(Text { label: "robot.yaml", text }, None).unwrap_or_else(|e| panic!("{text}\n{e}")).robot
+}
+
+fn read_urdf(name: &str) -> RobotDescription {
+    let text = format!("{HEAD}kinematics: {{urdf: {{base: world_base, tip: tool0}}}}\n");
+    let urdf = reference(&format!("{name}.urdf"));
+    let urdf = Text { label: "arm.urdf", text: &urdf };
+    read_calib(Text { label: "robot.yaml", text: &text }, Some(urdf)).unwrap_or_else(|e| panic!("{name}: {e}")).robot
+}
+
+fn all_forms(arm: &Arm) -> Vec<(&'static str, RobotDescription)> {
+    let file = |kinematics: &str, tool: &str| read(&format!("{HEAD}kinematics:\n  {kinematics}\ntool: {tool}\n"));
+    vec![
+        ("screws", file(&format!("screws:{}", arm.screws), arm.screws_tool)),
+        ("dh", file(&format!("dh:{}", arm.dh), arm.dh_tool)),
+        ("mdh", file(&format!("mdh:{}", arm.mdh), arm.dh_tool)),
+        ("urdf", read_urdf(arm.name)),
+    ]
+}
+
+#[test]
+fn every_description_of_an_arm_moves_alike() {
+    let mut random = ChaCha8Rng::seed_from_u64(20200116);
+    for arm in &ARMS {
+        let models: Vec<_> = all_forms(arm).into_iter().map(|(form, robot)| (form, RobotModel::new(robot))).collect();
+        let (_, first) = &models[0];
+        for _ in 0..1000 {
+            let q: Vec<f64> = (0..first.joints())
+                .map(|j| if first.is_revolute(j) { random.random_range(-3.1..3.1) } else { random.random_range(-3.0..3.0) })
+                .collect();
+            let expected = first.forward(&q);
+            for (form, model) in &models[1..] {
+                let found = model.forward(&q);
+                let (away, turned) =
+                    ((found.translation - expected.translation).norm(), (found.rotation - expected.rotation).norm());
+                assert!(away < EXACT, "{} as {form}: {away} m away at {q:?}", arm.name);
+                assert!(turned < EXACT, "{} as {form}: turned by {turned} at {q:?}", arm.name);
+            }
+        }
+    }
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+/// Numbers by Pinocchio: `tests/reference/kinematics.py`.
+#[test]
+fn forward_kinematics_and_link_masses_agree_with_pinocchio() {
+    for arm in &ARMS {
+        let file: Value = serde_json::from_str(&reference(&format!("{}.json", arm.name))).expect("JSON");
+        for (form, robot) in all_forms(arm) {
+            let model = RobotModel::new(robot);
+            for pose in file["poses"].as_array().expect("poses") {
+                let found = model.forward(&numbers(&pose["q"]));
+                let away = (found.translation - Vector3::from_vec(numbers(&pose["position"]))).norm();
+                let rotation = Matrix3::from_row_iterator(pose["rotation"].as_array().expect("rows").iter().flat_map(numbers));
+                assert!(away < EXACT, "{} as {form}: {away} m away", arm.name);
+                assert!((found.rotation - rotation).norm() < EXACT, "{} as {form}: turned", arm.name);
+            }
+        }
+        let bodies = file["bodies"].as_array().expect("bodies");
+        let robot = read_urdf(arm.name);
+        assert_eq!(robot.joints.len(), bodies.len());
+        for (joint, body) in robot.joints.iter().zip(bodies) {
+            let mass = joint.mass.expect("the URDF has masses");
+            assert!((mass - body["mass"].as_f64().expect("kg")).abs() < 1e-12, "{} {}: {mass} kg", arm.name, joint.name);
+            let centre = Vector3::from(joint.centre.expect("the URDF has centres"));
+            assert!((centre - Vector3::from_vec(numbers(&body["centre"]))).norm() < EXACT, "{} {}", arm.name, joint.name);
+        }
+        let [lower, upper] = robot.joints[1].limits.expect("the URDF has limits");
+        assert_eq!((lower, upper), (-3.1, 3.1));
+    }
+}
+
+const FULL: &str = "
+calib_robot: 1
+name: gantry arm
+units: {length: m, angle: rad}
+kinematics:
+  screws:
+    - {kind: prismatic, axis: [3, 0, 4]}
+    - {axis: [0, 0, 1], point: [0, 0, 0.5]}
+    - {axis: [1, 2, -2], point: [0.1, 0.2, 0.3]}
+tool: {point: [1.5, 0.1, 0.9], orientation: {rpy: [0.1, -0.2, 0.3]}}
+joints:
+  - {name: track, limits: [-1, 4.5]}
+  - {reduction_ratio: -213, motor_constant: 1.3}
+  -
+couplings: [{moved: 3, by: 2, ratio: 0.01}, {moved: 3, by: 1}]
+links: [{mass: 120, centre: [0.1, 0.2, 0.3]}, null, {mass: 0, centre: [0, 0, 0]}]
+payload: {mass: 6, offset: [0.05, 0, 0], frame: tool}
+gravity: [0.6, 0, -9.79]
+";
+
+#[test]
+fn a_robot_file_gives_what_it_says() {
+    let robot = read(FULL);
+    assert_eq!(robot.name, "gantry arm");
+    assert_eq!(robot.joints[0].kind, JointKind::Prismatic);
+    assert_eq!(robot.joints[0].axis, [0.6, 0.0, 0.8]);
+    assert_eq!((robot.joints[0].name.as_str(), robot.joints[2].name.as_str()), ("track", "J3"));
+    assert_eq!(robot.joints[0].limits, Some([-1.0, 4.5]));
+    assert_eq!((robot.joints[1].reduction_ratio, robot.joints[1].motor_constant), (Some(-213.0), Some(1.3)));
+    assert_eq!((robot.joints[1].mass, robot.joints[2].mass), (None, Some(0.0)));
+    assert_eq!(robot.couplings, [Coupling { moved: 2, by: 0, ratio: 0.0 }, Coupling { moved: 2, by: 1, ratio: 0.01 }]);
+    assert_eq!(robot.gravity, [0.6, 0.0, -9.79]);
+    let offset = Vector3::from(robot.payload_centre) - Vector3::from(robot.tool);
+    let x_of_tool = Vector3::from(robot.tool_rotation.map(|row| row[0]));
+    assert!((offset - x_of_tool * 0.05).norm() < 1e-15);
+}
+
+#[test]
+fn a_link_frame_carries_its_centre() {
+    let text = format!(
+        "{HEAD}kinematics: {{dh: [{{d: 100, a: 200, alpha: 90}}]}}\nlinks: [{{mass: 1, centre: [10, 20, 30], frame: link}}]\n"
+    );
+    // Frame 1 stands at (200, 0, 100) with y up and z along -y of the base.
+    let found = Vector3::from(read(&text).joints[0].centre.expect("a centre"));
+    assert!((found - Vector3::new(0.210, -0.030, 0.120)).norm() < 1e-15, "{found}");
+}
+
+fn distance(a: &RobotDescription, b: &RobotDescription) -> f64 {
+    let flat = |robot: &RobotDescription| -> Vec<f64> {
+        let mut out = vec![robot.payload_mass];
+        out.extend(
+            robot.tool.iter().chain(&robot.payload_centre).chain(&robot.gravity).chain(robot.tool_rotation.iter().flatten()),
+        );
+        out.extend(robot.couplings.iter().flat_map(|c| [c.moved as f64, c.by as f64, c.ratio]));
+        for joint in &robot.joints {
+            out.extend(joint.axis.iter().chain(&joint.point));
+            let optional = [joint.reduction_ratio, joint.motor_constant, joint.mass];
+            out.extend(optional.map(|x| x.unwrap_or(-1e9)));
+            out.extend(joint.limits.unwrap_or([-1e9; 2]).iter().chain(&joint.centre.unwrap_or([-1e9; 3])));
+        }
+        out
+    };
+    let (a, b) = (flat(a), flat(b));
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(&b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_table_keeps_the_description() {
+    let forms = ARMS.iter().flat_map(|arm| all_forms(arm).into_iter().map(|(_, robot)| robot));
+    for robot in forms.chain([read(FULL)]) {
+        let frame = Robot::from_description(&robot).to_frame().expect("within the schema");
+        let again = Robot::from_frame(&frame).and_then(|table| table.to_description()).expect("a robot");
+        assert!(distance(&robot, &again) < 1e-12, "{}", robot.name);
+        assert_eq!(robot.name, again.name);
+        assert!(robot.joints.iter().zip(&again.joints).all(|(a, b)| (&a.name, a.kind) == (&b.name, b.kind)));
+    }
+}
+
+#[test]
+fn a_practice_robot_is_read_in_its_units() {
+    let text = r#"{"name": "two", "axes": [[0, 0, 1], [0, -2, 0]], "points": [[0, 0, 0], [312.0, 0, 0]], "tool": [1854, 0, 1310],
+	"mass": [350, null], "com": [[150, 0, -120], null], "ratio": [213, 214], "kt": [1.3, 1.3], "payload": 210.0,
+	"payload_com": [180, 40, 60], "coupling": [[1, 0]], "colour": "orange"}"#;
+    let Imported { robot, notes } = read_case(Text { label: "robot.json", text }).expect("readable");
+    assert_eq!(robot.joints[1].axis, [0.0, -1.0, 0.0]);
+    assert_eq!(robot.joints[1].point, [0.312, 0.0, 0.0]);
+    assert_eq!((robot.joints[0].mass, robot.joints[1].mass, robot.joints[1].centre), (Some(350.0), None, None));
+    assert_eq!(robot.joints[1].reduction_ratio, Some(214.0));
+    assert!((Vector3::from(robot.payload_centre) - Vector3::new(2.034, 0.040, 1.370)).norm() < 1e-12);
+    assert_eq!(robot.couplings, [Coupling { moved: 1, by: 0, ratio: 0.0 }]);
+    assert_eq!(notes, ["robot.json: the key `colour` is not used"]);
+}
