@@ -4,6 +4,7 @@ pub mod ingest;
 mod report;
 mod robot;
 pub mod split;
+mod robot;
 mod validate;
 
 pub use report::{Report, ReportReads};
