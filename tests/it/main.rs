@@ -2,6 +2,7 @@
 
 mod arms;
 mod desk;
+mod arms;
 mod effects;
 mod fixture;
 mod ingest;
@@ -11,3 +12,5 @@ mod robot;
 mod split;
 mod store;
 mod tables;
+mod report;
+mod robot;
