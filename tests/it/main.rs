@@ -14,3 +14,4 @@ mod store;
 mod tables;
 mod report;
 mod robot;
+mod identify;

@@ -1,0 +1,161 @@
+//! Least squares on position data: rank as the theory says, truth recovered, uncertainty honest.
+
+use crate::fixture;
+use calib::effect::{EffectStack, Load, Setting, entry};
+use calib::estimate::{Fate, FitOptions, Fitted, Model, Stop, align, fit};
+use calib::robot::description::RobotDescription;
+use calib::robot::{Measurements, RobotModel};
+use calib::spatial::{Pose, Twist};
+use nalgebra::Vector3;
+
+const SIGMA: f64 = 1e-5;
+const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
+
+/// A reproducible number that is as good as normal: the sum of twelve uniform ones.
+fn normal(index: usize) -> f64 {
+    let mut state = (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut sum = -6.0;
+    for _ in 0..12 {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        sum += (state >> 11) as f64 / (1u64 << 53) as f64;
+    }
+    sum
+}
+
+fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
+    let setting = Setting { base, load: Load::GravityTorque };
+    let made = effects.iter().map(|name| (entry(name).expect("registered").make)(&setting)).collect();
+    Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
+}
+
+/// A recording of a robot whose true parameters are drawn, with the names and values of what was drawn.
+fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed: usize) -> (Measurements, Model) {
+    let robot = RobotModel::new(description.clone());
+    let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2));
+    let mut truth = model(&robot, base, effects);
+    for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
+        let size = match spec.name.split('.').next() {
+            Some("base_frame") => 0.0,
+            Some("joint_compliance") => 4e-7,
+            Some("reduction_ratio" | "coupling_ratio") => 3e-4,
+            _ => 5e-4,
+        };
+        truth.x[k] = size * normal(1000 * seed + k);
+    }
+    let mut data = Measurements {
+        joints: robot.joints(),
+        q: fixture::poses(description, rows),
+        position: vec![Vector3::zeros(); rows],
+        sigma: vec![Vector3::repeat(SIGMA); rows],
+        payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
+        current: None,
+    };
+    data.position = truth.predict(&data);
+    for (row, point) in data.position.iter_mut().enumerate() {
+        *point += Vector3::from_fn(|axis, _| SIGMA * normal(7_777 + 31 * seed + 1_000_000 * (seed + 1) + 3 * row + axis));
+    }
+    (data, truth)
+}
+
+fn identify(data: &Measurements, description: &RobotDescription, effects: &[&str], rows: &[usize]) -> (Model, Fitted) {
+    let robot = RobotModel::new(description.clone());
+    let base = align(&robot, data, rows);
+    let mut model = model(&robot, base, effects);
+    let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
+    let fitted = fit(&mut model, data, &FitOptions { rows, candidates: &candidates });
+    (model, fitted)
+}
+
+fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {
+    let predicted = model.predict(data);
+    let squares: Vec<f64> = rows.map(|row| (data.position[row] - predicted[row]).norm_squared()).collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn position_data_see_four_parameters_a_revolute_joint_two_a_prismatic_one_and_three_of_the_tool() {
+    for (description, expected) in fixture::all().into_iter().zip([27, 27, 31, 29]) {
+        let (data, _) = recording(&description, &GEOMETRY, 120, 1);
+        let rows: Vec<usize> = (0..120).collect();
+        let (_, fitted) = identify(&data, &description, &GEOMETRY, &rows);
+        let free = fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count();
+        assert_eq!(free, expected, "{}", description.name);
+        let gap = fitted.singular_all[expected - 1] / fitted.singular_all[expected].max(1e-300);
+        assert!(gap > 1e6, "{}: the singular values fall by {gap:.1e} behind the rank", description.name);
+        assert_eq!(fitted.stop, Stop::Converged);
+    }
+}
+
+#[test]
+fn geometry_ratios_coupling_and_compliance_come_back_and_held_out_points_reach_the_noise() {
+    let effects = [&GEOMETRY[..], &["reduction_ratio", "coupling_ratio", "joint_compliance"]].concat();
+    for description in fixture::all() {
+        let (data, truth) = recording(&description, &effects, 400, 2);
+        let rows: Vec<usize> = (0..400).filter(|row| row % 2 == 0 || row % 3 == 0).collect();
+        let (model, fitted) = identify(&data, &description, &effects, &rows);
+        let held_out = rms(&model, &data, (0..400).filter(|row| !rows.contains(row)));
+        let floor = SIGMA * 3f64.sqrt();
+        assert!((0.85..1.15).contains(&(held_out / floor)), "{}: held-out {held_out:.2e}, noise {floor:.2e}", description.name);
+        assert!(fitted.unmodelled < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.unmodelled);
+        for (k, spec) in model.stack.specs().iter().enumerate() {
+            let gauge = GEOMETRY.iter().any(|name| spec.name.starts_with(name));
+            if let (false, Fate::Free(sigma)) = (gauge, &fitted.fates[k]) {
+                let off = (model.x[k] - truth.x[k]) / sigma;
+                assert!(off.abs() < 4.5, "{} {}: {off:.1} sigma off", description.name, spec.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn scatter_of_ratios_over_robots_is_what_sigma_says() {
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let description = fixture::offset_wrist();
+    let mut squares = 0.0;
+    let mut count = 0.0;
+    for seed in 10..30 {
+        let (data, truth) = recording(&description, &effects, 80, seed);
+        let rows: Vec<usize> = (0..80).collect();
+        let (model, fitted) = identify(&data, &description, &effects, &rows);
+        for (k, spec) in model.stack.specs().iter().enumerate() {
+            if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.fates[k]) {
+                squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    let scatter: f64 = (squares / count as f64).sqrt();
+    assert!(count > 100.0);
+    assert!((0.8..1.2).contains(&scatter), "scatter over reported sigma {scatter:.2}");
+}
+
+#[test]
+fn a_few_gross_outliers_do_not_move_the_fit() {
+    let description = fixture::spherical();
+    let (mut data, _) = recording(&description, &GEOMETRY, 160, 3);
+    let rows: Vec<usize> = (0..120).collect();
+    for row in [5, 40, 77] {
+        data.position[row] += Vector3::new(0.3, -0.1, 0.8);
+    }
+    let (model, fitted) = identify(&data, &description, &GEOMETRY, &rows);
+    let held_out = rms(&model, &data, 120..160);
+    assert!(held_out < 1.5 * SIGMA * 3f64.sqrt(), "held-out {held_out:.2e} m");
+    assert!(fitted.downweighted >= 3);
+}
+
+#[test]
+fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
+    let mut description = fixture::spherical();
+    description.tool = [1.954, 0.0, 1.31];
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let robot = RobotModel::new(description.clone());
+    let mut data = recording(&description, &[], 100, 4).0;
+    data.position = model(&robot, Pose::identity(), &[]).predict(&data);
+    let rows: Vec<usize> = (0..100).collect();
+    let (model, fitted) = identify(&data, &description, &effects, &rows);
+    let k = model.stack.specs().iter().position(|spec| spec.name == "reduction_ratio.j6").expect("joint 6");
+    assert_eq!(fitted.fates[k], Fate::Unseen);
+    assert_eq!(model.x[k], 0.0);
+}
