@@ -12,3 +12,50 @@ crate::table::rows! { "observability",
         meaning: String,
     }
 }
+
+use crate::estimate::Fitted;
+
+impl Observability {
+    /// What a fit could see. `expected` is the rank that theory gives for the geometry, where it was asked for.
+    pub fn of(step: &str, fitted: &Fitted, geometry: Option<(usize, usize)>) -> Self {
+        let mut rows = Vec::new();
+        let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
+            // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
+            if value.is_finite() {
+                rows.push(ObservabilityRow {
+                    step: step.into(),
+                    quantity: quantity.into(),
+                    index: index as i64,
+                    value,
+                    meaning: meaning.into(),
+                });
+            }
+        };
+        push("free", 0, fitted.singular.len() as f64, "parameters estimated");
+        push("candidates", 0, fitted.singular_all.len() as f64, "parameters asked for");
+        if let Some((rank, expected)) = geometry {
+            push("rank", 0, rank as f64, "geometric parameters that the data see");
+            push("rank_expected", 0, expected as f64, "4 per revolute joint + 2 per prismatic joint + 3 of the measured point");
+        }
+        let rank = fitted.singular.len();
+        if rank > 0 && rank < fitted.singular_all.len() {
+            let gap = fitted.singular_all[rank - 1] / fitted.singular_all[rank];
+            push("gap", 0, gap, "fall of the candidates' singular values behind the last free one");
+        }
+        push(
+            "unmodelled_mm",
+            0,
+            fitted.unmodelled * 1e3,
+            "standard deviation per axis of the fitted rows beyond the instrument's noise",
+        );
+        push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
+        for (name, value, meaning) in &fitted.indices {
+            push(name, 0, *value, meaning);
+        }
+        for (k, value) in fitted.singular.iter().enumerate() {
+            push("singular_value", k + 1, *value, "of the whitened Jacobian, columns scaled to unit prior sigma");
+        }
+        rows.sort_by(|a, b| (&a.quantity, a.index).cmp(&(&b.quantity, b.index)));
+        Self(rows)
+    }
+}

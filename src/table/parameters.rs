@@ -23,3 +23,120 @@ crate::table::rows! { "parameters",
         remark: Option<String>,
     }
 }
+
+use crate::effect::{BaseFrame, EFFECTS, EffectStack, Load, Setting, entry};
+use crate::error::{Error, Result};
+use crate::estimate::{Fate, Fitted, Model};
+use crate::robot::RobotModel;
+use crate::spatial::Pose;
+use crate::units::Unit;
+use nalgebra::Vector3;
+
+impl Parameters {
+    /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
+    pub fn of(step: &str, model: &Model, fitted: &Fitted, held: &[usize], earlier: Option<&Parameters>) -> Self {
+        let specs = model.stack.specs();
+        let base = model.base();
+        let start = model.stack.base();
+        let mut rows = Vec::with_capacity(specs.len());
+        for (effect, range) in model.stack.effects() {
+            for k in range.clone() {
+                let spec = &specs[k];
+                let before = earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
+                if let (Fate::Kept, Some(before)) = (&fitted.fates[k], before) {
+                    let status = if before.status == "free" { "earlier".to_string() } else { before.status.clone() };
+                    rows.push(ParameterRow { status, ..before.clone() });
+                    continue;
+                }
+                let (nominal, value) = if effect.name() == BaseFrame::NAME {
+                    let axis = k - range.start;
+                    (component(start, axis), component(&base, axis))
+                } else {
+                    (0.0, model.x[k])
+                };
+                let names = |with: &[(usize, f64)]| {
+                    let list: Vec<&str> = with.iter().take(4).map(|(j, _)| specs[*j].name.as_str()).collect();
+                    if list.is_empty() { "several others".to_string() } else { list.join(", ") }
+                };
+                let (status, sigma, remark) = match &fitted.fates[k] {
+                    Fate::Free(sigma) => ("free", Some(spec.unit.from_si(*sigma)), None),
+                    Fate::Kept if held.contains(&k) => ("held", None, Some("held at nominal by the pipeline".to_string())),
+                    Fate::Kept => ("held", None, None),
+                    Fate::Redundant(with) => (
+                        "redundant",
+                        None,
+                        Some(format!("the measured points cannot tell it from {}; kept at nominal", names(with))),
+                    ),
+                    Fate::Unseen => (
+                        "unseen",
+                        None,
+                        Some("no plausible value of it would move the measured points beyond their noise".to_string()),
+                    ),
+                };
+                rows.push(ParameterRow {
+                    name: spec.name.clone(),
+                    effect: effect.name().into(),
+                    place: spec.place.clone(),
+                    unit: spec.unit.symbol().into(),
+                    nominal: spec.unit.from_si(nominal),
+                    value: spec.unit.from_si(value),
+                    sigma: sigma.filter(|sigma| sigma.is_finite()),
+                    status: status.into(),
+                    step: step.into(),
+                    remark,
+                });
+            }
+        }
+        rows.sort_by(|a, b| a.name.cmp(&b.name));
+        Self(rows)
+    }
+
+    /// The effects of this model, in the registry's order.
+    pub fn effects(&self) -> Vec<&'static str> {
+        EFFECTS.iter().map(|entry| entry.name).filter(|name| self.0.iter().any(|row| row.effect == *name)).collect()
+    }
+
+    /// The model that these parameters make of `robot`, with `more` effects at zero. Fails where a row names an unknown
+    /// effect or parameter.
+    pub fn model(&self, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
+        let base = self.base_pose();
+        // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
+        let load = match self.0.iter().find(|row| row.effect == "joint_compliance").map(|row| row.unit.as_str()) {
+            Some("rad/A") => Load::MotorCurrent,
+            Some(_) => Load::GravityTorque,
+            None => load,
+        };
+        let setting = Setting { base, load };
+        let names = EFFECTS.iter().map(|entry| entry.name);
+        let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
+        let effects = chosen.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting)).collect();
+        let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
+        for row in self.0.iter().filter(|row| row.effect != BaseFrame::NAME) {
+            let position = model.stack.specs().iter().position(|spec| spec.name == row.name);
+            let (Some(k), Some(unit)) = (position, Unit::parse(&row.unit)) else {
+                return Err(Error::data(
+                    "table parameters",
+                    format!("`{}` in {} is no parameter of this robot", row.name, row.unit),
+                ));
+            };
+            model.x[k] = unit.to_si(row.value);
+        }
+        Ok(model)
+    }
+
+    /// Where the base stands in the tracker's frame; the identity without `base_frame`.
+    pub fn base_pose(&self) -> Pose {
+        let value = |axis: &str, unit: Unit| {
+            let name = format!("{}.{axis}", BaseFrame::NAME);
+            self.0.iter().find(|row| row.name == name).map_or(0.0, |row| unit.to_si(row.value))
+        };
+        let translation = ["x", "y", "z"].map(|axis| value(axis, Unit::Millimetre));
+        let rotation = ["rx", "ry", "rz"].map(|axis| value(axis, Unit::Radian));
+        Pose::from_rotation_vector(Vector3::from(rotation), Vector3::from(translation))
+    }
+}
+
+/// x, y, z (m) or a component of the rotation vector (rad).
+fn component(pose: &Pose, axis: usize) -> f64 {
+    if axis < 3 { pose.translation[axis] } else { pose.rotation_vector()[axis - 3] }
+}

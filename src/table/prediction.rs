@@ -22,3 +22,34 @@ crate::table::rows! { "prediction",
         noise_mm: f64,
     }
 }
+
+use crate::estimate::Model;
+use crate::robot::Measurements;
+use crate::table::{Recording, Split};
+
+impl Prediction {
+    /// The residuals of every row under a model. `held_out[row]` as in the column.
+    pub fn of(step: &str, model: &Model, data: &Measurements, recording: &Recording, split: &Split, held_out: &[bool]) -> Self {
+        let predicted = model.predict(data);
+        let rows = predicted.iter().enumerate().map(|(row, point)| {
+            let point = point * 1e3;
+            let residual = data.position[row] * 1e3 - point;
+            PredictionRow {
+                sequence: recording.sequence[row],
+                point_id: recording.point_id[row].clone(),
+                set: split.0[row].set.clone(),
+                step: step.into(),
+                held_out: held_out[row],
+                x_mm: point.x,
+                y_mm: point.y,
+                z_mm: point.z,
+                dx_mm: residual.x,
+                dy_mm: residual.y,
+                dz_mm: residual.z,
+                error_mm: residual.norm(),
+                noise_mm: data.noise(row) * 1e3,
+            }
+        });
+        Self(rows.collect())
+    }
+}

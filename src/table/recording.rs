@@ -1,9 +1,11 @@
 //! The recording: joints as commanded or logged, and where the tracker saw the tool. SI in Rust, mm and rad in the table.
 
 use crate::error::Result;
+use crate::robot::{Instrument, Measurements};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
+use nalgebra::Vector3;
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 ///
@@ -43,6 +45,27 @@ impl Recording {
     /// Joint positions of a row, rad or m.
     pub fn q(&self, row: usize) -> &[f64] {
         &self.q[row * self.joints..(row + 1) * self.joints]
+    }
+}
+
+impl Recording {
+    /// What the numerics need, with the instrument's noise; where the recording has standard deviations they are added to it.
+    pub fn measurements(&self, instrument: &Instrument) -> Measurements {
+        let position: Vec<Vector3<f64>> = self.position.iter().map(|point| Vector3::from(*point)).collect();
+        let own = |row: usize, axis: usize| match &self.position_sigma {
+            Some(all) if all[row][axis].is_finite() => all[row][axis],
+            _ => 0.0,
+        };
+        let sigma = position
+            .iter()
+            .enumerate()
+            .map(|(row, point)| Vector3::from_fn(|axis, _| instrument.sigma(point).hypot(own(row, axis))))
+            .collect();
+        let payload = match &self.payload {
+            Some(all) => all.iter().map(|mass| if mass.is_finite() { *mass } else { 0.0 }).collect(),
+            None => vec![0.0; self.rows()],
+        };
+        Measurements { joints: self.joints, q: self.q.clone(), position, sigma, payload, current: self.current.clone() }
     }
 }
 

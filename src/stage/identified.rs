@@ -1,0 +1,82 @@
+//! What every identification hands back: the model, the fit's course, what it could see, and the residual of every row.
+
+use crate::estimate::{Fitted, Model};
+use crate::robot::Measurements;
+use crate::stage::Context;
+use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split};
+
+crate::stage::writes! {
+    /// Output ports of `identify` and `stiffness`.
+    pub struct Identified {
+        parameters: Parameters,
+        fit: Fit,
+        observability: Observability,
+        prediction: Prediction,
+    }
+}
+
+/// The inputs that both kinds of identification share.
+pub struct Fitting<'a> {
+    pub data: &'a Measurements,
+    pub recording: &'a Recording,
+    pub split: &'a Split,
+    /// Rows that were fitted.
+    pub rows: &'a [usize],
+    /// Parameters that the user holds.
+    pub held: &'a [usize],
+    pub earlier: Option<&'a Parameters>,
+    /// Rows that an earlier step was fitted to.
+    pub seen_before: &'a [bool],
+    /// Geometric rank: found and expected.
+    pub geometry: Option<(usize, usize)>,
+}
+
+impl Identified {
+    /// Tables of a finished fit, and its notes for the person.
+    pub fn of(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) -> Self {
+        let step = context.id;
+        let mut held_out: Vec<bool> = fitting.seen_before.iter().map(|seen| !seen).collect();
+        for row in fitting.rows {
+            held_out[*row] = false;
+        }
+        note(context, fitted, fitting);
+        Self {
+            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
+            fit: Fit::of(step, fitted),
+            observability: Observability::of(step, fitted, fitting.geometry),
+            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out),
+        }
+    }
+}
+
+fn note(context: &Context, fitted: &Fitted, fitting: &Fitting) {
+    let services = context.services;
+    let free = fitted.singular.len();
+    let asked = fitted.singular_all.len();
+    services.note(format!(
+        "{} points, {free} of {asked} parameters estimated, {} after {} iterations",
+        fitting.rows.len(),
+        fitted.stop.name(),
+        fitted.course.len().saturating_sub(1),
+    ));
+    if let Some((rank, expected)) = fitting.geometry {
+        if rank < expected {
+            services.warn(format!("the data see {rank} of the {expected} geometric parameters of this arm: some joints hardly move"));
+        }
+    }
+    if 3 * fitting.rows.len() < 2 * free {
+        services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));
+    }
+    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;
+    let noise_axis = noise / 3f64.sqrt();
+    if fitted.unmodelled > noise_axis {
+        services.note(format!(
+            "{:.3} mm per axis is left beyond the instrument's {:.3} mm: this model does not explain it",
+            fitted.unmodelled * 1e3,
+            noise_axis * 1e3
+        ));
+    }
+    if fitted.downweighted > 0 {
+        services.note(format!("{} rows stand far off and count less", fitted.downweighted));
+    }
+}

@@ -1,0 +1,199 @@
+//! Identification from the nominal robot: base, tool, geometry, transmission and, if wanted, compliance in one estimation.
+//!
+//! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
+
+use crate::effect::{EFFECTS, EffectStack, Load, Setting, entry};
+use crate::error::{Fault, Result, nearest};
+use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
+use crate::robot::{Instrument, RobotModel};
+use crate::stage::identified::{Fitting, Identified};
+use crate::stage::{Context, Stage};
+use crate::table::{Recording, Robot, Split};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `identify`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Identify {
+    /// Sets of the split to fit.
+    #[serde(default = "fit_set")]
+    pub on: Vec<String>,
+    /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
+    #[serde(default = "all_effects")]
+    pub effects: Vec<String>,
+    /// Parameters to hold at nominal, by name; `*` stands for anything, e.g. `reduction_ratio.*`.
+    #[serde(default)]
+    pub hold: Vec<String>,
+    /// What winds the joints up: gravity torque of the robot's masses, or motor currents.
+    #[serde(default)]
+    pub load: LoadSetting,
+    /// The tracker's noise.
+    #[serde(default)]
+    pub tracker: Instrument,
+}
+
+/// What stands in for a joint's load.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LoadSetting {
+    /// From the masses of the robot file.
+    #[default]
+    Gravity,
+    /// From the motor currents of the recording.
+    Current,
+}
+
+impl From<LoadSetting> for Load {
+    fn from(setting: LoadSetting) -> Self {
+        match setting {
+            LoadSetting::Gravity => Load::GravityTorque,
+            LoadSetting::Current => Load::MotorCurrent,
+        }
+    }
+}
+
+fn fit_set() -> Vec<String> {
+    vec!["fit".into()]
+}
+fn all_effects() -> Vec<String> {
+    EFFECTS.iter().map(|entry| entry.name.to_string()).collect()
+}
+
+crate::stage::reads! {
+    /// Input ports of [`Identify`].
+    pub struct IdentifyReads {
+        robot: Robot,
+        recording: Recording,
+        split: Split,
+    }
+}
+
+impl Stage for Identify {
+    const NAME: &'static str = "identify";
+    const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = IdentifyReads;
+    type Writes = Identified;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (k, name) in self.effects.iter().enumerate() {
+            if entry(name).is_none() {
+                let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+                let hint = nearest(name, names.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+                faults.push(Fault::new(
+                    format!("effects[{k}]"),
+                    format!("unknown effect `{name}`; {hint}allowed: {}", names.join(", ")),
+                ));
+            }
+        }
+        if self.on.is_empty() {
+            faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
+        }
+        if let Some(fault) = self.tracker.fault() {
+            faults.push(Fault::new("tracker", fault));
+        }
+        faults
+    }
+
+    fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let data = reads.recording.measurements(&self.tracker);
+        let rows = reads.split.rows(&reads.recording, &self.on)?;
+        let setting = Setting { base: align(&robot, &data, &rows), load: self.load.into() };
+        let mut effects = Vec::new();
+        for entry in EFFECTS.iter().filter(|entry| self.effects.iter().any(|name| name == entry.name)) {
+            let effect = (entry.make)(&setting);
+            match effect.missing(&robot, &data) {
+                Some(reason) => context.services.note(format!("{} is left out: {reason}", entry.name)),
+                None => effects.push(effect),
+            }
+        }
+        let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
+        let specs = model.stack.specs();
+        let (held, candidates): (Vec<usize>, Vec<usize>) =
+            (0..specs.len()).partition(|k| self.hold.iter().any(|pattern| matches(pattern, &specs[*k].name)));
+        for pattern in &self.hold {
+            if !specs.iter().any(|spec| matches(pattern, &spec.name)) {
+                context.services.warn(format!("hold: `{pattern}` matches no parameter of this model"));
+            }
+        }
+        let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+        question_ratios(&model, &fitted, context);
+        let fitting = Fitting {
+            data: &data,
+            recording: &reads.recording,
+            split: &reads.split,
+            rows: &rows,
+            held: &held,
+            earlier: None,
+            seen_before: &vec![false; data.rows()],
+            geometry: geometric_rank(&model, &fitted),
+        };
+        Ok(Identified::of(context, &model, &fitted, &fitting))
+    }
+}
+
+/// Effects that together are the rigid geometry of the arm.
+const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
+
+/// (found, expected) rank of the geometry, when all of it was asked for.
+fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
+    let asked = GEOMETRY.iter().all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
+    let found = model
+        .stack
+        .effects()
+        .filter(|(effect, _)| GEOMETRY.contains(&effect.name()))
+        .flat_map(|(_, range)| range)
+        .filter(|k| matches!(fitted.fates[*k], Fate::Free(_)))
+        .count();
+    let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>() + 3;
+    let held = model.stack.specs().len() != fitted.singular_all.len();
+    (asked && !held).then_some((found, expected))
+}
+
+/// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
+const PLAUSIBLE_RATIO: f64 = 5e-4;
+
+fn question_ratios(model: &Model, fitted: &Fitted, context: &Context) {
+    let compliant = model.stack.effects().any(|(effect, _)| effect.name() == "joint_compliance");
+    for (k, spec) in model.stack.specs().iter().enumerate() {
+        let value = model.x[k];
+        if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio."), &fitted.fates[k]) {
+            if value.abs() > PLAUSIBLE_RATIO && value.abs() > 3.0 * sigma {
+                let hint = if compliant { "" } else { "; self-weight deflection looks like this: add `joint_compliance`" };
+                context.services.warn(format!(
+                    "{}: {:.1}e-4 is implausible, a ratio is a quotient of tooth counts{hint}",
+                    spec.name,
+                    value * 1e4
+                ));
+            }
+        }
+    }
+}
+
+/// Whether a pattern with `*` for anything matches the whole name.
+fn matches(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {
+            rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn a_star_stands_for_anything() {
+        assert!(matches("reduction_ratio.*", "reduction_ratio.j2"));
+        assert!(matches("*.j2", "reduction_ratio.j2"));
+        assert!(matches("*", "x"));
+        assert!(matches("a*c*e", "abcde"));
+        assert!(!matches("a*c", "abcd"));
+        assert!(!matches("reduction_ratio", "reduction_ratio.j2"));
+    }
+}

@@ -1,0 +1,91 @@
+//! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
+
+use crate::error::{Error, Fault, Result};
+use crate::estimate::{FitOptions, fit};
+use crate::robot::{Instrument, RobotModel};
+use crate::stage::identified::{Fitting, Identified};
+use crate::stage::identify::LoadSetting;
+use crate::stage::{Context, Stage};
+use crate::table::{Parameters, Prediction, Recording, Robot, Split};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `stiffness`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stiffness {
+    /// Sets of the split to fit: loaded poses.
+    pub on: Vec<String>,
+    /// What winds the joints up.
+    #[serde(default)]
+    pub load: LoadSetting,
+    /// Joints to estimate, from 1; all that the data see if empty.
+    #[serde(default)]
+    pub joints: Vec<usize>,
+    /// The tracker's noise.
+    #[serde(default)]
+    pub tracker: Instrument,
+}
+
+crate::stage::reads! {
+    /// Input ports of [`Stiffness`].
+    pub struct StiffnessReads {
+        robot: Robot,
+        recording: Recording,
+        split: Split,
+        parameters: Parameters,
+        prediction: Prediction,
+    }
+}
+
+impl Stage for Stiffness {
+    const NAME: &'static str = "stiffness";
+    const SUMMARY: &'static str = "identifies joint compliance from loaded poses, everything identified before is kept";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = StiffnessReads;
+    type Writes = Identified;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        if self.on.is_empty() {
+            faults.push(Fault::new("on", "expected at least one set, e.g. [loaded]"));
+        }
+        if let Some(fault) = self.tracker.fault() {
+            faults.push(Fault::new("tracker", fault));
+        }
+        faults
+    }
+
+    fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
+        const EFFECT: &str = "joint_compliance";
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let data = reads.recording.measurements(&self.tracker);
+        let rows = reads.split.rows(&reads.recording, &self.on)?;
+        let mut model = reads.parameters.model(robot, &[EFFECT], self.load.into())?;
+        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == EFFECT);
+        if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data)) {
+            return Err(Error::data("with.load", format!("no joint load is known: {reason}")));
+        }
+        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{EFFECT}.j{joint}")).collect();
+        let specs = model.stack.specs();
+        if let Some(unknown) = wanted.iter().find(|name| !specs.iter().any(|spec| spec.name == **name)) {
+            return Err(Error::spec("with.joints", format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1")));
+        }
+        let (candidates, others): (Vec<usize>, Vec<usize>) = (0..specs.len())
+            .partition(|k| specs[*k].name.starts_with(EFFECT) && (wanted.is_empty() || wanted.contains(&specs[*k].name)));
+        let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+        let held: Vec<usize> = others.into_iter().filter(|k| model.stack.specs()[*k].name.starts_with(EFFECT)).collect();
+        let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
+        let fitting = Fitting {
+            data: &data,
+            recording: &reads.recording,
+            split: &reads.split,
+            rows: &rows,
+            held: &held,
+            earlier: Some(&reads.parameters),
+            seen_before: &seen_before,
+            geometry: None,
+        };
+        Ok(Identified::of(context, &model, &fitted, &fitting))
+    }
+}
