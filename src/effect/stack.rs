@@ -20,11 +20,12 @@ pub struct EffectStack {
 pub struct Scratch {
     deflection: Deflection,
     torque: Vec<f64>,
-    deflected: Vec<f64>,
     /// Frame before E_k, and J_left of the twist there.
     before: Vec<(Pose, Option<Matrix6<f64>>)>,
     /// Frame behind E_k, in front of joint k.
     behind: Vec<Pose>,
+    /// Frame of the body moved by joint k.
+    body: Vec<Pose>,
 }
 
 impl EffectStack {
@@ -60,16 +61,15 @@ impl EffectStack {
         Scratch {
             deflection: Deflection::new(n),
             torque: vec![0.0; n],
-            deflected: vec![0.0; n],
             before: vec![(Pose::identity(), None); n + 1],
             behind: vec![Pose::identity(); n + 1],
+            body: vec![Pose::identity(); n],
         }
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
     pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
-        self.deflect(robot, data, row, x, scratch);
-        self.chain(robot, data.q(row), scratch)
+        self.settle(robot, data, row, x, scratch)
     }
 
     /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`.
@@ -85,8 +85,7 @@ impl EffectStack {
         scratch: &mut Scratch,
         mut emit: impl FnMut(usize, Vector3<f64>),
     ) -> Vector3<f64> {
-        self.deflect(robot, data, row, x, scratch);
-        let point = self.chain(robot, data.q(row), scratch);
+        let point = self.settle(robot, data, row, x, scratch);
         for (parameter, direction) in &scratch.deflection.partials {
             let derivative = match direction {
                 Direction::Joint(joint, rate) => along(&scratch.behind[*joint], &point, &robot.screws()[*joint]) * *rate,
@@ -103,23 +102,31 @@ impl EffectStack {
         point
     }
 
-    fn deflect(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
-        let q = data.q(row);
-        // Torques where the arm really is: at the commanded angles first, then once more at the deflected ones.
-        for pass in 0..if self.needs_torque { 2 } else { 1 } {
-            if self.needs_torque {
-                for (deflected, (q, d)) in scratch.deflected.iter_mut().zip(q.iter().zip(&scratch.deflection.joint)) {
-                    *deflected = if pass == 0 { *q } else { q + d };
-                }
-                robot.gravity_torque(&scratch.deflected, data.payload[row], &mut scratch.torque);
-            }
-            scratch.deflection.clear();
-            let state = ArmState { q, torque: &scratch.torque, current: data.current(row), payload: data.payload[row] };
-            for (effect, range) in &self.effects {
-                scratch.deflection.start(range.start);
-                effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
+    /// The arm where it comes to rest. Torques are taken at the arm's own geometry, first unwound, then wound up; what a third
+    /// pass would add is of the order of the wind-up (rad) cubed.
+    fn settle(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+        scratch.torque.fill(0.0);
+        let mut point = self.pass(robot, data, row, x, scratch);
+        if self.needs_torque {
+            for _ in 0..2 {
+                let Scratch { behind, body, torque, .. } = scratch;
+                // Gravity is known in the base frame as corrected, hence behind[0].
+                robot.gravity_torque(&behind[0], behind, body, data.payload[row], torque);
+                point = self.pass(robot, data, row, x, scratch);
             }
         }
+        point
+    }
+
+    fn pass(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+        scratch.deflection.clear();
+        let payload = data.payload[row];
+        let state = ArmState { q: data.q(row), torque: &scratch.torque, current: data.current(row), payload };
+        for (effect, range) in &self.effects {
+            scratch.deflection.start(range.start);
+            effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
+        }
+        self.chain(robot, data.q(row), scratch)
     }
 
     fn chain(&self, robot: &RobotModel, q: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
@@ -135,6 +142,7 @@ impl EffectStack {
             scratch.behind[station] = frame;
             if station < n {
                 frame = frame * Pose::exp(&(robot.screws()[station] * (q[station] + scratch.deflection.joint[station])));
+                scratch.body[station] = frame;
             }
         }
         frame.point(&robot.home().translation)

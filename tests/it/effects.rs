@@ -144,7 +144,8 @@ fn every_effect_is_registered_under_its_own_name_and_its_parameters_are_named_af
 fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     let robot = RobotModel::new(fixture::offset_wrist());
     let mut torque = vec![0.0; 6];
-    robot.gravity_torque(&[0.0; 6], 10.0, &mut torque);
+    let still = [Pose::identity(); 6];
+    robot.gravity_torque(&Pose::identity(), &still, &still, 10.0, &mut torque);
     // Joint 2 turns about -y through x = 0; bodies 2..6 and the payload hang at their x.
     let bodies = [(12.7, -0.306), (4.3, -0.89815), (2.0, -1.1843), (2.0, -1.1843), (0.4, -1.1843), (10.0, -1.1343)];
     let expected: f64 = bodies.iter().map(|(mass, x)| mass * 9.81 * x).sum();
