@@ -132,8 +132,7 @@ impl EffectStack {
     fn chain(&self, robot: &RobotModel, q: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
         let n = robot.joints();
         let mut frame = self.base;
-        for station in 0..=n {
-            let twist = &scratch.deflection.station[station];
+        for (station, twist) in scratch.deflection.station.iter().enumerate() {
             let still = twist.iter().all(|value| *value == 0.0);
             scratch.before[station] = (frame, (!still).then(|| left_jacobian(twist)));
             if !still {

@@ -33,6 +33,8 @@ impl Stop {
 pub struct Iteration {
     /// Sum of losses, dimensionless.
     pub cost: f64,
+    /// Root mean square of the residual length over the fitted rows, m.
+    pub rms: f64,
     /// Largest component of the gradient, in units of (column norm x residual norm): the cosine between them.
     pub gradient: f64,
     /// Norm of the step that led here, in sigmas of prediction.
@@ -51,16 +53,16 @@ const STEP_TOLERANCE: f64 = 1e-7;
 ///
 /// Returns the course, why it stopped, and the factor at the end.
 pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> (Vec<Iteration>, Stop, Factor) {
-    let mut cost = problem.cost(model);
+    let (mut cost, rms) = problem.cost(model);
     let mut factor = problem.linearise(model, free);
-    let mut course = vec![Iteration { cost, gradient: cosine(&factor, cost), step_norm: 0.0, damping: 0.0 }];
+    let mut course = vec![Iteration { cost, rms, gradient: cosine(&factor, cost), step_norm: 0.0, damping: 0.0 }];
     if free.is_empty() {
         return (course, Stop::NothingFree, factor);
     }
     let mut damping = 0.0;
     for _ in 0..ITERATIONS {
         let mut tries = 0;
-        let (step, trial_cost) = loop {
+        let (step, trial_cost, rms) = loop {
             tries += 1;
             if tries > 20 {
                 return (course, Stop::Stalled, factor);
@@ -73,9 +75,9 @@ pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> 
             for (parameter, change) in free.iter().zip(&step) {
                 model.x[*parameter] += change;
             }
-            let trial_cost = problem.cost(model);
+            let (trial_cost, rms) = problem.cost(model);
             if trial_cost.is_finite() && trial_cost <= cost * (1.0 + 1e-12) {
-                break (step, trial_cost);
+                break (step, trial_cost, rms);
             }
             model.x = before;
             if step_norm(&factor, &step) < STEP_TOLERANCE {
@@ -87,7 +89,7 @@ pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> 
         let fall = cost - trial_cost;
         cost = trial_cost;
         factor = problem.linearise(model, free);
-        course.push(Iteration { cost, gradient: cosine(&factor, cost), step_norm, damping });
+        course.push(Iteration { cost, rms, gradient: cosine(&factor, cost), step_norm, damping });
         if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * cost {
             return (course, Stop::Converged, factor);
         }

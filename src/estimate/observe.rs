@@ -20,16 +20,15 @@ const RANK_TOLERANCE: f64 = 1e-8;
 
 /// Decides for the candidates (columns of `factor`, whitened; in order of precedence) which are seen.
 pub(crate) fn visibility(factor: &Factor, prior_sigma: &[f64]) -> Vec<Visibility> {
-    let p = factor.parameters();
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut kept: Vec<usize> = Vec::new();
     // Upper triangular coefficients of the kept columns in the basis.
     let mut triangle: Vec<Vec<f64>> = Vec::new();
-    let mut out = Vec::with_capacity(p);
-    for j in 0..p {
+    let mut out = Vec::with_capacity(prior_sigma.len());
+    for (j, prior) in prior_sigma.iter().enumerate() {
         let column = factor.column(j);
         let norm = length(&column);
-        if norm * prior_sigma[j] < 1.0 {
+        if norm * prior < 1.0 {
             out.push(Visibility::Unseen);
             continue;
         }
@@ -46,7 +45,7 @@ pub(crate) fn visibility(factor: &Factor, prior_sigma: &[f64]) -> Vec<Visibility
             }
         }
         let left = length(&rest);
-        if left < RANK_TOLERANCE * norm || left * prior_sigma[j] < 1.0 {
+        if left < RANK_TOLERANCE * norm || left * prior < 1.0 {
             out.push(Visibility::Redundant(combination(&triangle, &kept, &shares, factor, norm)));
             continue;
         }

@@ -46,9 +46,15 @@ impl Problem<'_> {
         residuals.iter().zip(self.rows).map(|(residual, row)| residual.component_mul(&self.weight(*row)).norm()).collect()
     }
 
-    /// Sum of Huber's losses, dimensionless.
-    pub fn cost(&self, model: &Model) -> f64 {
-        self.errors(model).iter().map(|error| huber(*error)).sum()
+    /// Sum of Huber's losses (dimensionless), and the root mean square of the residual length (m).
+    pub fn cost(&self, model: &Model) -> (f64, f64) {
+        let residuals = self.residuals(model);
+        let (mut cost, mut squares) = (0.0, 0.0);
+        for (residual, row) in residuals.iter().zip(self.rows) {
+            cost += huber(residual.component_mul(&self.weight(*row)).norm());
+            squares += residual.norm_squared();
+        }
+        (cost, (squares / residuals.len().max(1) as f64).sqrt())
     }
 
     /// The factor of the linearised problem in the `free` parameters of the model's stack.

@@ -59,10 +59,10 @@ fn note(context: &Context, fitted: &Fitted, fitting: &Fitting) {
         fitted.stop.name(),
         fitted.course.len().saturating_sub(1),
     ));
-    if let Some((rank, expected)) = fitting.geometry {
-        if rank < expected {
-            services.warn(format!("the data see {rank} of the {expected} geometric parameters of this arm: some joints hardly move"));
-        }
+    if let Some((rank, expected)) = fitting.geometry
+        && rank < expected
+    {
+        services.warn(format!("the data see {rank} of the {expected} geometric parameters of this arm: some joints hardly move"));
     }
     if 3 * fitting.rows.len() < 2 * free {
         services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));

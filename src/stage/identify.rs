@@ -81,7 +81,8 @@ impl Stage for Identify {
         for (k, name) in self.effects.iter().enumerate() {
             if entry(name).is_none() {
                 let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
-                let hint = nearest(name, names.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+                let hint =
+                    nearest(name, names.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
                 faults.push(Fault::new(
                     format!("effects[{k}]"),
                     format!("unknown effect `{name}`; {hint}allowed: {}", names.join(", ")),
@@ -160,15 +161,16 @@ fn question_ratios(model: &Model, fitted: &Fitted, context: &Context) {
     let compliant = model.stack.effects().any(|(effect, _)| effect.name() == "joint_compliance");
     for (k, spec) in model.stack.specs().iter().enumerate() {
         let value = model.x[k];
-        if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio."), &fitted.fates[k]) {
-            if value.abs() > PLAUSIBLE_RATIO && value.abs() > 3.0 * sigma {
-                let hint = if compliant { "" } else { "; self-weight deflection looks like this: add `joint_compliance`" };
-                context.services.warn(format!(
-                    "{}: {:.1}e-4 is implausible, a ratio is a quotient of tooth counts{hint}",
-                    spec.name,
-                    value * 1e4
-                ));
-            }
+        if let Fate::Free(sigma) = &fitted.fates[k]
+            && spec.name.starts_with("reduction_ratio.")
+            && value.abs() > PLAUSIBLE_RATIO.max(3.0 * sigma)
+        {
+            let hint = if compliant { "" } else { "; self-weight deflection looks like this: add `joint_compliance`" };
+            context.services.warn(format!(
+                "{}: {:.1}e-4 is implausible, a ratio is a quotient of tooth counts{hint}",
+                spec.name,
+                value * 1e4
+            ));
         }
     }
 }
@@ -177,9 +179,9 @@ fn question_ratios(model: &Model, fitted: &Fitted, context: &Context) {
 fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((head, tail)) => name.strip_prefix(head).is_some_and(|rest| {
-            rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))
-        }),
+        Some((head, tail)) => name
+            .strip_prefix(head)
+            .is_some_and(|rest| rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))),
     }
 }
 

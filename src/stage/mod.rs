@@ -1,14 +1,19 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
 pub mod ingest;
+mod identified;
+mod identify;
 mod report;
 mod robot;
 pub mod split;
 mod robot;
+mod stiffness;
 mod validate;
 
+pub use identify::{Identify, IdentifyReads};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
+pub use stiffness::{Stiffness, StiffnessReads};
 pub use validate::{Validate, ValidateReads};
 
 use crate::error::Result;

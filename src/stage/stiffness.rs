@@ -69,7 +69,10 @@ impl Stage for Stiffness {
         let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{EFFECT}.j{joint}")).collect();
         let specs = model.stack.specs();
         if let Some(unknown) = wanted.iter().find(|name| !specs.iter().any(|spec| spec.name == **name)) {
-            return Err(Error::spec("with.joints", format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1")));
+            return Err(Error::spec(
+                "with.joints",
+                format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
+            ));
         }
         let (candidates, others): (Vec<usize>, Vec<usize>) = (0..specs.len())
             .partition(|k| specs[*k].name.starts_with(EFFECT) && (wanted.is_empty() || wanted.contains(&specs[*k].name)));

@@ -7,6 +7,8 @@ crate::table::rows! { "fit",
         iteration: i64,
         /// Sum of Huber's losses of the whitened residuals, dimensionless. Rounds with a new noise level start afresh.
         cost: f64,
+        /// Root mean square of the residual length over the fitted rows, mm.
+        rms_mm: f64,
         /// Largest cosine between a column of the Jacobian and the residual: 0 at the minimum.
         gradient: f64,
         /// How far the step moved the whitened predictions, in sigmas.
@@ -26,6 +28,7 @@ impl Fit {
             step: step.into(),
             iteration: iteration as i64,
             cost: at.cost,
+            rms_mm: at.rms * 1e3,
             gradient: at.gradient,
             step_norm: at.step_norm,
             damping: at.damping,

@@ -113,8 +113,8 @@ fn geometry_ratios_coupling_and_compliance_come_back_and_held_out_points_reach_t
 fn scatter_of_ratios_over_robots_is_what_sigma_says() {
     let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
     let description = fixture::offset_wrist();
-    let mut squares = 0.0;
-    let mut count = 0.0;
+    let mut squares: f64 = 0.0;
+    let mut count: f64 = 0.0;
     for seed in 10..30 {
         let (data, truth) = recording(&description, &effects, 80, seed);
         let rows: Vec<usize> = (0..80).collect();
@@ -126,7 +126,7 @@ fn scatter_of_ratios_over_robots_is_what_sigma_says() {
             }
         }
     }
-    let scatter: f64 = (squares / count as f64).sqrt();
+    let scatter: f64 = (squares / count).sqrt();
     assert!(count > 100.0);
     assert!((0.8..1.2).contains(&scatter), "scatter over reported sigma {scatter:.2}");
 }
