@@ -1,12 +1,13 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
-pub mod ingest;
 mod identified;
 mod identify;
+pub mod ingest;
 mod report;
 mod robot;
 pub mod split;
 mod robot;
+pub mod split;
 mod stiffness;
 mod validate;
 
