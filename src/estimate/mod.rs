@@ -9,6 +9,7 @@ pub mod network;
 mod observe;
 mod problem;
 pub mod swarm;
+pub mod threads;
 
 pub use align::align;
 pub use fit::{Fate, FitOptions, Fitted, fit};

@@ -57,8 +57,9 @@ impl Section {
                 points: rows.iter().map(|row| [row.iteration as f64, row.rms_mm]).collect(),
             })
             .collect();
-        let trainings =
-            groups(tables.training.iter().flat_map(|t| &t.0), |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
+        // The networks of an ensemble differ by chance alone: the swarm and the first of them tell how training went.
+        let courses = tables.training.iter().flat_map(|t| &t.0).filter(|row| row.member <= 1);
+        let trainings = groups(courses, |row: &TrainingRow| (row.step.clone(), row.phase.clone()));
         let seen = groups(tables.observability.iter().flat_map(|t| &t.0), |row: &ObservabilityRow| row.step.clone());
         Self {
             courses: (!lines.is_empty())

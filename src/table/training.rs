@@ -1,11 +1,13 @@
 //! The course of a network's training.
 
 crate::table::rows! { "training",
-    /// Generations or epochs, one a row; key (`step`, `phase`, `generation`).
+    /// Generations or epochs, one a row; key (`step`, `phase`, `member`, `generation`).
     pub struct Training of TrainingRow {
         step: String,
         /// `swarm` or `gradient`.
         phase: String,
+        /// The network from 1; 0 for the swarm, which serves all.
+        member: i64,
         generation: i64,
         /// Best objective so far (mean squared error of the scaled training residuals plus decay).
         best: f64,

@@ -205,6 +205,7 @@ fn training() -> Vec<Labelled<Training>> {
             TrainingRow {
                 step: "network".into(),
                 phase: phase.clone(),
+                member: i64::from(phase == "gradient"),
                 generation: g,
                 best: train_rms_mm * 0.5,
                 train_rms_mm,

@@ -1,0 +1,165 @@
+//! Gradient training: limited-memory BFGS (Liu and Nocedal 1989) with backtracking, stopped early by rows kept back.
+
+use super::perceptron::{Loss, Scratch};
+use std::collections::VecDeque;
+
+/// Steps remembered; ten is the usual choice and more gains nothing here.
+const MEMORY: usize = 10;
+/// Armijo's condition: the least share of the predicted decrease.
+const SUFFICIENT: f64 = 1e-4;
+/// Below this relative decrease over one iteration the loss counts as flat.
+const FLAT: f64 = 1e-9;
+/// Iterations without a better check loss before training ends.
+const PATIENCE: usize = 20;
+
+/// One iteration of the training; iteration 0 is the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Iteration {
+    pub index: usize,
+    /// Loss on the training rows, decay included.
+    pub loss: f64,
+    /// Mean squared error per output on the training rows, and on the rows kept back.
+    pub train: [f64; super::OUTPUTS],
+    pub check: Option<[f64; super::OUTPUTS]>,
+    pub evaluations: u64,
+}
+
+/// Why the training ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    Iterations,
+    /// The loss no longer falls.
+    Flat,
+    /// The rows kept back got worse: what came before is kept.
+    Early,
+}
+
+/// A trained network.
+#[derive(Debug, Clone)]
+pub struct Descent {
+    pub parameters: Vec<f64>,
+    pub history: Vec<Iteration>,
+    pub stop: Stop,
+}
+
+/// Minimises `train` from `start` in at most `iterations` iterations.
+///
+/// With `check`, the parameters of the smallest check error are returned, else those of the smallest loss.
+pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: usize) -> Descent {
+    let mut scratch = Scratch::new(train.shape);
+    let mut x = start;
+    let mut gradient = vec![0.0; x.len()];
+    let mut loss = train.gradient(&x, &mut gradient, &mut scratch);
+    let mut evaluations = 1;
+    let mut memory: VecDeque<Pair> = VecDeque::new();
+    let mut kept = (f64::INFINITY, x.clone());
+    let mut since = 0;
+    let mut history = Vec::new();
+    let mut next = x.clone();
+    let mut next_gradient = gradient.clone();
+    let mut index = 0;
+    let stop = loop {
+        let checked = check.map(|check| check.mean_squares(&x, &mut scratch));
+        let train_squares = train.mean_squares(&x, &mut scratch);
+        history.push(Iteration { index, loss, train: train_squares, check: checked, evaluations });
+        let judged = checked.map_or(loss, |squares| squares.iter().sum());
+        if judged < kept.0 {
+            kept = (judged, x.clone());
+            since = 0;
+        } else {
+            since += 1;
+        }
+        if since >= PATIENCE {
+            break Stop::Early;
+        }
+        if index >= iterations {
+            break Stop::Iterations;
+        }
+        let mut direction = quasi_newton(&gradient, &memory);
+        let mut slope = dot(&direction, &gradient);
+        if slope >= 0.0 {
+            // The memory has gone bad: start again from steepest descent.
+            memory.clear();
+            direction = gradient.iter().map(|g| -g).collect();
+            slope = dot(&direction, &gradient);
+        }
+        let length = norm(&direction);
+        // The first step has no curvature to go by: one unit of length is about one weight.
+        let mut step = if memory.is_empty() { 1.0 / length.max(1.0) } else { 1.0 };
+        let found = loop {
+            for ((n, x), d) in next.iter_mut().zip(&x).zip(&direction) {
+                *n = x + step * d;
+            }
+            let value = train.gradient(&next, &mut next_gradient, &mut scratch);
+            evaluations += 1;
+            if value <= loss + SUFFICIENT * step * slope {
+                break Some(value);
+            }
+            step *= 0.5;
+            if step * length < 1e-12 {
+                break None;
+            }
+        };
+        let Some(value) = found else { break Stop::Flat };
+        let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
+        let y: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(n, g)| n - g).collect();
+        let curvature = dot(&s, &y);
+        // Only positive curvature keeps the approximation positive definite.
+        if curvature > 1e-10 * norm(&s) * norm(&y) {
+            if memory.len() == MEMORY {
+                memory.pop_front();
+            }
+            memory.push_back(Pair { s, y, curvature });
+        }
+        let flat = loss - value <= FLAT * loss.abs();
+        std::mem::swap(&mut x, &mut next);
+        std::mem::swap(&mut gradient, &mut next_gradient);
+        loss = value;
+        index += 1;
+        if flat {
+            break Stop::Flat;
+        }
+    };
+    Descent { parameters: kept.1, history, stop }
+}
+
+/// A step and the change of the gradient along it.
+struct Pair {
+    s: Vec<f64>,
+    y: Vec<f64>,
+    curvature: f64,
+}
+
+/// Minus the approximate inverse Hessian times the gradient, by the two-loop recursion.
+fn quasi_newton(gradient: &[f64], memory: &VecDeque<Pair>) -> Vec<f64> {
+    let mut q: Vec<f64> = gradient.iter().map(|g| -g).collect();
+    let mut alphas = Vec::with_capacity(memory.len());
+    for pair in memory.iter().rev() {
+        let alpha = dot(&pair.s, &q) / pair.curvature;
+        add(&mut q, -alpha, &pair.y);
+        alphas.push(alpha);
+    }
+    if let Some(last) = memory.back() {
+        let scale = last.curvature / dot(&last.y, &last.y);
+        q.iter_mut().for_each(|q| *q *= scale);
+    }
+    for (pair, alpha) in memory.iter().zip(alphas.into_iter().rev()) {
+        let beta = dot(&pair.y, &q) / pair.curvature;
+        add(&mut q, alpha - beta, &pair.s);
+    }
+    q
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn add(a: &mut [f64], factor: f64, b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += factor * b;
+    }
+}

@@ -1,0 +1,237 @@
+//! From samples to a correction: a beetle swarm finds the starts (Fig. 3), gradient descent finishes them, their mean is used.
+//!
+//! Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
+
+use super::correction::{Correction, Feature, Scaling, Valid};
+use super::descent::{Iteration, descend};
+use super::perceptron::{Activation, Batch, Loss, OUTPUTS, Scratch, Shape};
+use crate::estimate::swarm::{BeetleSwarm, Bounds, Budget, Generation, Objective, minimise};
+use crate::estimate::threads::in_order;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+/// Rows on which the swarm judges: drawn once, enough for a start.
+pub const SWARM_ROWS: usize = 256;
+/// Beetles search weights in -1..1: with standardised inputs no neuron is saturated there.
+const SWARM_BOUND: f64 = 1.0;
+
+/// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    pub sources: Vec<Vec<f64>>,
+    pub residual: Vec<[f64; OUTPUTS]>,
+}
+
+impl Samples {
+    pub fn rows(&self) -> usize {
+        self.residual.len()
+    }
+    pub fn pick(&self, rows: &[usize]) -> Self {
+        Self {
+            sources: rows.iter().map(|r| self.sources[*r].clone()).collect(),
+            residual: rows.iter().map(|r| self.residual[*r]).collect(),
+        }
+    }
+}
+
+/// How to train.
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    pub features: Vec<Feature>,
+    pub hidden: usize,
+    pub activation: Activation,
+    pub beetles: usize,
+    pub generations: usize,
+    /// Most iterations of the gradient training.
+    pub iterations: usize,
+    pub decay: f64,
+    /// Networks whose mean is the correction.
+    pub members: usize,
+    /// Share of the rows kept back from each member's training to stop it early.
+    pub keep_back: f64,
+    pub seed: u64,
+    pub jobs: usize,
+}
+
+/// Which part of the training a record is from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    Swarm,
+    Gradient,
+}
+
+/// One generation or iteration of the training.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course {
+    pub phase: Phase,
+    /// From 1; the swarm serves all members and has 0.
+    pub member: usize,
+    pub index: usize,
+    pub best: f64,
+    /// Root of the mean squared length of the error on the training rows, m, and on the rows kept back.
+    pub train_rms: f64,
+    pub check_rms: Option<f64>,
+    pub evaluations: u64,
+}
+
+/// Trains on all samples; `observe` sees each generation of the swarm. Panics without samples or features.
+pub fn train(samples: &Samples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<Course>) {
+    assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
+    let prepared = Prepared::new(samples, recipe);
+    let (starts, mut course) = prepared.swarm(observe);
+    let trained = in_order(recipe.jobs, recipe.members, |m| prepared.member(m, starts[m % starts.len()].clone()));
+    let mut members = Vec::with_capacity(recipe.members);
+    for (parameters, history) in trained {
+        members.push(parameters);
+        course.extend(history);
+    }
+    (prepared.correction(members), course)
+}
+
+/// Starts of `recipe.members` networks and the swarm's course; apart from [`finish`] so that several decays share one swarm.
+pub(super) struct Prepared<'a> {
+    recipe: &'a Recipe,
+    shape: Shape,
+    x: Vec<Vec<f64>>,
+    y: Vec<[f64; OUTPUTS]>,
+    inputs: Vec<Scaling>,
+    outputs: [Scaling; OUTPUTS],
+    valid: Vec<Valid>,
+}
+
+impl<'a> Prepared<'a> {
+    pub(super) fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
+        let sources = 1 + recipe.features.iter().map(|f| f.source).max().unwrap_or(0);
+        let column = |s: usize| samples.sources.iter().map(move |row| row[s]);
+        let valid = (0..sources)
+            .map(|s| Valid { lower: column(s).fold(f64::INFINITY, f64::min), upper: column(s).fold(f64::NEG_INFINITY, f64::max) })
+            .collect();
+        let inputs: Vec<Scaling> =
+            recipe.features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
+        let outputs = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
+        let scaled = |row: &Vec<f64>| recipe.features.iter().zip(&inputs).map(|(f, s)| s.scaled(f.of(row))).collect();
+        let x = samples.sources.iter().map(scaled).collect();
+        let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs_scaled(&outputs, k, r[k]))).collect();
+        let shape = Shape { inputs: recipe.features.len(), hidden: recipe.hidden, activation: recipe.activation };
+        Self { recipe, shape, x, y, inputs, outputs, valid }
+    }
+
+    /// The beetles' best positions, best first, and the course of the swarm.
+    pub(super) fn swarm(&self, mut observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<Course>) {
+        let mut rng = self.rng(0);
+        let rows =
+            if self.y.len() > SWARM_ROWS { draw(&mut rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
+        let batch = self.batch(&rows);
+        let loss = Loss { shape: self.shape, batch: &batch, decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64 };
+        let mut scratch = Scratch::new(self.shape);
+        let mut course: Vec<Course> = Vec::new();
+        let bounds = Bounds::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
+        let budget = Budget {
+            generations: self.recipe.generations,
+            evaluations: None,
+            target: None,
+            seed: rng.random(),
+            jobs: self.recipe.jobs,
+        };
+        let method = BeetleSwarm { beetles: self.recipe.beetles, ..BeetleSwarm::default() };
+        let outcome = minimise(&method, &Fitness(loss), &bounds, &budget, |generation, best| {
+            observe(generation);
+            let train_rms = match course.last() {
+                Some(last) if last.best == generation.best => last.train_rms,
+                _ => self.rms(loss.mean_squares(best, &mut scratch)),
+            };
+            course.push(Course {
+                phase: Phase::Swarm,
+                member: 0,
+                index: generation.index,
+                best: generation.best,
+                train_rms,
+                check_rms: None,
+                evaluations: generation.evaluations,
+            });
+        });
+        (outcome.elite.into_iter().map(|(_, position)| position).collect(), course)
+    }
+
+    /// Trains member `m` (from 0) from `start`.
+    pub(super) fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<Course>) {
+        let mut rng = self.rng(1 + m as u64);
+        let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
+        let (kept_back, rest) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
+        let batch = self.batch(&rest);
+        let check = self.batch(&kept_back);
+        let decay = self.recipe.decay;
+        let train = Loss { shape: self.shape, batch: &batch, decay };
+        let check = (check.rows() > 0).then_some(Loss { shape: self.shape, batch: &check, decay });
+        let descent = descend(train, check, start, self.recipe.iterations);
+        let course = |i: Iteration| Course {
+            phase: Phase::Gradient,
+            member: m + 1,
+            index: i.index,
+            best: i.loss,
+            train_rms: self.rms(i.train),
+            check_rms: i.check.map(|squares| self.rms(squares)),
+            evaluations: i.evaluations,
+        };
+        (descent.parameters, descent.history.into_iter().map(course).collect())
+    }
+
+    pub(super) fn correction(self, members: Vec<Vec<f64>>) -> Correction {
+        Correction {
+            shape: self.shape,
+            features: self.recipe.features.clone(),
+            inputs: self.inputs,
+            outputs: self.outputs,
+            valid: self.valid,
+            members,
+        }
+    }
+
+    /// A stream of its own for each purpose, so that none depends on how much another drew.
+    fn rng(&self, stream: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.recipe.seed);
+        rng.set_stream(stream);
+        rng
+    }
+
+    fn batch(&self, rows: &[usize]) -> Batch {
+        let x: Vec<Vec<f64>> = rows.iter().map(|r| self.x[*r].clone()).collect();
+        let y: Vec<[f64; OUTPUTS]> = rows.iter().map(|r| self.y[*r]).collect();
+        Batch::new(&x, &y)
+    }
+
+    /// Root of the mean squared length, m, from mean squares of the scaled outputs.
+    fn rms(&self, squares: [f64; OUTPUTS]) -> f64 {
+        squares.iter().zip(&self.outputs).map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
+    }
+}
+
+fn outputs_scaled(outputs: &[Scaling; OUTPUTS], k: usize, value: f64) -> f64 {
+    outputs[k].scaled(value)
+}
+
+/// The loss as the swarm sees it.
+struct Fitness<'a>(Loss<'a>);
+
+impl Objective for Fitness<'_> {
+    type Scratch = Scratch;
+    fn scratch(&self) -> Scratch {
+        Scratch::new(self.0.shape)
+    }
+    fn value(&self, x: &[f64], scratch: &mut Scratch) -> f64 {
+        self.0.value(x, scratch)
+    }
+}
+
+/// Draws `count` of `rows` rows without putting back: those drawn and the others, each in ascending order.
+fn draw(rng: &mut ChaCha8Rng, rows: usize, count: usize) -> (Vec<usize>, Vec<usize>) {
+    let mut order: Vec<usize> = (0..rows).collect();
+    for i in 0..count {
+        let j = rng.random_range(i..rows);
+        order.swap(i, j);
+    }
+    let mut rest = order.split_off(count);
+    order.sort_unstable();
+    rest.sort_unstable();
+    (order, rest)
+}

@@ -1,0 +1,187 @@
+//! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
+
+use calib::estimate::network::correction::{Scaling, Valid, features};
+use calib::estimate::network::perceptron::{Batch, Loss, Scratch};
+use calib::estimate::network::{Activation, Correction, Recipe, Samples, Shape, judge, train};
+use calib::table::{Network, Table};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+fn recipe(joints: usize) -> Recipe {
+    Recipe {
+        features: features(&vec![false; joints], false, false),
+        hidden: 12,
+        activation: Activation::Sigmoid,
+        beetles: 20,
+        generations: 30,
+        iterations: 200,
+        decay: 1.0,
+        members: 4,
+        keep_back: 0.1,
+        seed: 7,
+        jobs: 2,
+    }
+}
+
+/// Normal enough: the sum of twelve uniform numbers.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// Poses of a six-joint arm with a smooth remainder of about 0.9 mm (times `signal`) and noise of `noise` m per axis.
+fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> Samples {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut samples = Samples::default();
+    for _ in 0..rows {
+        let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
+        let reach = (q[1] + 0.3).sin() + (q[1] + q[2]).cos();
+        let lift = 0.5e-3 * (2.0 * q[1]).sin() + 0.4e-3 * reach * (q[2]).cos() + 0.2e-3 * q[4].sin() * q[3].cos();
+        let turn = 0.45e-3 * (2.0 * q[0] + 0.4).sin() + 0.2e-3 * q[3].sin();
+        let clean = [q[0].cos() * lift - q[0].sin() * turn, q[0].sin() * lift + q[0].cos() * turn, 1.2 * lift - 0.2e-3 * q[4]];
+        samples.residual.push(clean.map(|r| signal * r + noise * normal(&mut rng)));
+        samples.sources.push(q);
+    }
+    samples
+}
+
+fn mean_error(samples: &Samples, correction: Option<&Correction>) -> f64 {
+    let left = samples.sources.iter().zip(&samples.residual).map(|(q, r)| {
+        let delta = correction.map_or([0.0; 3], |correction| correction.at(q).delta);
+        (0..3).map(|k| (r[k] - delta[k]).powi(2)).sum::<f64>().sqrt()
+    });
+    left.sum::<f64>() / samples.rows() as f64
+}
+
+#[test]
+fn the_gradient_is_that_of_central_differences() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for activation in [Activation::Sigmoid, Activation::Tanh] {
+        // 130 rows: two full blocks and a rest.
+        let x: Vec<Vec<f64>> = (0..130).map(|_| (0..4).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
+        let y: Vec<[f64; 3]> = (0..130).map(|_| std::array::from_fn(|_| rng.random_range(-2.0..2.0))).collect();
+        let batch = Batch::new(&x, &y);
+        let shape = Shape { inputs: 4, hidden: 5, activation };
+        let loss = Loss { shape, batch: &batch, decay: 0.7 };
+        let mut scratch = Scratch::new(shape);
+        let mut w: Vec<f64> = (0..shape.parameters()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let mut gradient = vec![0.0; w.len()];
+        let value = loss.gradient(&w, &mut gradient, &mut scratch);
+        assert!((value - loss.value(&w, &mut scratch)).abs() < 1e-14);
+        for i in 0..w.len() {
+            let step = 1e-5;
+            let at = w[i];
+            w[i] = at + step;
+            let up = loss.value(&w, &mut scratch);
+            w[i] = at - step;
+            let down = loss.value(&w, &mut scratch);
+            w[i] = at;
+            let difference = (up - down) / (2.0 * step);
+            assert!((difference - gradient[i]).abs() < 1e-9, "{activation:?} {i}: {difference} {}", gradient[i]);
+        }
+        // The single-row function and the batched one are the same network.
+        let mut squares = 0.0;
+        for (x, y) in x.iter().zip(&y) {
+            squares += shape.at(&w, x).iter().zip(y).map(|(o, y)| (o - y) * (o - y)).sum::<f64>();
+        }
+        assert!((squares / 130.0 - loss.mean_squares(&w, &mut scratch).iter().sum::<f64>()).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
+    let noise = 0.25e-3;
+    let training = arm(200, 1.0, noise, 10);
+    let unseen = arm(400, 1.0, noise, 90);
+    let (correction, course) = train(&training, &recipe(6), |_| {});
+    let held_out = mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None);
+    let seen = mean_error(&training, Some(&correction)) / mean_error(&training, None);
+    println!("held-out ratio {held_out:.3}, training ratio {seen:.3}");
+    // Noise alone leaves 1.596 * 0.25 mm of 1.06 mm: 0.376.
+    assert!((0.376..0.60).contains(&held_out), "{held_out}");
+    assert!(seen < held_out && seen > 0.25, "{seen}");
+    for member in 1..=4 {
+        let own: Vec<_> = course.iter().filter(|c| c.member == member).collect();
+        assert!(own.len() > 10 && own.last().unwrap().best < own[0].best && own[0].check_rms.is_some());
+    }
+    assert_eq!(course.iter().filter(|c| c.member == 0).count(), 31);
+}
+
+#[test]
+fn training_is_the_same_on_one_thread_and_on_three() {
+    let samples = arm(90, 1.0, 0.2e-3, 3);
+    let on = |jobs| train(&samples, &Recipe { jobs, ..recipe(6) }, |_| {});
+    let judged = |jobs| judge(&samples, &Recipe { jobs, members: 2, ..recipe(6) }, &[0.5, 5.0], 3, |_, _| {});
+    assert_eq!(on(1), on(3));
+    assert_eq!(judged(1), judged(3));
+}
+
+#[test]
+fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
+    let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
+    let decays = [0.3, 3.0];
+    let verdict = judge(&arm(150, 1.0, 0.2e-3, 4), &cheap, &decays, 5, |_, _| {});
+    assert!(verdict.helps() && verdict.after < 0.8 * verdict.before, "{verdict:?}");
+    let refused = (0..20).filter(|seed| {
+        let recipe = Recipe { seed: *seed, ..cheap.clone() };
+        !judge(&arm(120, 0.0, 0.5e-3, 200 + seed), &recipe, &decays, 5, |_, _| {}).helps()
+    });
+    assert!(refused.count() >= 19, "useless networks pass");
+}
+
+#[test]
+fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
+    let (correction, _) = train(&arm(120, 1.0, 0.1e-3, 5), &recipe(6), |_| {});
+    let mut q = vec![0.1; 6];
+    q[1] = correction.valid[1].upper;
+    let edge = correction.at(&q);
+    assert_eq!(edge.share, 1.0);
+    let margin = 0.1 * (correction.valid[1].upper - correction.valid[1].lower);
+    let length = |d: [f64; 3]| d.iter().map(|d| d * d).sum::<f64>().sqrt();
+    let mut last = edge;
+    for step in 1..=20 {
+        q[1] = correction.valid[1].upper + margin * f64::from(step) / 20.0;
+        let now = correction.at(&q);
+        assert!(now.share < last.share && length(now.delta) <= length(last.delta), "step {step}");
+        // No jump: the smoothstep falls by at most 1.5/20 a step.
+        assert!(last.share - now.share < 0.08);
+        last = now;
+    }
+    assert_eq!((last.share, last.delta), (0.0, [0.0; 3]));
+    q[1] = f64::NAN;
+    assert_eq!(correction.at(&q).share, 0.0);
+    assert_eq!(correction.at(&q[..3]).share, 0.0);
+}
+
+#[test]
+fn a_correction_comes_back_from_its_table() {
+    let prismatic = [true, false, false];
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let features = features(&prismatic, true, true);
+    let shape = Shape { inputs: features.len(), hidden: 4, activation: Activation::Tanh };
+    let mut number = |from: f64, to: f64| rng.random_range(from..to);
+    let mut scaling = || Scaling { mean: number(-1.0, 1.0), scale: number(0.1, 2.0) };
+    let correction = Correction {
+        shape,
+        inputs: features.iter().map(|_| scaling()).collect(),
+        outputs: [scaling(), scaling(), scaling()],
+        valid: (0..4).map(|_| Valid { lower: number(-2.0, -1.0), upper: number(1.0, 2.0) }).collect(),
+        members: (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect(),
+        features,
+    };
+    assert_eq!(correction.features.len(), 6);
+    let table = Network::of(&correction, &prismatic);
+    let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&prismatic).unwrap().unwrap();
+    assert_eq!((&back.features, &back.members, back.shape), (&correction.features, &correction.members, correction.shape));
+    for _ in 0..100 {
+        let q: Vec<f64> = (0..4).map(|_| number(-2.5, 2.5)).collect();
+        let (there, here) = (correction.at(&q), back.at(&q));
+        // mm and m differ in the last bit only.
+        assert!((0..3).all(|k| (there.delta[k] - here.delta[k]).abs() <= 1e-12), "{there:?} {here:?}");
+    }
+    let empty = Network::from_frame(&Network(Vec::new()).to_frame().unwrap()).unwrap();
+    assert!(empty.correction(&prismatic).unwrap().is_none());
+    let mut holed = table;
+    holed.0.retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
+    let message = holed.correction(&prismatic).unwrap_err().to_string();
+    assert!(message.contains("bias"), "{message}");
+}
