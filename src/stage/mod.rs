@@ -6,8 +6,6 @@ pub mod ingest;
 mod report;
 mod robot;
 pub mod split;
-mod robot;
-pub mod split;
 mod stiffness;
 mod validate;
 

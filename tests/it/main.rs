@@ -2,8 +2,6 @@
 
 mod arms;
 mod desk;
-mod arms;
-mod desk;
 mod effects;
 mod fixture;
 mod identify;
