@@ -10,6 +10,7 @@ mod layers;
 mod network;
 mod report;
 mod robot;
+mod robot_faults;
 mod split;
 mod store;
 mod swarm;
