@@ -5,6 +5,7 @@ mod identify;
 pub mod ingest;
 mod report;
 mod robot;
+mod simulate;
 pub mod split;
 mod stiffness;
 mod validate;
@@ -12,6 +13,7 @@ mod validate;
 pub use identify::{Identify, IdentifyReads};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
+pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
 pub use validate::{Validate, ValidateReads};
 

@@ -4,7 +4,7 @@ use super::arm::{Arm, Posture};
 use super::effect::{Motion, Physical, State};
 use super::matrix::{self, Vector};
 
-/// Bodies with weight, in the base frame: centre, mass in kg, and the link that carries it.
+/// Bodies with weight, in the base frame: the link that carries it (the payload: one past the last), mass in kg, centre.
 #[derive(Debug, Clone)]
 pub struct Loads {
     bodies: Vec<(usize, f64, Vector)>,
@@ -18,7 +18,8 @@ impl Loads {
             .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
             .collect();
         if let Some(hand) = posture.frames.last() {
-            bodies.push((arm.links.len() - 1, payload, matrix::place(hand, arm.payload_centre)));
+            // Beyond the last link: it bends that link too.
+            bodies.push((arm.links.len(), payload, matrix::place(hand, arm.payload_centre)));
         }
         Loads { bodies, gravity: arm.gravity }
     }

@@ -5,7 +5,8 @@ use crate::twin::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Half a gap either way: by the direction of approach where the load is light, by the load where it is not.
+/// Half a gap either way: by the direction of approach where the load is light, by the load where it is not. Teeth and bearings
+/// under load also give back less than they took: the loop opens with the torque.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {
@@ -13,6 +14,9 @@ pub struct Backlash {
     pub joint: usize,
     /// The whole gap, arcsec.
     pub gap_arcsec: f64,
+    /// Growth of the gap with the torque, arcsec per Nm: the hysteresis of the loaded gear.
+    #[serde(default)]
+    pub arcsec_per_nm: f64,
     /// The torque that pushes the teeth to one side whatever the direction, Nm; 0: direction alone decides.
     #[serde(default)]
     pub closing_nm: f64,
@@ -27,7 +31,9 @@ impl Act for Backlash {
             // The link trails the motor by half the gap.
             -state.row.direction[self.joint - 1]
         };
-        motion.joint[self.joint - 1] += 0.5 * self.gap_arcsec * ARCSEC * side;
+        // Hysteresis follows the direction even where the load has closed the gap.
+        let loop_arcsec = self.arcsec_per_nm * torque.abs() * -state.row.direction[self.joint - 1];
+        motion.joint[self.joint - 1] += 0.5 * ARCSEC * (self.gap_arcsec * side + loop_arcsec);
     }
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
@@ -36,6 +42,7 @@ impl Act for Backlash {
         let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
         vec![
             true_value("backlash", &tag, place.clone(), "gap", "arcsec", self.gap_arcsec),
+            true_value("backlash", &tag, place.clone(), "growth", "arcsec/Nm", self.arcsec_per_nm),
             true_value("backlash", &tag, place, "closing", "Nm", self.closing_nm),
         ]
     }

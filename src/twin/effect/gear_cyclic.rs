@@ -1,11 +1,13 @@
 //! Run-out of gears and encoders: joint errors that repeat with every turn of the joint or of the motor.
+//!
+//! A mesh is also softer with fewer teeth in contact, so that the wind-up itself repeats: that part grows with the torque.
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `amplitude sin(order q + phase)`.
+/// `(amplitude + arcsec_per_nm torque) sin(order q + phase)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GearCyclic {
@@ -14,7 +16,11 @@ pub struct GearCyclic {
     /// Periods per turn of the joint.
     pub order: f64,
     /// arcsec.
+    #[serde(default)]
     pub amplitude_arcsec: f64,
+    /// Growth of the amplitude with the load, arcsec per Nm.
+    #[serde(default)]
+    pub arcsec_per_nm: f64,
     #[serde(default)]
     pub phase_deg: f64,
 }
@@ -50,13 +56,20 @@ fn sine_and_cosine(effect: &'static str, joint: usize, order: f64, amplitude_arc
 impl Act for GearCyclic {
     fn act(&self, state: &State, motion: &mut Motion) {
         let angle = state.row.command[self.joint - 1];
-        motion.joint[self.joint - 1] += ripple(self.amplitude_arcsec, self.order, angle, self.phase_deg);
+        let amplitude = self.amplitude_arcsec + self.arcsec_per_nm * state.torque[self.joint - 1];
+        motion.joint[self.joint - 1] += ripple(amplitude, self.order, angle, self.phase_deg);
     }
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
     fn truth(&self) -> Vec<TrueValue> {
-        sine_and_cosine("gear_cyclic", self.joint, self.order, self.amplitude_arcsec, self.phase_deg)
+        let mut out = sine_and_cosine("gear_cyclic", self.joint, self.order, self.amplitude_arcsec, self.phase_deg);
+        if self.arcsec_per_nm != 0.0 {
+            let (tag, place, number) =
+                (format!("j{}", self.joint), format!("joint {}", self.joint), format!("growth{}", self.order));
+            out.push(true_value("gear_cyclic", &tag, place, &number, "arcsec/Nm", self.arcsec_per_nm));
+        }
+        out
     }
 }
 

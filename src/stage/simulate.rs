@@ -1,0 +1,221 @@
+//! `simulate`: a recording from a twin of the robot whose truth is known.
+
+use crate::error::{Error, Fault, Result};
+use crate::robot::description::{JointKind, RobotDescription};
+use crate::stage::{Context, Stage, reads, writes};
+use crate::table::{Recording, Robot, Truth, TruthRow};
+use crate::twin::effect::{Physical, TrueValue};
+use crate::twin::plan::{Block, Climate, Poses};
+use crate::twin::recorder::{Experiment, Motors, Shot};
+use crate::twin::tracker::Tracker;
+use crate::twin::truth::TrueRobot;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Whether the effects listed in `effects` act.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Remainder {
+    /// They do.
+    #[default]
+    All,
+    /// The twin is its `truth` and nothing else: rigid errors, gears and linear wind-up.
+    None,
+}
+
+/// Records an experiment on a twin of the robot.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Simulate {
+    /// What the true robot is, against the robot file.
+    #[serde(default)]
+    pub truth: TrueRobot,
+    /// What acts on it besides; the name of an effect and its numbers each.
+    #[serde(default)]
+    pub effects: Vec<Physical>,
+    /// `none` switches `effects` off.
+    #[serde(default)]
+    pub remainder: Remainder,
+    /// Where the tracker stands and how well it measures.
+    #[serde(default)]
+    pub tracker: Tracker,
+    /// The motors as the controller logs them.
+    #[serde(default)]
+    pub motors: Motors,
+    /// Standard deviation of each joint from move to move, arcsec; empty: none.
+    #[serde(default)]
+    pub repeatability_arcsec: Vec<f64>,
+    /// Which poses may be measured.
+    #[serde(default)]
+    pub poses: Poses,
+    /// Runs of points in the order of measurement; their labels become the column `usage`.
+    pub blocks: Vec<Block>,
+    /// The clock and the temperature.
+    #[serde(default)]
+    pub climate: Climate,
+    /// Seed of poses and noise; missing: from the pipeline's seed.
+    #[serde(default)]
+    pub seed: Option<u64>,
+}
+
+reads! {
+    pub struct SimulateReads {
+        robot: Robot,
+    }
+}
+
+writes! {
+    pub struct SimulateWrites {
+        recording: Recording,
+        truth: Truth,
+    }
+}
+
+impl Stage for Simulate {
+    const NAME: &'static str = "simulate";
+    const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = SimulateReads;
+    type Writes = SimulateWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        let mut fault = |place: &str, message: &str| faults.push(Fault::new(place, message));
+        if self.blocks.iter().all(|block| block.points == 0) {
+            fault("blocks", "expected at least one block with points, e.g. [{usage: fit, points: 50}]");
+        }
+        for (index, block) in self.blocks.iter().enumerate() {
+            if !(block.payload_kg.is_finite() && block.payload_kg >= 0.0) {
+                fault(&format!("blocks[{index}].payload_kg"), "expected a mass, 0 or more");
+            }
+        }
+        for (index, range) in self.poses.range_deg.iter().enumerate() {
+            if !(range[0].is_finite() && range[1].is_finite() && range[0] <= range[1]) {
+                fault(&format!("poses.range_deg[{index}]"), "expected [lower, upper], lower first");
+            }
+        }
+        if !(self.tracker.coverage > 0.0 && self.tracker.noise_um >= 0.0 && self.tracker.noise_um_per_m >= 0.0) {
+            fault("tracker", "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2");
+        }
+        let pace = self.climate.pace_s;
+        if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && self.climate.warm_up_h > 0.0) {
+            fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h above 0");
+        }
+        faults
+    }
+
+    fn run(&self, reads: SimulateReads, context: &Context) -> Result<SimulateWrites> {
+        let robot = reads.robot.to_description()?;
+        let place = format!("{}.with", context.id);
+        let faults = self.against(&robot);
+        if !faults.is_empty() {
+            let named = |fault: Fault| Fault::new(format!("{place}.{}", fault.place), fault.message);
+            return Err(Error::Spec(faults.into_iter().map(named).collect()));
+        }
+        let effects = self.acting();
+        let experiment = Experiment {
+            robot: &robot,
+            truth: &self.truth,
+            effects,
+            tracker: &self.tracker,
+            motors: &self.motors,
+            repeatability_arcsec: &self.repeatability_arcsec,
+            poses: &self.poses,
+            blocks: &self.blocks,
+            climate: &self.climate,
+            seed: self.seed.unwrap_or(context.seed),
+        };
+        let points: usize = self.blocks.iter().map(|block| block.points).sum();
+        context.services.begin("measuring the twin", Some(points as u64), "points");
+        let mut done = 0;
+        let shots = experiment
+            .record(|| {
+                done += 1;
+                context.services.advance(done, "");
+            })
+            .map_err(|message| Error::spec(place, message))?;
+        context.services.note(format!("{points} points measured on a twin with {} effects besides its truth", effects.len()));
+        Ok(SimulateWrites {
+            recording: self.recording(&robot, &shots),
+            truth: truth(&robot, &self.truth, &self.tracker, effects),
+        })
+    }
+}
+
+impl Simulate {
+    /// The effects that act.
+    fn acting(&self) -> &[Physical] {
+        match self.remainder {
+            Remainder::All => &self.effects,
+            Remainder::None => &[],
+        }
+    }
+
+    /// Settings that this robot cannot have.
+    fn against(&self, robot: &RobotDescription) -> Vec<Fault> {
+        let joints = robot.joints.len();
+        let mut faults: Vec<Fault> =
+            self.truth.faults(robot).into_iter().map(|(at, what)| Fault::new(format!("truth.{at}"), what)).collect();
+        for (index, effect) in self.effects.iter().enumerate() {
+            faults.extend(effect.fault(joints).map(|what| Fault::new(format!("effects[{index}]"), what)));
+        }
+        for (name, list) in [("motors.sign", &self.motors.sign), ("repeatability_arcsec", &self.repeatability_arcsec)] {
+            if !list.is_empty() && list.len() != joints {
+                faults.push(Fault::new(name, format!("has {} numbers, the robot {joints} joints", list.len())));
+            }
+        }
+        for (joint, factor) in self.truth.compliance_rad_a.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
+            let at = format!("truth.compliance_rad_a[{joint}]");
+            let known = robot.joints.get(joint).is_some_and(|j| j.reduction_ratio.is_some() && j.motor_constant.is_some());
+            if !known {
+                faults.push(Fault::new(at, "needs reduction_ratio and motor_constant of this joint in the robot file"));
+            } else if factor.signum() == self.motors.sign.get(joint).copied().unwrap_or(1.0).signum() {
+                let why = "has the sign of motors.sign: the gear would wind up against its load; the signs must differ";
+                faults.push(Fault::new(at, why));
+            }
+        }
+        faults
+    }
+
+    fn recording(&self, robot: &RobotDescription, shots: &[Shot]) -> Recording {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        let mut ids = Vec::with_capacity(shots.len());
+        for shot in shots {
+            let usage = self.blocks[shot.block].usage.as_str();
+            let count = counts.entry(usage).or_default();
+            *count += 1;
+            ids.push(format!("{usage}-{count:04}"));
+        }
+        Recording {
+            joints: robot.joints.len(),
+            prismatic: robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+            sequence: (0..shots.len() as i64).collect(),
+            point_id: ids,
+            usage: shots.iter().map(|shot| Some(self.blocks[shot.block].usage.clone())).collect(),
+            q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+            position: shots.iter().map(|shot| shot.position).collect(),
+            position_sigma: Some(shots.iter().map(|shot| [shot.sigma; 3]).collect()),
+            time: Some(shots.iter().map(|shot| shot.time_s).collect()),
+            payload: Some(shots.iter().map(|shot| self.blocks[shot.block].payload_kg).collect()),
+            temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
+            current: Some(shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
+            direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+        }
+    }
+}
+
+/// The true numbers in canonical names, the names that identified parameters have; effects named twice are numbered.
+fn truth(robot: &RobotDescription, truth: &TrueRobot, tracker: &Tracker, effects: &[Physical]) -> Truth {
+    let values = truth.values(robot).into_iter().chain(tracker.values()).chain(effects.iter().flat_map(Physical::truth));
+    let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+    let rows = values.map(|TrueValue { name, effect, place, unit, value }| {
+        let count = seen.entry(name.clone()).or_default();
+        *count += 1;
+        let name = if *count == 1 { name } else { format!("{name}#{count}") };
+        TruthRow { name, effect: effect.into(), place, unit: unit.into(), value }
+    });
+    let mut rows: Vec<TruthRow> = rows.collect();
+    rows.sort_by(|a, b| a.name.cmp(&b.name));
+    Truth(rows)
+}

@@ -1,0 +1,301 @@
+//! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
+
+use calib::error::Result;
+use calib::robot::description::{JointDescription, JointKind, RobotDescription};
+use calib::robot::import::{Text, read_calib};
+use calib::stage::{Context, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Source, Stage};
+use calib::table::Robot;
+use calib::twin::arm::Arm;
+use calib::twin::effect::{Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Motion, Physical};
+use calib::twin::noise::{Noise, Purpose};
+use calib::twin::statics::{Equilibrium, Row, settle};
+use calib::twin::tracker::Tracker;
+use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
+
+const ARCSEC: f64 = PI / 648_000.0;
+
+fn sr210d() -> RobotDescription {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let text = std::fs::read_to_string(&path).expect("the pipeline's robot file");
+    read_calib(Text { label: "robot.yaml", text: &text }, None).expect("a good robot file").robot
+}
+
+/// One joint with axis -y at the origin and 2 m of massless arm along x, 100 kg at its end: a weight turns it by -m g r cos q.
+fn lever() -> RobotDescription {
+    RobotDescription {
+        name: "lever".into(),
+        joints: vec![JointDescription {
+            name: "J1".into(),
+            kind: JointKind::Revolute,
+            axis: [0.0, -1.0, 0.0],
+            point: [0.0; 3],
+            limits: Some([-1.0, 1.0]),
+            reduction_ratio: Some(200.0),
+            motor_constant: Some(0.5),
+            mass: Some(0.0),
+            centre: Some([0.0; 3]),
+        }],
+        tool: [2.0, 0.0, 0.0],
+        tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        couplings: vec![],
+        payload_mass: 100.0,
+        payload_centre: [2.0, 0.0, 0.0],
+        gravity: [0.0, 0.0, -10.0],
+    }
+}
+
+fn row(q: &[f64], payload_kg: f64) -> Row {
+    let direction = vec![1.0; q.len()];
+    Row { command: q.to_vec(), drive: q.to_vec(), direction, time_s: 0.0, temperature_c: 20.0, payload_kg }
+}
+
+fn rest(robot: &RobotDescription, effects: &[Physical], q: &[f64], payload_kg: f64) -> Equilibrium {
+    settle(&Arm::new(robot, &TrueRobot::default()), &row(q, payload_kg), effects)
+}
+
+fn tool_mm(robot: &RobotDescription, truth: &TrueRobot, q: &[f64]) -> [f64; 3] {
+    let arm = Arm::new(robot, truth);
+    arm.posture(&truth.drive(robot, q), &Motion::none(q.len())).tool.map(|x| 1e3 * x)
+}
+
+fn assert_near(found: [f64; 3], expected: [f64; 3], within: f64) {
+    let apart = (0..3).map(|i| (found[i] - expected[i]).abs()).fold(0.0, f64::max);
+    assert!(apart <= within, "{found:?} is {apart} from {expected:?}");
+}
+
+/// The point is (1542, 50, 1340) from joint 2, (260, 50, 30) from joint 5 and (50, 30) across axes 4 and 6; quarter turns by hand.
+#[test]
+fn quarter_turns_put_the_tool_where_paper_and_pencil_do() {
+    let robot = sr210d();
+    let turned = |joints: &[usize]| {
+        let q: Vec<f64> = (1..=6).map(|joint| if joints.contains(&joint) { FRAC_PI_2 } else { 0.0 }).collect();
+        tool_mm(&robot, &TrueRobot::default(), &q)
+    };
+    assert_near(turned(&[]), [1854.0, 50.0, 1340.0], 1e-9);
+    assert_near(turned(&[1]), [-50.0, 1854.0, 1340.0], 1e-9);
+    assert_near(turned(&[2]), [312.0 - 1340.0, 50.0, 1542.0], 1e-9);
+    assert_near(turned(&[3]), [312.0 - 265.0, 50.0, 1075.0 + 1542.0], 1e-9);
+    assert_near(turned(&[4]), [1854.0, -30.0, 1360.0], 1e-9);
+    assert_near(turned(&[5]), [1594.0 - 30.0, 50.0, 1310.0 + 260.0], 1e-9);
+    assert_near(turned(&[6]), [1854.0, -30.0, 1360.0], 1e-9);
+    assert_near(turned(&[1, 2]), [-50.0, 312.0 - 1340.0, 1542.0], 1e-9);
+}
+
+#[test]
+fn errors_of_lengths_gears_and_couplings_move_the_tool_as_they_should() {
+    let robot = sr210d();
+    let longer = LinkError { link: 2, shift_mm: [0.0, 0.0, 0.5], tilt_arcsec: [0.0; 3] };
+    let truth = TrueRobot { links: vec![longer], ..TrueRobot::default() };
+    assert_near(tool_mm(&robot, &truth, &[0.0; 6]), [1854.0, 50.0, 1340.5], 1e-9);
+    // The half millimetre lies on the upper arm, which joint 2 lays back along -x.
+    assert_near(tool_mm(&robot, &truth, &[0.0, FRAC_PI_2, 0.0, 0.0, 0.0, 0.0]), [311.5 - 1340.0, 50.0, 1542.0], 1e-9);
+
+    let tilted = LinkError { link: 1, shift_mm: [0.0; 3], tilt_arcsec: [0.0, 0.0, 10.0] };
+    let truth = TrueRobot { links: vec![tilted], ..TrueRobot::default() };
+    let a = 10.0 * ARCSEC;
+    let expected = [312.0 + 1542.0 * a.cos() - 50.0 * a.sin(), 50.0 * a.cos() + 1542.0 * a.sin(), 1340.0];
+    assert_near(tool_mm(&robot, &truth, &[0.0; 6]), expected, 1e-9);
+
+    let truth = TrueRobot {
+        ratio: vec![1.0, 1.0, 1.0, 1.0, 1.01, 1.02],
+        couplings: vec![CouplingError { moved: 6, by: 5, error: 0.1 }],
+        offset_deg: vec![0.0, 0.0, 0.0, 0.0, 0.0, 3.0],
+        ..TrueRobot::default()
+    };
+    let drive = truth.drive(&robot, &[0.0, 0.0, 0.0, 0.0, 0.5, 0.2]);
+    assert!((drive[4] - 0.505).abs() < 1e-15);
+    assert!((drive[5] - (3.0 * PI / 180.0 + 1.02 * 0.2 + 0.1 * 1.01 * 0.5)).abs() < 1e-15);
+}
+
+#[test]
+fn a_mass_on_a_compliant_joint_sags_until_torque_and_wind_up_agree() {
+    let spring = Physical::JointCompliance(JointCompliance { joint: 1, rad_per_nm: 1e-5 });
+    let found = rest(&lever(), &[spring], &[0.0], 100.0);
+    // 100 kg, 10 m/s2, 2 m: sag = 0.02 rad cos(sag); the first two terms of its series leave 2e-9.
+    let mut sag: f64 = 0.0;
+    for _ in 0..50 {
+        sag = 0.02 * sag.cos();
+    }
+    assert!((sag - (0.02 - 0.02f64.powi(3) / 2.0)).abs() < 1e-8);
+    assert_near(found.posture.tool, [2.0 * sag.cos(), 0.0, -2.0 * sag.sin()], 1e-13);
+    assert!((found.torque[0] + 2000.0 * sag.cos()).abs() < 1e-9);
+}
+
+#[test]
+fn a_beam_bends_by_the_cantilever_formula() {
+    let beam = Physical::LinkCompliance(LinkCompliance { link: 1, bending_rad_per_nm: 3e-7, torsion_rad_per_nm: 0.0 });
+    let found = rest(&lever(), &[beam], &[0.0], 100.0);
+    // F L^3 / (3 EI) with L/EI = 3e-7: 1000 N * 4 m2 * 3e-7 / 3.
+    assert_near(found.posture.tool, [2.0, 0.0, -4e-4], 1e-9);
+}
+
+#[test]
+fn a_foundation_tilts_towards_the_load() {
+    let base = BaseCompliance { rad_per_nm: [1e-8, 1e-8], pivot_mm: [0.0, 0.0, -1000.0] };
+    let found = rest(&lever(), &[Physical::BaseCompliance(base)], &[0.0], 100.0);
+    // 2000 Nm tilt by 2e-5 rad about 1 m below: the tool goes down by 2 m of it and forwards by 1 m of it.
+    assert_near(found.posture.tool, [2.0 + 2e-5, 0.0, -4e-5], 1e-8);
+}
+
+#[test]
+fn a_joint_trails_by_half_its_gap_and_more_under_load() {
+    let gap = |arcsec_per_nm| [Physical::Backlash(Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm, closing_nm: 0.0 })];
+    let turned = |effects: &[Physical]| rest(&lever(), effects, &[0.0], 100.0).motion.joint[0] / ARCSEC;
+    assert!((turned(&gap(0.0)) + 10.0).abs() < 1e-9);
+    assert!((turned(&gap(0.01)) + 20.0).abs() < 1e-6);
+    let closed = Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm: 0.0, closing_nm: 500.0 };
+    assert!((turned(&[Physical::Backlash(closed)]) + 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_gear_ripple_follows_the_reported_angle() {
+    let ripple = GearCyclic { joint: 1, order: 3.0, amplitude_arcsec: 12.0, arcsec_per_nm: 0.0, phase_deg: 30.0 };
+    let found = rest(&lever(), &[Physical::GearCyclic(ripple)], &[PI / 9.0], 0.0);
+    assert!((found.motion.joint[0] - 12.0 * ARCSEC).abs() < 1e-15, "sin(3 * 20 deg + 30 deg) = 1");
+}
+
+#[test]
+fn tracker_noise_has_the_stated_size() {
+    let tracker = Tracker { noise_um: 10.0, noise_um_per_m: 2.5, coverage: 2.0, ..Tracker::default() };
+    let point = [0.0, 4.0, 3.0];
+    // (10 + 2.5 * 5) / 2.
+    assert!((tracker.sigma(point) - 11.25e-6).abs() < 1e-18);
+    let mut noise = Noise::new(7, Purpose::Tracker);
+    let draws: Vec<f64> = (0..20_000).map(|_| tracker.measure(point, &mut noise)[1] - 4.0).collect();
+    let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+    let sigma = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64).sqrt();
+    // Four standard errors of a mean and of a standard deviation of 20,000 draws.
+    assert!(mean.abs() < 4.0 * 11.25e-6 / 20_000f64.sqrt(), "mean {mean}");
+    assert!((sigma / 11.25e-6 - 1.0).abs() < 4.0 / 40_000f64.sqrt(), "sigma {sigma}");
+}
+
+struct Quiet;
+impl Services for Quiet {
+    fn open(&self, _file: &RawFile) -> Result<Source> {
+        panic!("simulate opens no file")
+    }
+    fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {
+        panic!("simulate streams nothing")
+    }
+    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
+    fn advance(&self, _done: u64, _message: &str) {}
+    fn note(&self, _line: String) {}
+    fn warn(&self, _line: String) {}
+}
+
+fn simulate(settings: &Simulate, seed: u64) -> Result<SimulateWrites> {
+    let robot = Robot::from_description(&sr210d());
+    settings.clone().run(SimulateReads { robot }, &Context { id: "simulate", seed, jobs: 1, services: &Quiet })
+}
+
+fn settings() -> Simulate {
+    let text = "
+truth: {ratio: [1, 1.0013, 1, 1, 1, 1], compliance_rad_a: [0, 1.89e-5, -2.49e-5, 0, 0, 0]}
+effects:
+  - gear_cyclic: {joint: 3, order: 17, amplitude_arcsec: 12, phase_deg: 30}
+  - holding_friction: {joint: 2, torque_nm: 60}
+motors: {sign: [1, -1, 1, 1, 1, 1]}
+poses: {range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]], floor_mm: 300, clearance_mm: 1000}
+blocks: [{usage: fit, points: 12}, {usage: check, points: 8, payload_kg: 210}]
+";
+    serde_saphyr::from_str(text).expect("good settings")
+}
+
+#[test]
+fn a_seed_gives_one_recording_and_another_seed_another() {
+    let (first, again, other) = (simulate(&settings(), 5), simulate(&settings(), 5), simulate(&settings(), 6));
+    let (first, again, other) = (first.expect("runs"), again.expect("runs"), other.expect("runs"));
+    assert_eq!(first.recording, again.recording);
+    assert_eq!(first.truth, again.truth);
+    assert_ne!(first.recording.q, other.recording.q);
+}
+
+#[test]
+fn without_its_remainder_a_twin_is_its_parameters() {
+    let without = Simulate { remainder: Remainder::None, ..settings() };
+    let bare = Simulate { effects: vec![], ..settings() };
+    let (all, without, bare) = (simulate(&settings(), 5), simulate(&without, 5), simulate(&bare, 5));
+    let (all, without, bare) = (all.expect("runs"), without.expect("runs"), bare.expect("runs"));
+    assert_eq!(without.recording, bare.recording);
+    assert_eq!(all.recording.q, without.recording.q, "the plan does not depend on the effects");
+    assert_ne!(all.recording.position, without.recording.position);
+    let effects = |table: &calib::table::Truth| table.0.iter().map(|row| row.effect.clone()).collect::<Vec<_>>();
+    assert!(effects(&all.truth).iter().any(|effect| effect == "gear_cyclic"));
+    assert!(!effects(&without.truth).iter().any(|effect| effect == "gear_cyclic" || effect == "holding_friction"));
+    let ratio = without.truth.0.iter().find(|row| row.name == "reduction_ratio.j2").expect("a true ratio");
+    assert!((ratio.value - 0.0013).abs() < 1e-12);
+}
+
+#[test]
+fn a_plan_keeps_to_limits_floor_and_blocks() {
+    let settings = settings();
+    let recording = simulate(&settings, 5).expect("runs").recording;
+    assert_eq!(recording.rows(), 20);
+    let robot = sr210d();
+    for index in 0..recording.rows() {
+        let q = recording.q(index);
+        for (angle, range) in q.iter().zip(&settings.poses.range_deg) {
+            assert!((range[0]..=range[1]).contains(&angle.to_degrees()));
+        }
+        let tool = tool_mm(&robot, &settings.truth, q);
+        assert!(tool[2] >= 295.0 && tool[0].hypot(tool[1]) >= 995.0, "{tool:?}");
+    }
+    let payload = recording.payload.expect("a payload");
+    assert_eq!((payload[11], payload[12]), (0.0, 210.0));
+    assert_eq!(recording.usage[12].as_deref(), Some("check"));
+    assert_eq!(recording.point_id[12], "check-0001");
+    let time = recording.time.expect("a clock");
+    assert!(time.windows(2).all(|pair| pair[1] > pair[0]));
+}
+
+/// Wind-up is the factor times the current (Eq. 28), and the current is the holding torque through gear and motor.
+#[test]
+fn currents_carry_the_load_in_the_controllers_sign() {
+    let settings = Simulate { remainder: Remainder::None, ..settings() };
+    let recording = simulate(&settings, 5).expect("runs").recording;
+    let current = recording.current.clone().expect("currents");
+    let robot = sr210d();
+    let arm = Arm::new(&robot, &settings.truth);
+    let spring = |joint: usize, factor: f64| {
+        let link = &arm.links[joint - 1];
+        Physical::JointCompliance(JointCompliance { joint, rad_per_nm: factor / (link.gear * link.motor_constant) })
+    };
+    for index in 0..recording.rows() {
+        let q = recording.q(index);
+        let payload = recording.payload.as_ref().expect("a payload")[index];
+        let mut row = row(q, payload);
+        row.drive = settings.truth.drive(&robot, q);
+        let found = settle(&arm, &row, &[spring(2, 1.89e-5), spring(3, 2.49e-5)]);
+        for (joint, factor) in [(1, 1.89e-5), (2, -2.49e-5)] {
+            let wind_up = found.motion.joint[joint];
+            assert!((factor * current[index * 6 + joint] - wind_up).abs() < 1e-12, "row {index}");
+        }
+    }
+}
+
+#[test]
+fn settings_that_a_robot_cannot_have_are_named_all_at_once() {
+    let text = "
+truth: {ratio: [1, 1], links: [{link: 9, shift_mm: [0, 0, 1]}], compliance_rad_a: [0, -1.89e-5, 0, 0, 0, 0]}
+effects: [{backlash: {joint: 7, gap_arcsec: 10}}]
+motors: {sign: [1, -1, 1, 1, 1, 1]}
+blocks: [{usage: fit, points: 5}]
+";
+    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    let message = error.to_string();
+    for place in ["truth.ratio", "truth.links[0].link", "truth.compliance_rad_a[1]", "effects[0]"] {
+        assert!(message.contains(&format!("simulate.with.{place}: ")), "{place} is missing in\n{message}");
+    }
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn a_workspace_without_a_pose_is_refused_with_what_to_widen() {
+    let mut settings = settings();
+    settings.poses.floor_mm = 9000.0;
+    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    assert!(error.to_string().contains("poses.floor_mm"), "{error}");
+}
