@@ -1,9 +1,32 @@
-//! What every identification hands back: the model, the fit's course, what it could see, and the residual of every row.
+//! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
+use crate::effect::Load;
 use crate::estimate::{Fitted, Model};
 use crate::robot::Measurements;
 use crate::stage::Context;
 use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What stands in for a joint's load.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LoadSetting {
+    /// From the masses of the robot file.
+    #[default]
+    Gravity,
+    /// From the motor currents of the recording.
+    Current,
+}
+
+impl From<LoadSetting> for Load {
+    fn from(setting: LoadSetting) -> Self {
+        match setting {
+            LoadSetting::Gravity => Load::GravityTorque,
+            LoadSetting::Current => Load::MotorCurrent,
+        }
+    }
+}
 
 crate::stage::writes! {
     /// Output ports of `identify` and `stiffness`.

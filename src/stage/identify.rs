@@ -2,11 +2,11 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{EFFECTS, EffectStack, Load, Setting, entry};
+use crate::effect::{EFFECTS, EffectStack, Setting, entry};
 use crate::error::{Fault, Result, nearest};
 use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
 use crate::robot::{Instrument, RobotModel};
-use crate::stage::identified::{Fitting, Identified};
+use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
 use schemars::JsonSchema;
@@ -31,26 +31,6 @@ pub struct Identify {
     /// The tracker's noise.
     #[serde(default)]
     pub tracker: Instrument,
-}
-
-/// What stands in for a joint's load.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LoadSetting {
-    /// From the masses of the robot file.
-    #[default]
-    Gravity,
-    /// From the motor currents of the recording.
-    Current,
-}
-
-impl From<LoadSetting> for Load {
-    fn from(setting: LoadSetting) -> Self {
-        match setting {
-            LoadSetting::Gravity => Load::GravityTorque,
-            LoadSetting::Current => Load::MotorCurrent,
-        }
-    }
 }
 
 fn fit_set() -> Vec<String> {

@@ -3,8 +3,7 @@
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{FitOptions, fit};
 use crate::robot::{Instrument, RobotModel};
-use crate::stage::identified::{Fitting, Identified};
-use crate::stage::identify::LoadSetting;
+use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::{Context, Stage};
 use crate::table::{Parameters, Prediction, Recording, Robot, Split};
 use schemars::JsonSchema;

@@ -98,8 +98,10 @@ fn layers_use_only_what_the_map_allows() {
 fn stages_do_not_use_each_other() {
     let names: Vec<String> = fs::read_dir(source().join("stage"))
         .unwrap()
-        .map(|entry| entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
-        .filter(|name| name != "mod")
+        .map(|entry| entry.unwrap().path())
+        // What several stages share is no stage.
+        .filter(|path| path.is_file() && fs::read_to_string(path).unwrap().contains("impl Stage for"))
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     let mut faults = Vec::new();
     for path in files(&source().join("stage")) {
