@@ -1,5 +1,8 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
+mod refusals;
+mod together;
+
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};
 use calib::stage::ingest::{Ingest, IngestReads};
@@ -37,6 +40,7 @@ pub fn robot(kinds: &str, half_turns: f64) -> Robot {
     Robot(kinds.chars().zip(1..).map(row).collect())
 }
 
+/// What a run of the stage gives.
 struct Taken {
     recording: Recording,
     rejected: Rejected,
@@ -228,13 +232,4 @@ fn the_ur10_recordings_are_read_to_the_last_row() {
             assert!((taken.recording.position[1][1] - -3.1343677).abs() < 1e-15);
         }
     }
-}
-
-#[test]
-fn a_missing_column_is_named_with_those_that_are_there() {
-    let desk = Desk::default().with("a.csv", "id,q1,q2,x,y_m,depth\nP,1,2,3,4,5\n");
-    let yaml = TWO.replace("column: y,", "column: y_mm,").replace("column: z,", "column: height,");
-    let expected = "a.csv:1: no column `y_mm`, mapped to `y`; did you mean `y_m`?\n\
-                    a.csv:1: no column `height`, mapped to `z`; found: id, q1, q2, x, y_m, depth";
-    assert_eq!(refusal(&desk, &yaml, robot("rr", 1.0)), expected);
 }

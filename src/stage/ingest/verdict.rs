@@ -76,12 +76,13 @@ fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Faul
     }
     let twins = fate.twins.len() as u64;
     let mut counts = scan.tally.clone();
-    for (reason, rows, detail) in [
-        (Reason::DuplicateId, twins, "point ids that occur more than once"),
-        (Reason::Unmatched, scan.used() - accepted - twins, "no partner in the other file"),
+    let first_twin = fate.twins.values().map(|twin| u64::from(twin.line)).min().unwrap_or_default();
+    for (reason, rows, first_line, detail) in [
+        (Reason::DuplicateId, twins, first_twin, "point ids that occur more than once"),
+        (Reason::Unmatched, scan.used() - accepted - twins, 0, "no partner in the other file"),
     ] {
         if rows > 0 {
-            counts.insert(reason, Count { rows, first_line: 0, first_detail: detail.into() });
+            counts.insert(reason, Count { rows, first_line, first_detail: detail.into() });
         }
     }
     let mut reasons: Vec<_> = counts.iter().collect();
@@ -96,7 +97,11 @@ fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Faul
     let share =
         if accepted == 0 { "no row is left".to_string() } else { format!("{rejected} of {} rows are rejected", scan.read) };
     let allowed = settings.max_rejected_fraction * 100.0;
-    Some(Fault::new(&scan.label, format!("{share}; allowed: up to {allowed} %. Reasons: {}", listed.join("; "))))
+    let place = match reasons.first() {
+        Some((_, count)) if count.first_line > 0 => format!("{}:{}", scan.label, count.first_line),
+        _ => scan.label.clone(),
+    };
+    Some(Fault::new(place, format!("{share}; allowed: up to {allowed} %; reasons: {}", listed.join("; "))))
 }
 
 fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Context) {

@@ -1,0 +1,160 @@
+//! Files and settings that are refused as a whole: the message names the place and what is allowed.
+
+use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
+use crate::desk::Desk;
+
+fn with(file: &str, yaml: &str) -> String {
+    refusal(&Desk::default().with("a.csv", file), yaml, robot("rr", 1.0))
+}
+
+#[test]
+fn a_missing_column_is_named_with_those_that_are_there() {
+    let desk = Desk::default().with("a.csv", "id,q1,q2,x,y_m,depth\nP,1,2,3,4,5\n");
+    let yaml = TWO.replace("column: y,", "column: y_mm,").replace("column: z,", "column: height,");
+    let expected = "a.csv:1: no column `y_mm`, mapped to `y`; did you mean `y_m`?\n\
+                    a.csv:1: no column `height`, mapped to `z`; found: id, q1, q2, x, y_m, depth";
+    assert_eq!(refusal(&desk, &yaml, robot("rr", 1.0)), expected);
+}
+
+#[test]
+fn a_file_that_is_none_says_what_it_is() {
+    assert_eq!(with("", TWO), "a.csv: is empty");
+    assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row");
+    assert_eq!(with("\n\n", TWO), "a.csv: has no header: its 2 lines are empty, comments or skipped");
+    let utf16 = Desk::default().with("a.csv", [0xff, 0xfe, b'i', 0]);
+    assert_eq!(refusal(&utf16, TWO, robot("rr", 1.0)), "a.csv: is UTF-16; allowed: UTF-8 (with or without a byte-order mark)");
+    let open = with(&format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"), TWO);
+    assert_eq!(open, "a.csv:3: a quoted field is not closed");
+    let endless = with(&format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21)), TWO);
+    assert_eq!(endless, "a.csv:2: a row of more than 1 MiB; allowed: rows ending in LF or CRLF, every quote closed");
+}
+
+#[test]
+fn a_header_of_another_shape_gets_a_hint() {
+    let semicolons = with("id;q1;q2;x;y;z\n", TWO);
+    assert!(semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"), "{semicolons}");
+    assert!(with("1,2,3,4,5,6\n", TWO).ends_with("(all numbers; `header: false`?)"));
+    let twice = with("id,q1,q2,x,y,z,x\n", TWO);
+    assert!(twice.starts_with("a.csv:1: column `x`, mapped to `x`, stands twice in the header (4 and 7); name it by number"));
+}
+
+#[test]
+fn another_number_of_joints_is_an_error_of_the_file() {
+    let desk = || rows(&good(3));
+    let more = refusal(&desk(), TWO, robot("rrr", 1.0));
+    assert!(more.starts_with("a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"), "{more}");
+    let fewer = refusal(&desk(), TWO, robot("r", 1.0));
+    assert!(fewer.starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joints only"), "{fewer}");
+    let listed = refusal(&desk(), &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"), robot("rrr", 1.0));
+    assert!(listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"), "{listed}");
+    let linear = refusal(&desk(), TWO, robot("pr", 1.0));
+    assert!(linear.starts_with("a.csv:1: joint 1 is prismatic; say `linear_unit` for `q`"), "{linear}");
+}
+
+#[test]
+fn an_unannounced_decimal_comma_is_an_error_that_says_so() {
+    let yaml = TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: \";\"\n");
+    let file = "id;q1;q2;x;y;z\nP1;0,365;1;2;3;4\nP2;1;2,5;2;3;4\n";
+    let expected = "a.csv:2: no row is left; allowed: up to 50 %; reasons: 2 not_a_number \
+                    (line 2: q1: `0,365` has a decimal comma; allowed: `decimal: comma` in the settings)";
+    assert_eq!(with(file, &yaml), expected);
+    let announced = yaml.replace("delimiter", "decimal: comma\n    delimiter");
+    let points = with("id;q1;q2;x;y;z\nP1;0.365;1;2;3;4\n", &announced);
+    assert!(points.contains("q1: `0.365` has a decimal point; allowed: `decimal: point` in the settings"), "{points}");
+}
+
+#[test]
+fn degrees_declared_as_rad_are_an_error_that_says_so() {
+    let text: String = (1..=10).map(|row| format!("P{row},{},20,1,2,3\n", 15 * row)).collect();
+    let message = refusal(&rows(&text), &TWO.replace("deg", "rad"), robot("rr", 1.0));
+    let expected = "a.csv:2: `q` is declared in rad, but 10 of 10 rows hold a joint beyond one and a half turns, \
+                    here joint 1 at 15.0000 rad; allowed: up to 9.42 rad; if the file holds degrees, say `unit: deg`";
+    assert_eq!(message, expected);
+    let small: String = (1..=10).map(|row| format!("P{row},0.{row},5,1,2,3\n")).collect();
+    let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), robot("rr", 1.0));
+    assert!(
+        message.starts_with("a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 at 5.0000"),
+        "{message}"
+    );
+    assert!(message.ends_with("say `unit: deg`"), "{message}");
+    let desk = rows(&(1..=10).map(|row| format!("P{row},{row}e-1,1.5,1,2,3\n")).collect::<String>());
+    take(&desk, TWO, robot("rr", 1.0)).unwrap();
+    let warning = "a.csv: no joint is ever beyond 1.50 deg; if the file holds rad, say `unit: rad`";
+    assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
+}
+
+#[test]
+fn too_few_usable_rows_are_an_error_with_the_reasons() {
+    let text = format!("{}B1,,2,3,4,5\nB2,,2,3,4,5\nB3,1,2\ng1,1,2,3,4,5\n", good(3));
+    let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 %; reasons: 2 blank (line 5: q1 is blank); \
+                    2 duplicate_id (line 2: point ids that occur more than once); 1 short_row (line 7: 3 fields; allowed: 6)";
+    assert_eq!(refusal(&rows(&text), TWO, robot("rr", 1.0)), expected);
+    take(&rows(&text), &format!("{TWO}max_rejected_fraction: 0.8\n"), robot("rr", 1.0)).unwrap();
+}
+
+#[test]
+fn faulty_settings_are_named_all_at_once_with_what_is_allowed() {
+    let yaml = r#"
+max_rejected_fraction: 2
+files:
+  - file: a.csv
+    delimiter: ab
+    header: false
+    columns:
+      q: {column: qj, unit: degrees}
+      x: {column: 0, unit: inch}
+      y: {column: 2, unit: deg}
+      z: {unit: mm}
+      sigma_x: {column: 3}
+"#;
+    let found = calib::stage::Stage::check(&settings(yaml)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    assert_eq!(
+        found,
+        [
+            "max_rejected_fraction: allowed: above 0 and up to 1",
+            "files[0].delimiter: delimiter `ab`; allowed: one ASCII character, `tab` or `whitespace`",
+            "files[0].columns.x: columns count from 1",
+            "files[0].columns.x.unit: unknown unit `inch`; allowed: mm, um, m, in",
+            "files[0].columns.y.unit: `deg` is the unit of another quantity; allowed: mm, um, m, in",
+            "files[0].columns.z: say `column` or `value`, one of them",
+            "files[0].columns.sigma_x.unit: no unit; allowed: mm, um, m, in",
+            "files[0].columns.q.column: `qj` has no {j} for the joint's number; e.g. `q{j}_deg`, or list them in `columns`",
+            "files[0].columns.q.unit: unknown unit `degrees`; allowed: rad, deg, mrad, arcsec",
+            "files[0].columns: map all of sigma_x, sigma_y, sigma_z, or none",
+        ]
+    );
+}
+
+#[test]
+fn files_that_do_not_fit_together_are_faults_of_the_settings() {
+    let file = |columns: &str| format!("  - {{file: a.csv, columns: {{{columns}}}}}\n");
+    let (id, time) = ("point_id: {column: id}, ", "time: {column: t, unit: s}, ");
+    let q = "q: {column: \"q{j}\", unit: deg}";
+    let xyz = "x: {column: x, unit: mm}, y: {column: y, unit: mm}, z: {column: z, unit: mm}";
+    let faults = |first: &str, second: &str, rest: &str| {
+        let yaml = format!("files:\n{}{}{rest}", file(first), if second.is_empty() { String::new() } else { file(second) });
+        calib::stage::Stage::check(&settings(&yaml)).iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let without =
+        "join: several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
+    assert_eq!(faults(q, xyz, ""), [without]);
+    assert_eq!(faults(q, "", ""), ["files[0].columns: not mapped: x, y, z"]);
+    assert_eq!(
+        faults(q, xyz, "join: {by: append}"),
+        ["files[0].columns: not mapped: x, y, z", "files[1].columns: not mapped: q"]
+    );
+    assert_eq!(faults(q, "", "join: {by: order}"), ["join: joins two files, not 1"]);
+    assert_eq!(
+        faults(&format!("{id}{q}"), xyz, "join: {by: id}"),
+        ["files[1].columns.point_id: not mapped; the files are joined by point_id"]
+    );
+    assert_eq!(
+        faults(&format!("{id}{time}{q}"), &format!("{id}{time}{xyz}"), "join: {by: id}\nduplicates: keep"),
+        [
+            "files[1].columns.time: mapped in both files; map it in one",
+            "duplicates: `keep` cannot go with a join by id; allowed: reject, first, last"
+        ]
+    );
+    let clock = faults(&format!("{time}{q}"), &format!("{time}{xyz}"), "join: {by: time, tolerance_s: -1}");
+    assert_eq!(clock, ["join.tolerance_s: allowed: 0 and above"]);
+}

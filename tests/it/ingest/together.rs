@@ -1,0 +1,254 @@
+//! Duplicates, joins, shapes of files, and long files.
+
+use super::{HEAD, TWO, good, robot, rows, settings, take};
+use crate::desk::{Desk, table};
+use calib::stage::ingest::IngestReads;
+use calib::table::{Recording, Rejected};
+
+fn refused(rejected: &Rejected) -> Vec<(&str, i64, &str, &str)> {
+    rejected.0.iter().map(|row| (row.file.as_str(), row.line, row.reason.as_str(), row.detail.as_str())).collect()
+}
+
+#[test]
+fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
+    let text = format!("{}B,190,20,1,2,3\n", good(3));
+    let desk = rows(&text);
+    assert_eq!(take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(), 4);
+    let warning = "a.csv: 1 rows have a joint beyond the robot's limits and are used; first line 5, joint 1 at 3.3161 \
+                   (limits -3.1416 to 3.1416, rad or m)";
+    assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
+    let rejecting = take(&rows(&text), &format!("{TWO}limits: reject\n"), robot("rr", 1.0)).unwrap();
+    let detail = "joint 1 at 190.0000 deg; allowed: -180.0000 to 180.0000 deg";
+    assert_eq!(refused(&rejecting.rejected), [("a.csv", 5, "out_of_range", detail)]);
+    let desk = rows(&text);
+    assert_eq!(take(&desk, &format!("{TWO}limits: ignore\n"), robot("rr", 1.0)).unwrap().recording.rows(), 4);
+    assert!(desk.warnings.lock().unwrap().is_empty());
+}
+
+#[test]
+fn of_duplicated_ids_none_the_first_the_last_or_all_are_used() {
+    let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1,2,,4,3\nA,1,2,3,4,4\nC,1,2,3,4,5\nD,1,2,3,4,6\n";
+    let used = |word: &str| {
+        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), robot("rr", 1.0)).unwrap();
+        let lines = taken.rejected.0.iter().map(|row| (row.line, row.detail.clone())).collect::<Vec<_>>();
+        (taken.recording.sequence, lines)
+    };
+    let blank = (4, "x is blank".to_string());
+    let twin = |line, other: i64| (line, format!("point id `A` also stands on line {other}"));
+    assert_eq!(used("reject"), (vec![2, 5, 6], vec![twin(2, 5), blank.clone(), twin(5, 2)]));
+    assert_eq!(used("first"), (vec![1, 2, 5, 6], vec![blank.clone(), twin(5, 2)]));
+    assert_eq!(used("last"), (vec![2, 4, 5, 6], vec![twin(2, 5), blank.clone()]));
+    assert_eq!(used("keep"), (vec![1, 2, 4, 5, 6], vec![blank]));
+}
+
+const PAIR: &str = r#"
+files:
+  - file: run/z_arm.csv
+    columns:
+      KEY: {column: kLEFT}
+      q: {column: "q{j}", unit: rad}
+      payload: {value: 5000, unit: kg}
+  - file: run/b_tracker.csv
+    columns:
+      KEY: {column: kRIGHT}
+      usage: {column: use, optional: true}
+      x: {column: x, unit: m}
+      y: {column: y, unit: m}
+      z: {column: z, unit: m}
+"#;
+
+#[test]
+fn rows_join_by_id_in_the_order_of_the_first_file() {
+    let desk = Desk::default()
+        .with("run/z_arm.csv", "k,q1\nC,3\nA,1\nlost,4\nA2,\nB,2\n")
+        .with("run/b_tracker.csv", "k,use,x,y,z\nA,fit,1,1,1\nB,,2,2,2\nC,validate,3,3,3\nA2,fit,4,4,4\nmore,fit,5,5,5\n");
+    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
+    let taken = take(&desk, &yaml, robot("r", 2.0)).unwrap();
+    let recording = &taken.recording;
+    assert_eq!(
+        (recording.point_id.as_slice(), recording.sequence.as_slice()),
+        (&["C", "A", "B"].map(String::from)[..], &[1, 2, 5][..])
+    );
+    assert_eq!(recording.position, [[3.0; 3], [1.0; 3], [2.0; 3]]);
+    assert_eq!(recording.usage, [Some("validate".into()), Some("fit".into()), None]);
+    assert_eq!(recording.payload.as_deref(), Some(&[5000.0; 3][..]));
+    assert_eq!(
+        refused(&taken.rejected),
+        [
+            ("b_tracker.csv", 5, "unmatched", "no usable row of z_arm.csv has the point id `A2`"),
+            ("b_tracker.csv", 6, "unmatched", "no usable row of z_arm.csv has the point id `more`"),
+            ("z_arm.csv", 4, "unmatched", "no usable row of b_tracker.csv has the point id `lost`"),
+            ("z_arm.csv", 5, "blank", "q1 is blank"),
+        ]
+    );
+}
+
+#[test]
+fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
+    let desk = Desk::default()
+        .with("run/z_arm.csv", "k,q1\n10,1\n20,2\n30,3\n40,1\n")
+        .with("run/b_tracker.csv", "k,x,y,z\n31500,3,3,3\n11400,1,1,1\n21600,2,2,2\n46000,4,4,4\n");
+    let yaml = PAIR.replace("KEY", "time").replace("kLEFT", "k, unit: s").replace("kRIGHT", "k, unit: ms");
+    let yaml = yaml + "join: {by: time, tolerance_s: 0.2, offset_s: 1.5}\n";
+    let taken = take(&desk, &yaml, robot("r", 2.0)).unwrap();
+    assert_eq!(taken.recording.position, [[1.0; 3], [2.0; 3], [3.0; 3]]);
+    assert_eq!(taken.recording.time.as_deref(), Some(&[10.0, 20.0, 30.0][..]));
+    assert_eq!(
+        refused(&taken.rejected),
+        [
+            ("b_tracker.csv", 5, "unmatched", "no row of z_arm.csv is its partner within 0.2 s of 46 s"),
+            ("z_arm.csv", 5, "unmatched", "no row of b_tracker.csv is its partner within 0.2 s of 40 s"),
+        ]
+    );
+}
+
+#[test]
+fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
+    let desk = Desk::default()
+        .with("run/z_arm.csv", "q1\n1\nbad\n3\n4\n")
+        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
+    let yaml = PAIR.replace("      KEY: {column: kLEFT}\n", "").replace("KEY", "point_id").replace("RIGHT", "");
+    let taken = take(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0)).unwrap();
+    assert_eq!(taken.recording.point_id, ["A", "C"]);
+    assert_eq!(taken.recording.position, [[1.0; 3], [3.0; 3]]);
+    assert_eq!(
+        refused(&taken.rejected),
+        [
+            ("b_tracker.csv", 3, "unmatched", "data row 2 of z_arm.csv is missing or rejected"),
+            ("z_arm.csv", 3, "not_a_number", "q1: `bad` is not a number"),
+            ("z_arm.csv", 5, "unmatched", "data row 4 of b_tracker.csv is missing or rejected"),
+        ]
+    );
+}
+
+#[test]
+fn files_that_continue_each_other_share_their_ids() {
+    let part = TWO.replace("files:\n", "");
+    let yaml = format!("files:{}{}join: {{by: append}}\n", part, part.replace("a.csv", "b/a.csv"));
+    let desk = Desk::default()
+        .with("a.csv", format!("{HEAD}{}", good(3)))
+        .with("b/a.csv", format!("{HEAD}N,1,2,3,4,5\ng2,1,2,3,4,5\nM,1,2,3,4,5\n"));
+    let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.sequence, [1, 3, 4, 6]);
+    assert_eq!(
+        refused(&taken.rejected),
+        [
+            ("a.csv", 3, "duplicate_id", "point id `g2` also stands on line 3 of a.csv (2)"),
+            ("a.csv (2)", 3, "duplicate_id", "point id `g2` also stands on line 3 of a.csv"),
+        ]
+    );
+}
+
+#[test]
+fn junk_units_comments_and_columns_by_number_are_as_the_settings_say() {
+    let text = "\u{feff}Report of today;;\r\n\r\nno\tx\ty\tz\tq\ttemp\r\n-\tin\tum\tm\tmm\tK\r\n! a remark\r\n7\t1\t2000\t3\t1500\t300.15\r\n9\t1\t2\t3\t20\t\r\n8\t1\t2\t3\t20\t\r\n";
+    let yaml = r#"
+files:
+  - file: a.txt
+    delimiter: tab
+    skip: 1
+    skip_below_header: 1
+    comment: "!"
+    columns:
+      sequence: {column: no}
+      x: {column: 2, unit: in}
+      y: {column: y, unit: um}
+      z: {column: z, unit: m}
+      q: {columns: [5], linear_unit: mm}
+      temperature: {column: temp, unit: K, optional: true}
+"#;
+    let taken = take(&Desk::default().with("a.txt", text), yaml, robot("p", 1.0)).unwrap();
+    let recording = &taken.recording;
+    assert_eq!((recording.sequence.as_slice(), recording.point_id[0].as_str()), (&[7, 9][..], "row 1"));
+    assert_eq!((recording.position[0], recording.q(0)), ([0.0254, 0.002, 3.0], &[1.5][..]));
+    let temperature = recording.temperature.as_ref().unwrap();
+    assert!((temperature[0] - 27.0).abs() < 1e-12 && temperature[1].is_nan());
+    assert_eq!(refused(&taken.rejected), [("a.txt", 8, "out_of_order", "sequence 8 does not follow 9")]);
+}
+
+#[test]
+fn a_file_without_header_is_read_by_numbers() {
+    let yaml =
+        TWO.replace("columns:\n", "header: false\n    delimiter: whitespace\n    columns:\n").replace("column: id", "column: 1");
+    let yaml = yaml.replace("column: \"q{j}\"", "columns: [2, 3]");
+    let yaml = yaml.replace("column: x", "column: 4").replace("column: y", "column: 5").replace("column: z", "column: 6");
+    let taken = take(&Desk::default().with("a.csv", "  \"P 1\" 1 2  3 4 5\nP2 1 2 3\t4 5\n"), &yaml, robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.point_id, ["P 1", "P2"]);
+}
+
+#[test]
+fn what_the_schema_refuses_is_refused_row_by_row() {
+    let schema: serde_json::Value = serde_json::from_str(include_str!("../../../schemas/recording.json")).unwrap();
+    let fields = [
+        ("x_mm", "x"),
+        ("y_mm", "y"),
+        ("z_mm", "z"),
+        ("sigma_x_mm", "sx"),
+        ("sigma_y_mm", "sy"),
+        ("sigma_z_mm", "sz"),
+        ("payload_kg", "load"),
+        ("temp_c", "temp"),
+        ("q{j}_rad", "q1"),
+        ("q{j}_mm", "q2"),
+        ("i{j}_a", "i1"),
+        ("dir{j}", "d1"),
+    ];
+    let names: Vec<&str> = fields.iter().map(|field| field.1).chain(["i2", "d2"]).collect();
+    let mut text = format!("{}\n", names.join(","));
+    let mut wanted = Vec::new();
+    for (index, (column, name)) in fields.iter().enumerate() {
+        let field = schema["fields"].as_array().unwrap().iter().find(|field| field["name"] == *column).unwrap();
+        for (limit, beyond) in [("min", -1.0), ("max", 1.0)] {
+            let limit = field["constraints"][limit].as_f64().unwrap_or_else(|| panic!("{column} has a {limit}"));
+            for value in [limit, limit + beyond] {
+                let mut cells = vec!["1".to_string(); names.len()];
+                cells[index] = format!("{value}");
+                text += &format!("{}\n", cells.join(","));
+            }
+            wanted.push(format!("{name}: `{}`", limit + beyond));
+        }
+    }
+    let yaml = r#"
+limits: ignore
+files:
+  - file: a.csv
+    columns:
+      x: {column: x, unit: mm}
+      y: {column: y, unit: mm}
+      z: {column: z, unit: mm}
+      sigma_x: {column: sx, unit: mm}
+      sigma_y: {column: sy, unit: mm}
+      sigma_z: {column: sz, unit: mm}
+      payload: {column: load, unit: kg}
+      temperature: {column: temp, unit: C}
+      q: {columns: [q1, q2], unit: rad, linear_unit: mm}
+      current: {column: "i{j}", unit: A}
+      direction: {column: "d{j}"}
+"#;
+    let taken = take(&Desk::default().with("a.csv", text), yaml, robot("rp", 1.0)).unwrap();
+    let found: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.split(';').next().unwrap()).collect();
+    assert_eq!(found, wanted);
+    assert!(taken.rejected.0.iter().all(|row| row.reason == "out_of_range"));
+}
+
+#[test]
+fn a_long_file_streams_in_chunks_and_equal_content_gives_equal_tables() {
+    let count = 300_000u64;
+    let mut text = String::from(HEAD);
+    for row in 0..count {
+        let id = if row % 1000 == 999 { row - 1 } else { row };
+        text += &format!("P{id},{},{},{}.25,-20.5,{}\n", row % 170, row % 90, row % 3000, 1 + row % 7);
+    }
+    let run = |folder: &str| {
+        let desk = Desk::default().with(&format!("{folder}/a.csv"), text.clone());
+        desk.run(&settings(&TWO.replace("a.csv", &format!("{folder}/a.csv"))), IngestReads { robot: robot("rr", 1.0) }).unwrap()
+    };
+    let tables = run("here");
+    assert_eq!(tables, run("there"));
+    let chunks = table::<Recording>(&tables);
+    let rejected: usize = table::<Rejected>(&tables).iter().map(|chunk| chunk.0.len()).sum();
+    assert_eq!(rejected, 600);
+    assert_eq!(chunks.iter().map(Recording::rows).sum::<usize>(), 299_400);
+    assert!(chunks.iter().all(|chunk| chunk.rows() <= 65_536) && chunks.len() == 5);
+    assert!(chunks.windows(2).all(|pair| pair[0].sequence.last() < pair[1].sequence.first()));
+}
