@@ -42,6 +42,8 @@
 pub mod error;
 pub mod units;
 
+pub mod yaml;
+
 pub mod spatial;
 
 pub mod robot;

@@ -1,1 +1,23 @@
-//! The YAML, the plan, the run.
+//! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
+
+mod desk;
+mod execute;
+mod lock;
+mod manifest;
+mod overrides;
+pub mod plan;
+mod preview;
+mod reason;
+mod run;
+mod select;
+mod services;
+mod spec;
+mod wiring;
+
+pub use manifest::{Host, Manifest, OutputRecord, StageReport, StageStatus, Surroundings, Tool};
+pub use overrides::Override;
+pub use plan::Plan;
+pub use preview::{Forecast, Prospect, preview};
+pub use run::{Outcome, RunOptions, run};
+pub use select::Selection;
+pub use services::Observer;

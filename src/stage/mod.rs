@@ -3,6 +3,7 @@
 mod identified;
 mod identify;
 pub mod ingest;
+mod registry;
 mod report;
 mod robot;
 mod simulate;
@@ -11,6 +12,7 @@ mod stiffness;
 mod validate;
 
 pub use identify::{Identify, IdentifyReads};
+pub use registry::{ErasedStage, StageEntry};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
@@ -238,3 +240,6 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     }
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }
+
+/// Every kind of stage, one line each.
+pub const STAGES: &[StageEntry] = &[];

@@ -1,0 +1,91 @@
+//! How far a plan is: which tables every stage has, and from them the key of the next.
+
+use super::plan::{Plan, PlannedStage};
+use super::services::label;
+use crate::error::{Error, Result};
+use crate::store::schema;
+use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
+use crate::stage::Arity;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+pub(super) struct Desk<'a> {
+    pub plan: &'a Plan,
+    /// Tables by port, for every stage whose tables are known.
+    pub tables: Vec<Option<BTreeMap<String, TableRef>>>,
+    hashes: BTreeMap<PathBuf, FileHash>,
+}
+
+/// The key of a stage, or the stage whose tables must be there first.
+pub(super) enum Key {
+    Known(StageKey),
+    Pending(usize),
+}
+
+impl<'a> Desk<'a> {
+    pub fn new(plan: &'a Plan) -> Self {
+        Self { plan, tables: vec![None; plan.stages.len()], hashes: BTreeMap::new() }
+    }
+
+    pub fn key(&mut self, index: usize) -> Result<Key> {
+        let stage = &self.plan.stages[index];
+        let mut reads = BTreeMap::new();
+        for input in &stage.inputs {
+            let mut keys = Vec::new();
+            for origin in &input.from {
+                let Some(tables) = &self.tables[origin.stage] else { return Ok(Key::Pending(origin.stage)) };
+                let table = table(tables, &self.plan.stages[origin.stage], origin.port)?;
+                // Only where a port takes several tables does the stage see whose they are.
+                let writer = (input.port.arity == Arity::Every).then(|| self.plan.stages[origin.stage].id.clone());
+                keys.push(ReadKey { stage: writer, table: table.table_hash.clone() });
+            }
+            reads.insert(input.port.name.to_string(), keys);
+        }
+        let mut files = BTreeMap::new();
+        for file in &stage.files {
+            let key = FileKey { name: label(&file.path), content: self.hash(&file.path)? };
+            files.insert(file.place.clone(), key);
+        }
+        let mut schemas = BTreeMap::new();
+        for port in &stage.outputs {
+            schemas.insert(port.name.to_string(), schema::of(port.kind)?.id());
+        }
+        Ok(Key::Known(StageKey {
+            key_format: KEY_FORMAT,
+            id: stage.id.clone(),
+            stage: stage.entry.name.into(),
+            implementation: stage.entry.implementation,
+            settings: stage.stage.settings(),
+            reads,
+            files,
+            schemas,
+            seed: self.seed(index),
+        }))
+    }
+
+    /// The seed of a stage: its own, so that stages do not share random numbers.
+    pub fn seed(&self, index: usize) -> u64 {
+        let text = format!("{} {}", self.plan.seed, self.plan.stages[index].id);
+        let hash = blake3::hash(text.as_bytes());
+        u64::from_le_bytes(*hash.as_bytes().first_chunk().expect("a hash has 32 bytes"))
+    }
+
+    /// The hash of a raw input file, read once a run.
+    pub fn hash(&mut self, path: &Path) -> Result<FileHash> {
+        if let Some(hash) = self.hashes.get(path) {
+            return Ok(hash.clone());
+        }
+        let hash = File::open(path)
+            .and_then(FileHash::of_reader)
+            .map_err(|error| Error::data(path.display().to_string(), format!("cannot be read: {error}")))?;
+        self.hashes.insert(path.into(), hash.clone());
+        Ok(hash)
+    }
+}
+
+/// The table of an output port, which the record of a stage must have.
+pub(super) fn table<'t>(tables: &'t BTreeMap<String, TableRef>, stage: &PlannedStage, port: usize) -> Result<&'t TableRef> {
+    let name = stage.outputs[port].name;
+    tables.get(name).ok_or_else(|| Error::Bug(format!("the record of stage {} has no table {name}", stage.id)))
+}

@@ -1,0 +1,85 @@
+//! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
+
+use super::desk::{self, Desk};
+use super::services::{Observer, StageServices};
+use crate::error::{Error, Result};
+use crate::stage::{Context, Output};
+use crate::store::frame::Frame;
+use crate::store::{Account, FinishedFile, Product, Store, TableRef};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+
+/// Where a stage is executed.
+pub(super) struct Place<'a> {
+    pub store: &'a Store,
+    pub threads: &'a rayon::ThreadPool,
+    pub observer: &'a dyn Observer,
+    pub run: &'a str,
+}
+
+/// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
+pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Account) -> Result<Vec<(String, Product)>> {
+    let stage = &desk.plan.stages[index];
+    let frames = load(desk, index, place.store)?;
+    let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
+    let context =
+        Context { id: &stage.id, seed: desk.seed(index), jobs: place.threads.current_num_threads(), services: &services };
+    let body = || place.threads.install(|| stage.stage.run(frames, &context));
+    let outputs = catch_unwind(AssertUnwindSafe(body))
+        .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
+    let lines = services.lines();
+    (account.notes, account.warnings) = (lines.notes, lines.warnings);
+    let outputs = outputs?;
+    if outputs.len() != stage.outputs.len() {
+        return Err(Error::Bug(format!("stage {} gave {} tables for {} ports", stage.id, outputs.len(), stage.outputs.len())));
+    }
+    stage
+        .outputs
+        .iter()
+        .zip(outputs)
+        .map(|(port, output)| {
+            let (kind, product) = match output {
+                Output::Frame(frame) => (frame.kind(), Product::Frame(frame)),
+                Output::Streamed(streamed) => {
+                    let file = streamed.handle.downcast::<FinishedFile>();
+                    let file = file.map_err(|_| Error::Bug(format!("stage {}: a sink that is not the engine's", stage.id)))?;
+                    (streamed.kind, Product::File(*file))
+                }
+            };
+            if kind != port.kind {
+                return Err(Error::Bug(format!("stage {}: a table of {kind} on port {}", stage.id, port.name)));
+            }
+            Ok((port.name.to_string(), product))
+        })
+        .collect()
+}
+
+fn load(desk: &Desk, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
+    let stages = &desk.plan.stages;
+    let inputs = stages[index].inputs.iter();
+    inputs
+        .map(|input| {
+            let frames = input.from.iter().map(|origin| {
+                let from = &stages[origin.stage];
+                let tables = desk.tables[origin.stage].as_ref();
+                let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
+                Ok((from.id.clone(), store.load(desk::table(tables, from, origin.port)?)?))
+            });
+            frames.collect()
+        })
+        .collect()
+}
+
+/// Writes the documents of a table to where people find them.
+pub(super) fn documents(store: &Store, pipeline: &str, table: &TableRef) -> Result<Vec<PathBuf>> {
+    let frame = store.load(table)?;
+    let names = frame.read::<String>("name")?;
+    let contents = frame.read::<String>("content")?;
+    names.iter().zip(&contents).map(|(name, content)| store.expose_document(pipeline, name, content.as_bytes())).collect()
+}
+
+fn panic_message(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a message")
+}

@@ -1,0 +1,185 @@
+//! The audit record of one run, written when it starts, after every stage and at the end.
+
+use super::overrides::Override;
+use crate::store::{ActionId, FileHash, StageKey, TableRef};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Bumped when older readers can no longer understand a manifest.
+const MANIFEST_FORMAT: u32 = 1;
+
+/// What the engine cannot know by itself: who runs it, where and when.
+#[derive(Debug, Clone)]
+pub struct Surroundings {
+    pub tool: Tool,
+    pub host: Host,
+    pub command_line: Vec<String>,
+    pub now: fn() -> std::time::SystemTime,
+    /// A fresh id for a run.
+    pub run_id: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Tool {
+    pub name: String,
+    pub version: String,
+    pub target: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Host {
+    pub name: String,
+    pub os: String,
+    pub architecture: String,
+    pub cores: usize,
+    pub user: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Manifest {
+    manifest_format: u32,
+    pub run_id: String,
+    pub status: RunStatus,
+    /// What went wrong, where the status says so.
+    pub error: Option<String>,
+    pub pipeline: PipelineRecord,
+    pub overrides: Vec<Override>,
+    pub tool: Tool,
+    pub host: Host,
+    pub command_line: Vec<String>,
+    pub seed: u64,
+    pub jobs: usize,
+    /// RFC 3339, UTC.
+    pub started: String,
+    pub ended: Option<String>,
+    pub wall_seconds: Option<f64>,
+    pub stages: Vec<StageReport>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunStatus {
+    /// Running, or killed.
+    Running,
+    Done,
+    Failed,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct PipelineRecord {
+    pub name: String,
+    pub file: String,
+    /// Of the YAML file's bytes.
+    pub blake3: String,
+    pub text: String,
+    /// With variables and overrides filled in.
+    pub resolved: serde_json::Value,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StageStatus {
+    /// Its tables were there already.
+    Cached,
+    Executed,
+    Failed,
+    /// Outside of what was selected, or never reached.
+    NotRun,
+}
+
+/// What became of one stage.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageReport {
+    pub id: String,
+    pub uses: String,
+    pub implementation: u32,
+    pub status: StageStatus,
+    /// Why it was executed.
+    pub reason: Option<String>,
+    pub action: Option<ActionId>,
+    /// The components of `action`.
+    pub key: Option<StageKey>,
+    pub inputs: Vec<InputRecord>,
+    pub files: Vec<FileRecord>,
+    pub outputs: Vec<OutputRecord>,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+    /// Of the execution, also where it was an earlier run's.
+    pub wall_seconds: Option<f64>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct InputRecord {
+    pub port: String,
+    /// `stage.port` that wrote it.
+    pub from: String,
+    #[serde(flatten)]
+    pub table: TableRef,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct FileRecord {
+    pub place: String,
+    pub path: PathBuf,
+    pub bytes: u64,
+    pub modified: Option<String>,
+    pub blake3: FileHash,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct OutputRecord {
+    pub port: String,
+    pub kind: String,
+    /// Where people find it.
+    pub path: Option<PathBuf>,
+    #[serde(flatten)]
+    pub table: TableRef,
+}
+
+impl Manifest {
+    pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, jobs: usize, started: String) -> Self {
+        Self {
+            manifest_format: MANIFEST_FORMAT,
+            run_id: surroundings.run_id.clone(),
+            status: RunStatus::Running,
+            error: None,
+            pipeline: PipelineRecord {
+                name: plan.name.clone(),
+                file: plan.file.display().to_string(),
+                blake3: blake3::hash(plan.text.as_bytes()).to_hex().to_string(),
+                text: plan.text.clone(),
+                resolved: plan.resolved.clone(),
+            },
+            overrides: plan.overrides.clone(),
+            tool: surroundings.tool.clone(),
+            host: surroundings.host.clone(),
+            command_line: surroundings.command_line.clone(),
+            seed: plan.seed,
+            jobs,
+            started,
+            ended: None,
+            wall_seconds: None,
+            stages: plan.stages.iter().map(StageReport::pending).collect(),
+        }
+    }
+}
+
+impl StageReport {
+    fn pending(stage: &super::plan::PlannedStage) -> Self {
+        Self {
+            id: stage.id.clone(),
+            uses: stage.entry.name.into(),
+            implementation: stage.entry.implementation,
+            status: StageStatus::NotRun,
+            reason: None,
+            action: None,
+            key: None,
+            inputs: Vec::new(),
+            files: Vec::new(),
+            outputs: Vec::new(),
+            notes: Vec::new(),
+            warnings: Vec::new(),
+            wall_seconds: None,
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! `--set` and `${variable}`: what is put into the YAML's tree before it is typed.
+
+use crate::error::{Fault, nearest};
+use crate::yaml::{self, Mark, Node, Trouble, Value};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// One `--set target=value`.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Override {
+    /// A variable, `seed` or `STAGE.path.of.setting`.
+    pub target: String,
+    /// YAML.
+    pub value: String,
+}
+
+impl Override {
+    /// Reads `target=value`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.split_once('=') {
+            Some((target, value)) if !target.is_empty() => Ok(Self { target: target.trim().into(), value: value.into() }),
+            _ => Err(format!("`{text}`: expected TARGET=VALUE, e.g. case=recordings/r7, seed=7 or split.every=4")),
+        }
+    }
+
+    fn node(&self) -> Result<Node, Fault> {
+        let (node, troubles) = yaml::parse(&self.value);
+        match (node, troubles.into_iter().next()) {
+            (Some(mut node), None) => {
+                node.walk_mut("", &mut |_, node| {
+                    node.mark = Mark::CommandLine;
+                    node.overridden = true;
+                });
+                Ok(node)
+            }
+            // An empty value is an empty text.
+            _ if self.value.trim().is_empty() => {
+                Ok(Node { overridden: true, ..Node::new(Value::Text(String::new()), Mark::CommandLine) })
+            }
+            (_, trouble) => {
+                let why = trouble.map(|trouble| trouble.message).unwrap_or_default();
+                Err(Fault::new(format!("--set {}", self.target), format!("the value is not YAML: {why}")))
+            }
+        }
+    }
+}
+
+/// The variables of a pipeline: name and value.
+pub(super) type Variables = BTreeMap<String, Node>;
+
+/// Puts the overrides into the tree and takes its variables out.
+pub(super) fn apply(tree: &mut Node, overrides: &[Override]) -> (Variables, Vec<Fault>) {
+    let mut faults = Vec::new();
+    let mut variables: Variables = BTreeMap::new();
+    for (name, _, node) in tree.get("variables").map(Node::entries).unwrap_or_default() {
+        variables.insert(name.clone(), node.clone());
+    }
+    let ids = stage_ids(tree);
+    let mut names: BTreeSet<String> = used_variables(tree);
+    names.extend(variables.keys().cloned());
+    for set in overrides {
+        let node = match set.node() {
+            Ok(node) => node,
+            Err(fault) => {
+                faults.push(fault);
+                continue;
+            }
+        };
+        let place = format!("--set {}", set.target);
+        let stage = set.target.split_once(['.', '[']).and_then(|(id, _)| ids.iter().position(|known| known == id));
+        match stage {
+            _ if set.target == "seed" => {
+                if let Err(why) = tree.put("seed", node) {
+                    faults.push(Fault::new(place, why));
+                }
+            }
+            _ if names.contains(&set.target) => {
+                variables.insert(set.target.clone(), node);
+            }
+            Some(index) => {
+                let path = set.target[ids[index].len()..].trim_start_matches('.');
+                if let Err(why) = tree.put(&format!("stages[{index}].with.{path}"), node) {
+                    faults.push(Fault::new(place, why));
+                }
+            }
+            None => faults.push(Fault::new(place, unknown(&set.target, &names, &ids))),
+        }
+    }
+    (variables, faults)
+}
+
+fn unknown(target: &str, names: &BTreeSet<String>, ids: &[String]) -> String {
+    let (head, rest) = match target.find(['.', '[']) {
+        Some(dot) => target.split_at(dot),
+        None => (target, ""),
+    };
+    if rest.is_empty() && ids.iter().any(|id| id == target) {
+        return format!("`{target}` is a stage: name a setting of it, e.g. {target}.SETTING=VALUE");
+    }
+    let candidates: Vec<&str> = if rest.is_empty() {
+        names.iter().map(String::as_str).chain(["seed"]).collect()
+    } else {
+        ids.iter().map(String::as_str).collect()
+    };
+    let hint = nearest(head, candidates).map(|name| format!("; did you mean `{name}{rest}`?"));
+    let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
+    format!(
+        "nothing of that name to set{} Allowed: {}",
+        hint.unwrap_or_else(|| ".".into()),
+        list(&mut names.iter().cloned().chain(["seed".into()]).chain(ids.iter().map(|id| format!("{id}.SETTING"))))
+    )
+}
+
+/// The id of every stage, empty where the YAML gives none.
+pub(super) fn stage_ids(tree: &Node) -> Vec<String> {
+    let id = |stage: &Node| stage.get("id").or_else(|| stage.get("uses")).and_then(Node::text).unwrap_or_default();
+    tree.get("stages").map(Node::items).unwrap_or_default().iter().map(id).collect()
+}
+
+fn used_variables(tree: &Node) -> BTreeSet<String> {
+    let mut used = BTreeSet::new();
+    if let Some(stages) = tree.get("stages") {
+        stages.walk("", &mut |_, node| {
+            if let Value::Text(text) = &node.value {
+                used.extend(pieces(text).filter_map(|piece| match piece {
+                    Piece::Variable(name) => Some(name.to_string()),
+                    Piece::Plain(_) => None,
+                }));
+            }
+        });
+    }
+    used
+}
+
+/// Replaces every `${name}` below `node`; text that is one variable alone takes its type too.
+pub(super) fn substitute(node: &mut Node, path: &str, variables: &Variables) -> Vec<Trouble> {
+    let mut troubles = Vec::new();
+    node.walk_mut(path, &mut |path, node| {
+        let Value::Text(text) = &node.value else { return };
+        let found: Vec<Piece> = pieces(text).collect();
+        if !found.iter().any(|piece| matches!(piece, Piece::Variable(_))) {
+            return;
+        }
+        let text = text.clone();
+        match fill(node, &text, variables) {
+            Ok(filled) => *node = filled,
+            Err(message) => troubles.push(Trouble::new(message).at(node.mark).below(path)),
+        }
+    });
+    troubles
+}
+
+fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> {
+    let mut filled = String::new();
+    let mut overridden = node.overridden;
+    for (index, piece) in pieces(text).enumerate() {
+        let name = match piece {
+            Piece::Plain(plain) => {
+                filled.push_str(plain);
+                continue;
+            }
+            Piece::Variable(name) => name,
+        };
+        let Some(variable) = variables.get(name) else {
+            let hint = nearest(name, variables.keys().map(String::as_str)).map(|near| format!(" did you mean `${{{near}}}`?"));
+            return Err(format!(
+                "`${{{name}}}` is not defined;{} Give it under `variables` or by --set {name}=VALUE",
+                hint.unwrap_or_default()
+            ));
+        };
+        if matches!(variable.value, Value::Null) {
+            return Err(format!("`${{{name}}}` has no value here: give it by --set {name}=VALUE"));
+        }
+        if text.len() == name.len() + 3 {
+            return Ok(Node { mark: node.mark, ..variable.clone() });
+        }
+        let Some(value) = variable.text() else {
+            return Err(format!("`${{{name}}}` is a list or a block and cannot stand inside text"));
+        };
+        overridden |= index == 0 && variable.overridden;
+        filled.push_str(&value);
+    }
+    Ok(Node { overridden, ..Node::new(Value::Text(filled), node.mark) })
+}
+
+enum Piece<'t> {
+    Plain(&'t str),
+    Variable(&'t str),
+}
+
+/// Splits text at its `${name}`; anything else with a dollar is plain.
+fn pieces(text: &str) -> impl Iterator<Item = Piece<'_>> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        if let Some(name) = variable_at(rest) {
+            rest = &rest[name.len() + 3..];
+            return Some(Piece::Variable(name));
+        }
+        let end = rest.char_indices().skip(1).find(|(at, _)| variable_at(&rest[*at..]).is_some()).map_or(rest.len(), |(at, _)| at);
+        let (plain, after) = rest.split_at(end);
+        rest = after;
+        Some(Piece::Plain(plain))
+    })
+}
+fn variable_at(text: &str) -> Option<&str> {
+    let (name, _) = text.strip_prefix("${")?.split_once('}')?;
+    (!name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-')).then_some(name)
+}

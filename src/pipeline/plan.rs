@@ -1,0 +1,88 @@
+//! The plan: a pipeline whose YAML is sound, whose settings are typed and whose tables are wired.
+
+pub use super::spec::InputFile;
+pub use super::wiring::{Input, Origin};
+
+use super::overrides::Override;
+use super::{spec, wiring};
+use crate::error::{Error, Fault, Result};
+use crate::stage::{ErasedStage, Port, StageEntry};
+use std::path::{Path, PathBuf};
+
+/// A pipeline that can be run.
+pub struct Plan {
+    /// The YAML file as it was named.
+    pub file: PathBuf,
+    pub text: String,
+    pub name: String,
+    pub seed: u64,
+    /// In the order of the YAML; every stage comes after those it reads.
+    pub stages: Vec<PlannedStage>,
+    /// The YAML with variables and overrides filled in.
+    pub resolved: serde_json::Value,
+    pub overrides: Vec<Override>,
+}
+
+pub struct PlannedStage {
+    pub id: String,
+    pub entry: &'static StageEntry,
+    pub stage: Box<dyn ErasedStage>,
+    pub files: Vec<InputFile>,
+    pub inputs: Vec<Input>,
+    pub outputs: Vec<Port>,
+}
+
+impl Plan {
+    /// Reads a pipeline; fails with every fault at once.
+    pub fn load(file: &Path, overrides: &[Override], stages: &'static [StageEntry]) -> Result<Self> {
+        let label = file.display().to_string();
+        let text = std::fs::read(file).map_err(|error| {
+            Error::spec(&label, if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() })
+        })?;
+        let text = String::from_utf8(text).map_err(|_| Error::spec(&label, "not a text file: expected YAML in UTF-8"))?;
+        Self::parse(file, text, overrides, stages)
+    }
+
+    /// The same for a text that is already read.
+    pub fn parse(file: &Path, text: String, overrides: &[Override], registry: &'static [StageEntry]) -> Result<Self> {
+        let label = file.display().to_string();
+        let mut draft = spec::read(file, &text, overrides, registry);
+        let mut inputs = Vec::new();
+        for index in 0..draft.stages.len() {
+            let (wired, troubles) = wiring::wire(&draft.stages, index, registry);
+            inputs.push(wired);
+            draft.faults.extend(troubles.into_iter().map(|trouble| trouble.below(&format!("stages[{index}]")).fault(&label)));
+        }
+        let mut stages = Vec::new();
+        for (stage, inputs) in draft.stages.into_iter().zip(inputs) {
+            if let (Some(entry), Some(body)) = (stage.entry, stage.stage) {
+                let outputs = (entry.writes)();
+                stages.push(PlannedStage { id: stage.id, entry, stage: body, files: stage.files, inputs, outputs });
+            } else if draft.faults.is_empty() {
+                draft.faults.push(Fault::new(&label, format!("stage `{}` could not be read", stage.id)));
+            }
+        }
+        if !draft.faults.is_empty() {
+            return Err(Error::Spec(draft.faults));
+        }
+        Ok(Self {
+            file: file.into(),
+            text,
+            name: draft.name,
+            seed: draft.seed,
+            stages,
+            resolved: draft.resolved,
+            overrides: overrides.to_vec(),
+        })
+    }
+
+    /// The place of a stage, or what is allowed.
+    pub fn find(&self, id: &str, option: &str) -> Result<usize> {
+        self.stages.iter().position(|stage| stage.id == id).ok_or_else(|| {
+            let ids: Vec<&str> = self.stages.iter().map(|stage| stage.id.as_str()).collect();
+            let hint = crate::error::nearest(id, ids.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+            let message = format!("no stage `{id}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), ids.join(", "));
+            Error::spec(option, message)
+        })
+    }
+}

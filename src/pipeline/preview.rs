@@ -1,0 +1,52 @@
+//! What a run would do, without doing it.
+
+use super::desk::{Desk, Key};
+use super::plan::Plan;
+use super::reason;
+use super::select::Selection;
+use crate::error::Result;
+use crate::store::{Lookup, Store};
+use serde::Serialize;
+
+/// What would become of a stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "status")]
+pub enum Prospect {
+    Cached,
+    Run { reason: String },
+    /// Not known before another stage has run.
+    Pending { on: String },
+    /// Outside of `--only`, `--from`, `--until`, and not cached.
+    NotSelected,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Forecast {
+    pub id: String,
+    pub uses: String,
+    #[serde(flatten)]
+    pub prospect: Prospect,
+}
+
+pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<Forecast>> {
+    let selected = selection.of(plan)?;
+    let mut desk = Desk::new(plan);
+    let mut forecasts = Vec::new();
+    for (index, stage) in plan.stages.iter().enumerate() {
+        let inside = selected.stages.contains(&index);
+        let prospect = match desk.key(index)? {
+            Key::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
+            Key::Pending(_) => Prospect::NotSelected,
+            Key::Known(key) => match store.action(&key)? {
+                Lookup::Done(record) if !selected.forces(index) => {
+                    desk.tables[index] = Some(record.tables);
+                    Prospect::Cached
+                }
+                _ if !inside => Prospect::NotSelected,
+                found => Prospect::Run { reason: reason::why(store, plan, &key, &found, selected.forces(index))? },
+            },
+        };
+        forecasts.push(Forecast { id: stage.id.clone(), uses: stage.entry.name.into(), prospect });
+    }
+    Ok(forecasts)
+}

@@ -1,0 +1,235 @@
+//! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
+
+use super::desk::{self, Desk, Key};
+use super::execute::{self, Place};
+use super::lock::ActionLock;
+use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings};
+use super::plan::Plan;
+use super::reason;
+use super::select::{Selected, Selection};
+use super::services::Observer;
+use crate::error::{Error, Result};
+use crate::store::{ActionRecord, Lookup, Run, StageKey, Store};
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+/// How to run a plan.
+#[derive(Debug, Clone)]
+pub struct RunOptions {
+    pub selection: Selection,
+    /// Worker threads; no result depends on it.
+    pub jobs: usize,
+}
+
+/// A run that went through.
+pub struct Outcome {
+    pub manifest: Manifest,
+    /// Reports and other documents, where people find them.
+    pub documents: Vec<PathBuf>,
+}
+
+impl Outcome {
+    /// The tables of a kind, in pipeline order.
+    pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
+        self.manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
+    }
+    pub fn nothing_done(&self) -> bool {
+        self.manifest.stages.iter().all(|stage| stage.status == StageStatus::Cached)
+    }
+}
+
+/// Runs a plan; whatever happens, the run's manifest says how far it came.
+pub fn run(
+    plan: &Plan,
+    store: &Store,
+    options: &RunOptions,
+    surroundings: &Surroundings,
+    observer: &dyn Observer,
+) -> Result<Outcome> {
+    let selected = options.selection.of(plan)?;
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
+    let begun = (surroundings.now)();
+    let manifest = Manifest::new(plan, surroundings, options.jobs, rfc3339(begun));
+    let record = store.begin_run(&surroundings.run_id, &manifest)?;
+    let mut running = Running {
+        desk: Desk::new(plan),
+        store,
+        selected,
+        now: surroundings.now,
+        threads,
+        observer,
+        manifest,
+        record,
+        documents: Vec::new(),
+    };
+    let result = (0..plan.stages.len()).try_for_each(|index| running.stage(index));
+    let Running { mut manifest, record, documents, .. } = running;
+    let ended = (surroundings.now)();
+    manifest.ended = Some(rfc3339(ended));
+    manifest.wall_seconds = Some(seconds(begun, ended));
+    manifest.status = if result.is_ok() { RunStatus::Done } else { RunStatus::Failed };
+    manifest.error = result.as_ref().err().map(ToString::to_string);
+    let finished = store.finish_run(record, &manifest);
+    // The first error is the one that explains the others.
+    result.and(finished)?;
+    Ok(Outcome { manifest, documents })
+}
+
+struct Running<'a> {
+    desk: Desk<'a>,
+    store: &'a Store,
+    selected: Selected,
+    now: fn() -> SystemTime,
+    threads: rayon::ThreadPool,
+    observer: &'a dyn Observer,
+    manifest: Manifest,
+    record: Run,
+    documents: Vec<PathBuf>,
+}
+
+impl Running<'_> {
+    fn stage(&mut self, index: usize) -> Result<()> {
+        let plan = self.desk.plan;
+        let inside = self.selected.stages.contains(&index);
+        let key = match self.desk.key(index)? {
+            Key::Known(key) => key,
+            Key::Pending(_) if !inside => return Ok(()),
+            Key::Pending(on) => {
+                let (id, on) = (&plan.stages[index].id, &plan.stages[on].id);
+                let message = format!("stage `{id}` reads from `{on}`, which is not cached and was not selected: select it too");
+                return Err(Error::spec("--only, --from", message));
+            }
+        };
+        let report = &mut self.manifest.stages[index];
+        report.action = Some(key.id());
+        report.key = Some(key.clone());
+        let forced = self.selected.forces(index);
+        let found = self.store.action(&key)?;
+        match found {
+            Lookup::Done(record) if !forced => return self.cached(index, record),
+            _ if !inside => return Ok(()),
+            _ => {}
+        }
+        let reason = reason::why(self.store, plan, &key, &found, forced)?;
+        let id = &plan.stages[index].id;
+        let mut waiting = || self.observer.note(id, "waiting for another run that does the same");
+        let lock = ActionLock::take(self.store, &key.id(), &mut waiting);
+        if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
+            return self.cached(index, record);
+        }
+        let result = self.execute(index, key, reason);
+        drop(lock);
+        if result.is_err() {
+            self.manifest.stages[index].status = StageStatus::Failed;
+        }
+        result
+    }
+
+    fn cached(&mut self, index: usize, record: ActionRecord) -> Result<()> {
+        self.manifest.stages[index].status = StageStatus::Cached;
+        self.settle(index, record)
+    }
+
+    fn execute(&mut self, index: usize, key: StageKey, reason: String) -> Result<()> {
+        let stage = &self.desk.plan.stages[index];
+        self.observer.stage_begins(&stage.id, stage.entry.name, &reason);
+        let started = (self.now)();
+        self.event("begins", index, serde_json::json!({ "reason": reason }))?;
+        self.manifest.stages[index].reason = Some(reason);
+        let place = Place { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
+        let mut account = crate::store::Account { run: place.run.into(), started: rfc3339(started), ..Default::default() };
+        let products = execute::stage(&self.desk, index, &place, &mut account)?;
+        let ended = (self.now)();
+        account.ended = rfc3339(ended);
+        account.wall_seconds = seconds(started, ended);
+        let published = if self.selected.forces(index) {
+            self.store.republish(&key, products, account)?
+        } else {
+            self.store.publish(&key, products, account)?
+        };
+        self.manifest.stages[index].status = StageStatus::Executed;
+        if let Some(conflict) = published.conflict {
+            self.observer.warn(&stage.id, &conflict);
+            self.manifest.stages[index].warnings.push(conflict);
+        }
+        self.settle(index, published.record)?;
+        self.store.write_manifest(&self.record, &self.manifest)
+    }
+
+    /// Takes the tables of a stage that is done into the plan, the manifest and the human paths.
+    fn settle(&mut self, index: usize, record: ActionRecord) -> Result<()> {
+        let plan = self.desk.plan;
+        let stage = &plan.stages[index];
+        let mut outputs = Vec::new();
+        for (port, output) in stage.outputs.iter().enumerate() {
+            let table = desk::table(&record.tables, stage, port)?;
+            let path = self.store.expose(&plan.name, &stage.id, output.name, table)?;
+            if output.kind == "document" {
+                self.documents.extend(execute::documents(self.store, &plan.name, table)?);
+            }
+            outputs.push(OutputRecord {
+                port: output.name.into(),
+                kind: output.kind.into(),
+                path: Some(path),
+                table: table.clone(),
+            });
+        }
+        let inputs = self.inputs(index)?;
+        let files = self.files(index)?;
+        let report = &mut self.manifest.stages[index];
+        (report.inputs, report.files, report.outputs) = (inputs, files, outputs);
+        report.wall_seconds = Some(record.account.wall_seconds);
+        report.notes = record.account.notes;
+        report.warnings.splice(0..0, record.account.warnings);
+        self.desk.tables[index] = Some(record.tables);
+        let status = serde_json::json!({ "status": self.manifest.stages[index].status });
+        self.event("ends", index, status)?;
+        self.observer.stage_ends(&self.manifest.stages[index]);
+        Ok(())
+    }
+
+    fn inputs(&self, index: usize) -> Result<Vec<InputRecord>> {
+        let stages = &self.desk.plan.stages;
+        let mut records = Vec::new();
+        for input in &stages[index].inputs {
+            for origin in &input.from {
+                let from = &stages[origin.stage];
+                let Some(tables) = &self.desk.tables[origin.stage] else { continue };
+                records.push(InputRecord {
+                    port: input.port.name.into(),
+                    from: format!("{}.{}", from.id, from.outputs[origin.port].name),
+                    table: desk::table(tables, from, origin.port)?.clone(),
+                });
+            }
+        }
+        Ok(records)
+    }
+
+    fn files(&mut self, index: usize) -> Result<Vec<FileRecord>> {
+        let mut records = Vec::new();
+        for file in &self.desk.plan.stages[index].files {
+            let metadata = std::fs::metadata(&file.path).ok();
+            records.push(FileRecord {
+                place: file.place.clone(),
+                path: file.path.clone(),
+                bytes: metadata.as_ref().map_or(0, std::fs::Metadata::len),
+                modified: metadata.and_then(|metadata| metadata.modified().ok()).map(rfc3339),
+                blake3: self.desk.hash(&file.path)?,
+            });
+        }
+        Ok(records)
+    }
+
+    fn event(&mut self, event: &str, index: usize, more: serde_json::Value) -> Result<()> {
+        let stage = &self.desk.plan.stages[index].id;
+        let time = rfc3339((self.now)());
+        self.record.append_event(&serde_json::json!({ "time": time, "event": event, "stage": stage, "detail": more }))
+    }
+}
+
+fn rfc3339(time: SystemTime) -> String {
+    jiff::Timestamp::try_from(time).map(|time| format!("{time:.3}")).unwrap_or_default()
+}
+fn seconds(from: SystemTime, to: SystemTime) -> f64 {
+    to.duration_since(from).unwrap_or_default().as_secs_f64()
+}

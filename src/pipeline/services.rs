@@ -1,0 +1,96 @@
+//! What the engine does for a running stage: files, sinks, progress and lines that are kept.
+
+use crate::error::{Error, Result};
+use crate::stage::{RawFile, Services, Sink, Source, Streamed};
+use crate::store::frame::Frame;
+use crate::store::{FinishedFile, Store, TableWriter};
+use std::fs::File;
+use std::sync::{Mutex, PoisonError};
+
+/// Whoever watches a run: a terminal, a log, nobody.
+pub trait Observer: Sync {
+    /// A stage starts to execute, with the reason.
+    fn stage_begins(&self, id: &str, uses: &str, reason: &str);
+    /// A stage is over; the report says how.
+    fn stage_ends(&self, report: &super::manifest::StageReport);
+    /// Units of work: what is done, how many in all, and what a unit is called.
+    fn begin(&self, id: &str, what: &str, total: Option<u64>, unit: &str);
+    fn advance(&self, id: &str, done: u64, message: &str);
+    /// Lines while the stage runs; they are in its report too.
+    fn note(&self, id: &str, line: &str);
+    fn warn(&self, id: &str, line: &str);
+}
+
+pub(super) struct StageServices<'a> {
+    pub id: &'a str,
+    pub store: &'a Store,
+    pub files: &'a [super::plan::InputFile],
+    pub observer: &'a dyn Observer,
+    lines: Mutex<Lines>,
+}
+
+/// What a stage told the person.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Lines {
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+impl<'a> StageServices<'a> {
+    pub fn new(id: &'a str, store: &'a Store, files: &'a [super::plan::InputFile], observer: &'a dyn Observer) -> Self {
+        Self { id, store, files, observer, lines: Mutex::default() }
+    }
+    pub fn lines(self) -> Lines {
+        self.lines.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Services for StageServices<'_> {
+    fn open(&self, file: &RawFile) -> Result<Source> {
+        if !self.files.iter().any(|known| known.path == file.0) {
+            let message = format!("stage {} opens {} without listing it among its files", self.id, file.0.display());
+            return Err(Error::Bug(message));
+        }
+        let shown = file.0.display().to_string();
+        let opened = File::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
+        let size = opened.metadata().ok().map(|metadata| metadata.len());
+        Ok(Source { label: label(&file.0), reader: Box::new(opened), size })
+    }
+    fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
+        Ok(Box::new(StoreSink { kind, writer: self.store.writer(kind)? }))
+    }
+    fn begin(&self, what: &str, total: Option<u64>, unit: &str) {
+        self.observer.begin(self.id, what, total, unit);
+    }
+    fn advance(&self, done: u64, message: &str) {
+        self.observer.advance(self.id, done, message);
+    }
+    fn note(&self, line: String) {
+        self.observer.note(self.id, &line);
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner).notes.push(line);
+    }
+    fn warn(&self, line: String) {
+        self.observer.warn(self.id, &line);
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner).warnings.push(line);
+    }
+}
+
+/// A file as messages and tables name it: its name alone, so that equal content gives equal tables wherever it lies.
+pub(super) fn label(path: &std::path::Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+struct StoreSink {
+    kind: &'static str,
+    writer: TableWriter,
+}
+
+impl Sink for StoreSink {
+    fn push(&mut self, chunk: Frame) -> Result<()> {
+        self.writer.push(&chunk)
+    }
+    fn finish(self: Box<Self>) -> Result<Streamed> {
+        let file: FinishedFile = self.writer.finish()?;
+        Ok(Streamed { kind: self.kind, rows: file.table().rows, handle: Box::new(file) })
+    }
+}

@@ -1,0 +1,280 @@
+//! The pipeline's YAML, typed: every stage with its settings and files, or every fault with its place.
+
+use super::overrides::{self, Override};
+use crate::error::{Fault, nearest};
+use crate::stage::{ErasedStage, StageEntry};
+use crate::yaml::{self, Mark, Node, Trouble, Value, typed};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The format of the YAML that this version reads.
+pub(crate) const FORMAT: u64 = 1;
+
+/// A pipeline as far as it could be read.
+pub(super) struct Draft {
+    pub name: String,
+    pub seed: u64,
+    pub stages: Vec<StageDraft>,
+    /// The YAML with variables and overrides filled in.
+    pub resolved: serde_json::Value,
+    pub faults: Vec<Fault>,
+}
+
+pub(super) struct StageDraft {
+    pub id: String,
+    pub mark: Mark,
+    /// Nothing where `uses` names no stage.
+    pub entry: Option<&'static StageEntry>,
+    /// Nothing where the settings are faulty.
+    pub stage: Option<Box<dyn ErasedStage>>,
+    pub files: Vec<InputFile>,
+    /// Wishes for the wiring: port -> names of stages.
+    pub reads: BTreeMap<String, Wish>,
+}
+
+/// Stages that a port is to be read from, as the YAML names them.
+pub(super) struct Wish {
+    pub mark: Mark,
+    pub names: Vec<String>,
+}
+
+/// A raw input file of a stage.
+#[derive(Debug, Clone)]
+pub struct InputFile {
+    /// Where it stands below `with`.
+    pub place: String,
+    pub path: PathBuf,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "named so that other keys are faults; read from the tree")]
+struct Head {
+    calib: u64,
+    name: String,
+    #[serde(default)]
+    seed: u64,
+    #[serde(default)]
+    variables: BTreeMap<String, IgnoredAny>,
+    stages: Vec<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "named so that other keys are faults; read from the tree")]
+struct StageHead {
+    #[serde(default)]
+    id: Option<String>,
+    uses: String,
+    #[serde(default)]
+    with: Option<BTreeMap<String, IgnoredAny>>,
+    #[serde(default)]
+    reads: Option<BTreeMap<String, IgnoredAny>>,
+}
+
+/// Reads `text`, the content of the YAML `file`; relative paths in it start at the folder of the file.
+pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static [StageEntry]) -> Draft {
+    let label = file.display().to_string();
+    let (tree, mut troubles) = yaml::parse(text);
+    let mut draft =
+        Draft { name: String::new(), seed: 0, stages: Vec::new(), resolved: serde_json::Value::Null, faults: Vec::new() };
+    let Some(mut tree) = tree else {
+        draft.faults.extend(troubles.into_iter().map(|trouble| trouble.fault(&label)));
+        return draft;
+    };
+    let (variables, mut faults) = overrides::apply(&mut tree, sets);
+    if let Err(more) = typed::<Head>(&tree) {
+        troubles.extend(more);
+    }
+    troubles.extend(check_head(&tree));
+    draft.name = tree.get("name").and_then(Node::text).unwrap_or_default();
+    draft.seed = tree.get("seed").and_then(|seed| typed(seed).ok()).unwrap_or_default();
+
+    let mut known = BTreeSet::new();
+    if let Some(list) = tree.at_mut("stages") {
+        if let Value::List(items) = &mut list.value {
+            for (index, item) in items.iter_mut().enumerate() {
+                let path = format!("stages[{index}]");
+                troubles.extend(overrides::substitute(item, &path, &variables));
+                let (stage, more) = read_stage(file, item, stages);
+                troubles.extend(more.into_iter().map(|trouble| trouble.at(item.mark).below(&path)));
+                if !stage.id.is_empty() && !known.insert(stage.id.clone()) {
+                    let message = format!("two stages have the id `{}`; give one of them another `id`", stage.id);
+                    troubles.push(Trouble::new(message).at(item.mark).below(&path));
+                }
+                draft.stages.push(stage);
+            }
+        }
+    }
+    troubles.extend(non_finite(&tree));
+    draft.resolved = json(&tree);
+    faults.extend(in_order(troubles).into_iter().map(|trouble| trouble.fault(&label)));
+    draft.faults = faults;
+    draft
+}
+
+/// Faults in the order of the file, those without a line last.
+fn in_order(mut troubles: Vec<Trouble>) -> Vec<Trouble> {
+    troubles.sort_by_key(|trouble| match trouble.mark {
+        Some(Mark::Line { line, column }) => (line, column),
+        _ => (u64::MAX, 0),
+    });
+    let mut seen = BTreeSet::new();
+    troubles.retain(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
+    troubles
+}
+
+fn check_head(tree: &Node) -> Vec<Trouble> {
+    let mut troubles = Vec::new();
+    let mut fault = |key: &str, message: String| {
+        let mark = tree.nearest_mark(key);
+        troubles.push(Trouble::new(message).at(mark).below(key));
+    };
+    match tree.get("calib").map(|node| &node.value) {
+        Some(Value::Integer(format)) if *format == FORMAT.into() => {}
+        Some(Value::Integer(format)) => fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}")),
+        _ => {}
+    }
+    if let Some(name) = tree.get("name").and_then(Node::text)
+        && !is_identifier(&name)
+    {
+        fault("name", format!("`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"));
+    }
+    if tree.get("stages").is_some_and(|stages| matches!(&stages.value, Value::List(items) if items.is_empty())) {
+        fault("stages", "expected at least one stage".into());
+    }
+    troubles
+}
+
+/// Ids and names become parts of paths.
+fn is_identifier(name: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    name.len() <= 64 && name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.chars().all(allowed)
+}
+
+fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (StageDraft, Vec<Trouble>) {
+    let mut troubles = typed::<StageHead>(node).err().unwrap_or_default();
+    let uses = node.get("uses").and_then(Node::text);
+    let id = node.get("id").and_then(Node::text).or_else(|| uses.clone()).unwrap_or_default();
+    if !id.is_empty() && node.get("id").is_some() && !is_identifier(&id) {
+        let message = format!("`{id}`: expected letters, digits, `-` and `_`, starting with a letter or digit");
+        troubles.push(Trouble::new(message).at(node.nearest_mark("id")).below("id"));
+    }
+    let entry = uses.as_ref().and_then(|name| registry.iter().find(|entry| entry.name == name));
+    if let (Some(name), None) = (&uses, entry) {
+        let names: Vec<&str> = registry.iter().map(|entry| entry.name).collect();
+        let hint = nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let message = format!("unknown stage `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), names.join(", "));
+        troubles.push(Trouble::new(message).at(node.nearest_mark("uses")).below("uses"));
+    }
+    let mut draft = StageDraft { id, mark: node.mark, entry, stage: None, files: Vec::new(), reads: BTreeMap::new() };
+    for (port, mark, wish) in node.get("reads").map(Node::entries).unwrap_or_default() {
+        let path = format!("reads.{port}");
+        match stage_names(wish) {
+            Some(names) => drop(draft.reads.insert(port.clone(), Wish { mark: *mark, names })),
+            None => troubles.push(Trouble::new("expected the id of a stage, or a list of ids").at(wish.mark).below(&path)),
+        }
+    }
+    if let Some(entry) = entry {
+        let with = match node.get("with") {
+            Some(with) if !matches!(with.value, Value::Null) => with.clone(),
+            _ => Node::empty_map(node.mark),
+        };
+        if matches!(with.value, Value::Map(_)) {
+            let (stage, files, more) = type_settings(file, with, entry);
+            (draft.stage, draft.files) = (stage, files);
+            troubles.extend(more.into_iter().map(|trouble| trouble.below("with")));
+        }
+    }
+    (draft, troubles)
+}
+
+fn stage_names(wish: &Node) -> Option<Vec<String>> {
+    match &wish.value {
+        Value::Text(name) => Some(vec![name.clone()]),
+        Value::List(items) => items.iter().map(Node::text).collect(),
+        _ => None,
+    }
+}
+
+type Typed = (Option<Box<dyn ErasedStage>>, Vec<InputFile>, Vec<Trouble>);
+
+/// Types the settings of a stage and finds its files.
+fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
+    let stage = match (entry.parse)(&with) {
+        Ok(stage) => stage,
+        Err(troubles) => return (None, Vec::new(), troubles),
+    };
+    let mut troubles: Vec<Trouble> = stage
+        .check()
+        .into_iter()
+        .map(|fault| Trouble::new(fault.message).at(with.nearest_mark(&fault.place)).below(&fault.place))
+        .collect();
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for (place, raw) in stage.files() {
+        let overridden = with.at(&place).is_some_and(|node| node.overridden);
+        let path = if overridden { raw.0.clone() } else { folder.join(&raw.0) };
+        let mark = with.nearest_mark(&place);
+        if let Some(message) = unreadable(&path) {
+            troubles.push(Trouble::new(message).at(mark).below(&place));
+        }
+        let text = Node { overridden, ..Node::new(Value::Text(path.to_string_lossy().into_owned()), mark) };
+        if let Err(message) = with.put(&place, text) {
+            troubles.push(Trouble::new(message).at(mark).below(&place));
+        }
+        files.push(InputFile { place, path });
+    }
+    if !troubles.is_empty() || files.is_empty() {
+        return (troubles.is_empty().then_some(stage), files, troubles);
+    }
+    // Once more, with the paths as they are to be opened.
+    match (entry.parse)(&with) {
+        Ok(stage) => (Some(stage), files, troubles),
+        Err(troubles) => (None, files, troubles),
+    }
+}
+
+fn unreadable(path: &Path) -> Option<String> {
+    let shown = path.display();
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Some(format!("`{shown}` is a folder; expected a file")),
+        Ok(_) => None,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Some(format!("no such file: `{shown}` (paths are relative to the YAML file; those given by --set to the working directory)"))
+        }
+        Err(error) => Some(format!("`{shown}` cannot be read: {error}")),
+    }
+}
+
+fn non_finite(tree: &Node) -> Vec<Trouble> {
+    let mut troubles = Vec::new();
+    tree.walk("", &mut |path, node| {
+        if let Value::Float(value) = node.value
+            && !value.is_finite()
+        {
+            let found = node.raw.clone().unwrap_or_else(|| value.to_string());
+            troubles.push(Trouble::new(format!("expected a finite number; found {found}")).at(node.mark).below(path));
+        }
+    });
+    troubles
+}
+
+fn json(node: &Node) -> serde_json::Value {
+    use serde_json::Value as Json;
+    match &node.value {
+        Value::Null => Json::Null,
+        Value::Bool(value) => Json::Bool(*value),
+        Value::Integer(value) => match (u64::try_from(*value), i64::try_from(*value)) {
+            (Ok(value), _) => value.into(),
+            (_, Ok(value)) => value.into(),
+            _ => value.to_string().into(),
+        },
+        Value::Float(value) => (*value).into(),
+        Value::Text(text) => text.clone().into(),
+        Value::List(items) => Json::Array(items.iter().map(json).collect()),
+        Value::Map(entries) => Json::Object(entries.iter().map(|(key, _, value)| (key.clone(), json(value))).collect()),
+    }
+}

@@ -1,0 +1,59 @@
+//! Stages without their types, so that a pipeline can hold any of them.
+
+use super::{Context, Output, Port, RawFile, Reads, Stage, Writes};
+use crate::error::{Fault, Result};
+use crate::store::frame::Frame;
+use crate::yaml::{Node, Trouble, typed};
+use schemars::{Schema, SchemaGenerator};
+
+/// A stage with its settings, its type erased.
+pub trait ErasedStage: Send + Sync {
+    fn check(&self) -> Vec<Fault>;
+    fn files(&self) -> Vec<(String, RawFile)>;
+    /// The settings with defaults filled in; part of the stage's key.
+    fn settings(&self) -> serde_json::Value;
+    /// Takes the frames of each input port with the ids of the stages that wrote them.
+    fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>>;
+}
+
+impl<T: Stage> ErasedStage for T {
+    fn check(&self) -> Vec<Fault> {
+        Stage::check(self)
+    }
+    fn files(&self) -> Vec<(String, RawFile)> {
+        Stage::files(self)
+    }
+    fn settings(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("settings are plain data")
+    }
+    fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>> {
+        Stage::run(self, T::Reads::take(frames)?, context)?.give()
+    }
+}
+
+/// One kind of stage, as the pipeline's YAML names it.
+#[derive(Debug, Clone, Copy)]
+pub struct StageEntry {
+    pub name: &'static str,
+    pub summary: &'static str,
+    pub implementation: u32,
+    pub reads: fn() -> Vec<Port>,
+    pub writes: fn() -> Vec<Port>,
+    /// Types the settings; all their faults, with paths below `with`.
+    pub parse: fn(&Node) -> Result<Box<dyn ErasedStage>, Vec<Trouble>>,
+    pub schema: fn(&mut SchemaGenerator) -> Schema,
+}
+
+impl StageEntry {
+    pub const fn of<T: Stage>() -> Self {
+        Self {
+            name: T::NAME,
+            summary: T::SUMMARY,
+            implementation: T::IMPLEMENTATION,
+            reads: T::Reads::ports,
+            writes: T::Writes::ports,
+            parse: |settings| Ok(Box::new(typed::<T>(settings)?)),
+            schema: |generator| generator.subschema_for::<T>(),
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! A YAML value with its place in the file.
+
+/// Where a value was given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    Line { line: u64, column: u64 },
+    /// `--set`.
+    CommandLine,
+    Unknown,
+}
+
+#[derive(Debug, Clone)]
+pub struct Node {
+    pub value: Value,
+    pub mark: Mark,
+    /// A number or boolean as it was spelt, for where text is wanted.
+    pub raw: Option<String>,
+    /// Given on the command line: a relative path starts at the working directory.
+    pub overridden: bool,
+    pub(crate) bytes: Option<(u64, u64)>,
+}
+
+#[derive(Debug, Clone)]
+pub enum Value {
+    Null,
+    Bool(bool),
+    Integer(i128),
+    Float(f64),
+    Text(String),
+    List(Vec<Node>),
+    /// In the order of the file.
+    Map(Vec<(String, Mark, Node)>),
+}
+
+impl Node {
+    pub fn new(value: Value, mark: Mark) -> Self {
+        Self { value, mark, raw: None, overridden: false, bytes: None }
+    }
+    pub(super) fn parsed(value: Value, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
+        Self { value, mark, raw: None, overridden: false, bytes }
+    }
+    pub fn empty_map(mark: Mark) -> Self {
+        Self::new(Value::Map(Vec::new()), mark)
+    }
+
+    /// Remembers how numbers and booleans were spelt.
+    pub(super) fn fill_raw(&mut self, text: &str) {
+        let bytes = self.bytes.take();
+        match &mut self.value {
+            Value::Bool(_) | Value::Integer(_) | Value::Float(_) => {
+                self.raw = bytes.and_then(|(start, length)| {
+                    let start = usize::try_from(start).ok()?;
+                    let end = start.checked_add(usize::try_from(length).ok()?)?;
+                    text.get(start..end).map(|raw| raw.trim().to_string())
+                });
+            }
+            Value::List(items) => items.iter_mut().for_each(|item| item.fill_raw(text)),
+            Value::Map(entries) => entries.iter_mut().for_each(|(_, _, value)| value.fill_raw(text)),
+            Value::Null | Value::Text(_) => {}
+        }
+    }
+
+    /// A scalar as text, as it was spelt; nothing for lists, blocks and null.
+    pub fn text(&self) -> Option<String> {
+        match &self.value {
+            Value::Text(text) => Some(text.clone()),
+            Value::Bool(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            Value::Integer(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            Value::Float(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            Value::Null | Value::List(_) | Value::Map(_) => None,
+        }
+    }
+
+    pub fn entries(&self) -> &[(String, Mark, Node)] {
+        if let Value::Map(entries) = &self.value { entries } else { &[] }
+    }
+    pub fn items(&self) -> &[Node] {
+        if let Value::List(items) = &self.value { items } else { &[] }
+    }
+    pub fn get(&self, key: &str) -> Option<&Node> {
+        self.entries().iter().find(|(name, _, _)| name == key).map(|(_, _, node)| node)
+    }
+
+    /// The node at a path like `effects[0].cycles` or `effects.0.cycles`.
+    pub fn at(&self, path: &str) -> Option<&Node> {
+        if path.is_empty() {
+            return Some(self);
+        }
+        match &self.value {
+            Value::Map(entries) => {
+                entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest)))
+            }
+            Value::List(items) => {
+                let (index, rest) = split_index(path)?;
+                items.get(index)?.at(rest)
+            }
+            _ => None,
+        }
+    }
+    pub fn at_mut(&mut self, path: &str) -> Option<&mut Node> {
+        if path.is_empty() {
+            return Some(self);
+        }
+        match &mut self.value {
+            Value::Map(entries) => entries
+                .iter_mut()
+                .find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at_mut(rest))),
+            Value::List(items) => {
+                let (index, rest) = split_index(path)?;
+                items.get_mut(index)?.at_mut(rest)
+            }
+            _ => None,
+        }
+    }
+    /// The mark of the deepest node on a path that exists.
+    pub fn nearest_mark(&self, path: &str) -> Mark {
+        let mut end = path.len();
+        loop {
+            if let Some(node) = self.at(&path[..end]) {
+                return node.mark;
+            }
+            match path[..end].rfind(['.', '[']) {
+                Some(shorter) => end = shorter,
+                None => return self.mark,
+            }
+        }
+    }
+
+    /// Puts a value at a path, making blocks on the way; an index must exist or be the next one.
+    pub fn put(&mut self, path: &str, node: Node) -> Result<(), String> {
+        if let Some(place) = self.at_mut(path) {
+            *place = node;
+            return Ok(());
+        }
+        if matches!(self.value, Value::Null) {
+            self.value = Value::Map(Vec::new());
+        }
+        match &mut self.value {
+            Value::Map(entries) => {
+                for (key, _, child) in entries.iter_mut() {
+                    if let Some(rest) = rest_after(path, key) {
+                        return child.put(rest, node);
+                    }
+                }
+                let (key, rest) = split_key(path);
+                let mut child = Node::new(Value::Null, node.mark);
+                let mark = node.mark;
+                child.put(rest, node)?;
+                entries.push((key.into(), mark, child));
+                Ok(())
+            }
+            Value::List(items) => {
+                let (index, rest) = split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
+                if index > items.len() {
+                    return Err(format!("the list has {} entries; index {index} is too large", items.len()));
+                }
+                if index == items.len() {
+                    items.push(Node::new(Value::Null, node.mark));
+                }
+                items[index].put(rest, node)
+            }
+            _ => Err(format!("`{path}` lies below a plain value")),
+        }
+    }
+
+    /// Takes the map entry out that holds the path; false where there is none.
+    pub(super) fn remove(&mut self, path: &str) -> bool {
+        match &mut self.value {
+            Value::Map(entries) => {
+                let Some(index) = entries.iter().position(|(key, _, _)| rest_after(path, key).is_some()) else { return false };
+                let rest = rest_after(path, &entries[index].0).unwrap_or_default().to_string();
+                // The innermost entry that can go, so that the siblings are still looked at.
+                if rest.is_empty() || !entries[index].2.remove(&rest) {
+                    entries.remove(index);
+                }
+                true
+            }
+            Value::List(items) => match split_index(path) {
+                Some((index, rest)) => items.get_mut(index).is_some_and(|item| item.remove(rest)),
+                None => false,
+            },
+            _ => false,
+        }
+    }
+
+    /// Calls `visit` with every node and its path below this one.
+    pub fn walk(&self, path: &str, visit: &mut dyn FnMut(&str, &Node)) {
+        visit(path, self);
+        match &self.value {
+            Value::List(items) => {
+                for (index, item) in items.iter().enumerate() {
+                    item.walk(&format!("{path}[{index}]"), visit);
+                }
+            }
+            Value::Map(entries) => {
+                for (key, _, value) in entries {
+                    value.walk(&super::trouble::join(path, key), visit);
+                }
+            }
+            _ => {}
+        }
+    }
+    pub fn walk_mut(&mut self, path: &str, visit: &mut dyn FnMut(&str, &mut Node)) {
+        visit(path, self);
+        match &mut self.value {
+            Value::List(items) => {
+                for (index, item) in items.iter_mut().enumerate() {
+                    item.walk_mut(&format!("{path}[{index}]"), visit);
+                }
+            }
+            Value::Map(entries) => {
+                for (key, _, value) in entries {
+                    value.walk_mut(&super::trouble::join(path, key), visit);
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What follows a key at the head of a path.
+fn rest_after<'p>(path: &'p str, key: &str) -> Option<&'p str> {
+    let rest = path.strip_prefix(key)?;
+    if rest.is_empty() || rest.starts_with('[') { Some(rest) } else { rest.strip_prefix('.') }
+}
+fn split_key(path: &str) -> (&str, &str) {
+    match path.find(['.', '[']) {
+        Some(end) if path[end..].starts_with('.') => (&path[..end], &path[end + 1..]),
+        Some(end) => (&path[..end], &path[end..]),
+        None => (path, ""),
+    }
+}
+fn split_index(path: &str) -> Option<(usize, &str)> {
+    let (digits, rest) = match path.strip_prefix('[') {
+        Some(inner) => inner.split_once(']')?,
+        None => path.split_at(path.find(['.', '[']).unwrap_or(path.len())),
+    };
+    Some((digits.parse().ok()?, rest.strip_prefix('.').unwrap_or(rest)))
+}
