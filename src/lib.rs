@@ -9,6 +9,7 @@
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`] | errors by reader, units of stored columns | - |
+//! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | error |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
@@ -41,7 +42,6 @@
 
 pub mod error;
 pub mod units;
-
 pub mod yaml;
 
 pub mod spatial;

@@ -1,1 +1,7 @@
-fn main() {}
+//! The `calib` binary: hands the command line to [`calib::cli`] and turns the result into an exit code.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ExitCode::from(calib::cli::main(std::env::args_os().collect()))
+}

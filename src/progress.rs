@@ -1,1 +1,162 @@
-//! Progress bars: the only file that knows a terminal.
+//! Progress on stderr: bars on a terminal, plain lines elsewhere. The only file that knows a terminal.
+
+use crate::pipeline::{Observer, StageReport, StageStatus};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verbosity {
+    Normal,
+    /// Warnings only.
+    Quiet,
+}
+
+/// Time between two plain lines about the same work; a log file has no use for more.
+const PAUSE: Duration = Duration::from_secs(5);
+
+/// Watches a run.
+pub struct Progress {
+    verbosity: Verbosity,
+    /// Width of the stages' ids.
+    width: usize,
+    state: Mutex<State>,
+}
+
+struct State {
+    /// On a terminal only.
+    bar: Option<ProgressBar>,
+    what: String,
+    unit: String,
+    total: Option<u64>,
+    begun: Instant,
+    said: Instant,
+}
+
+impl Progress {
+    pub fn new(verbosity: Verbosity, width: usize) -> Self {
+        let terminal = verbosity == Verbosity::Normal && std::io::stderr().is_terminal();
+        let bar = terminal.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));
+        let now = Instant::now();
+        let state = State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now };
+        Self { verbosity, width, state: Mutex::new(state) }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.state().bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+    fn line(&self, id: &str, text: &str) {
+        if self.verbosity == Verbosity::Normal {
+            self.print(id, text);
+        }
+    }
+    fn print(&self, id: &str, text: &str) {
+        // A reader that has gone away is no fault.
+        let write = || drop(writeln!(std::io::stderr(), "{id:width$}  {text}", width = self.width));
+        match &self.state().bar {
+            Some(bar) => bar.suspend(write),
+            None => write(),
+        }
+    }
+}
+
+fn spinner() -> ProgressStyle {
+    ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed})").unwrap_or_else(|_| ProgressStyle::default_spinner())
+}
+fn counted(unit: &str) -> ProgressStyle {
+    // Braces in a template are its own.
+    let unit = unit.replace(['{', '}'], "");
+    let template = format!("{{prefix}}  {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left  {{msg}}");
+    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+impl Observer for Progress {
+    fn stage_begins(&self, id: &str, _uses: &str, reason: &str) {
+        self.line(id, &format!("runs ({reason})"));
+        if let Some(bar) = &self.state().bar {
+            bar.reset();
+            bar.set_style(spinner());
+            bar.set_prefix(format!("{id:width$}", width = self.width));
+            bar.set_message("");
+            bar.enable_steady_tick(Duration::from_millis(120));
+        }
+    }
+
+    fn stage_ends(&self, report: &StageReport) {
+        if let Some(bar) = &self.state().bar {
+            bar.disable_steady_tick();
+            bar.finish_and_clear();
+        }
+        let rows: Vec<String> = report.outputs.iter().map(|output| format!("{} {}", output.port, output.table.rows)).collect();
+        let rows = rows.join(", ");
+        match report.status {
+            StageStatus::Cached => {
+                self.line(&report.id, &format!("cached (rows: {rows})"));
+                // The lines of an executed stage came while it ran.
+                report.notes.iter().for_each(|line| self.line(&report.id, &format!("  {line}")));
+                report.warnings.iter().for_each(|line| self.print(&report.id, &format!("  warning: {line}")));
+            }
+            _ => self.line(&report.id, &format!("done in {:.1} s (rows: {rows})", report.wall_seconds.unwrap_or_default())),
+        }
+    }
+
+    fn begin(&self, id: &str, what: &str, total: Option<u64>, unit: &str) {
+        let mut state = self.state();
+        (state.what, state.unit, state.total) = (what.into(), unit.into(), total);
+        (state.begun, state.said) = (Instant::now(), Instant::now());
+        if let Some(bar) = &state.bar {
+            bar.reset();
+            bar.set_prefix(format!("{id:width$}", width = self.width));
+            match total {
+                Some(total) => {
+                    bar.set_length(total);
+                    bar.set_style(counted(unit));
+                }
+                None => bar.set_style(spinner()),
+            }
+            bar.set_message(what.to_string());
+        }
+    }
+
+    fn advance(&self, id: &str, done: u64, message: &str) {
+        let mut state = self.state();
+        let text = if message.is_empty() { state.what.clone() } else { format!("{}: {message}", state.what) };
+        if let Some(bar) = &state.bar {
+            bar.set_position(done);
+            bar.set_message(match state.total {
+                Some(_) => text,
+                None => format!("{text}, {done} {}", state.unit),
+            });
+            return;
+        }
+        if state.said.elapsed() < PAUSE {
+            return;
+        }
+        state.said = Instant::now();
+        let line = match state.total {
+            Some(total) if total > 0 && done > 0 => {
+                let spent = state.begun.elapsed().as_secs_f64();
+                let left = spent / done as f64 * total.saturating_sub(done) as f64;
+                format!("  {text}, {done}/{total} {}, about {left:.0} s left", state.unit)
+            }
+            _ => format!("  {text}, {done} {}", state.unit),
+        };
+        drop(state);
+        self.line(id, &line);
+    }
+
+    fn note(&self, id: &str, line: &str) {
+        self.line(id, &format!("  {line}"));
+    }
+    fn warn(&self, id: &str, line: &str) {
+        self.print(id, &format!("  warning: {line}"));
+    }
+}

@@ -1,1 +1,78 @@
-//! The command line.
+//! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
+
+mod check;
+mod run;
+mod schema;
+mod surroundings;
+mod tables;
+
+use crate::error::{Error, Result};
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::io::Write;
+
+/// Makes industrial robots accurate, and says why they were not: from laser-tracker recordings through pipelines of stages
+/// to an identified model and a report.
+#[derive(Parser)]
+#[command(name = "calib", version, max_term_width = 110, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Run(run::RunArguments),
+    Check(check::CheckArguments),
+    Schema(schema::SchemaArguments),
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
+70 a bug in calib; 75 try again later (disk, permissions).";
+
+/// Runs a command line, prints what comes of it and gives the exit code.
+pub fn main(arguments: Vec<OsString>) -> u8 {
+    let parsed = match Arguments::try_parse_from(&arguments) {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            // Help and version come this way too, with code 0 and on stdout.
+            let code = u8::try_from(error.exit_code()).unwrap_or(2);
+            let _ = error.print();
+            return code;
+        }
+    };
+    let result = match parsed.verb {
+        Verb::Run(verb) => run::main(&verb, &arguments),
+        Verb::Check(verb) => check::main(&verb),
+        Verb::Schema(verb) => schema::main(&verb),
+    };
+    match result {
+        Ok(()) => 0,
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "{}", message(&error));
+            error.exit_code()
+        }
+    }
+}
+
+/// One fault a line, and how many there are where there are several.
+fn message(error: &Error) -> String {
+    match error {
+        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => format!("{error}\nerror: {} faults", faults.len()),
+        _ => format!("error: {error}"),
+    }
+}
+
+/// Prints a result on stdout; a reader that has gone away is no fault.
+fn emit(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::store("stdout", error.to_string())),
+        _ => Ok(()),
+    }
+}
+
+fn emit_json(value: &serde_json::Value) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(error.to_string()))?;
+    emit(&format!("{text}\n"))
+}

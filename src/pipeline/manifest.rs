@@ -32,7 +32,6 @@ pub struct Host {
     pub os: String,
     pub architecture: String,
     pub cores: usize,
-    pub user: Option<String>,
 }
 
 #[derive(Debug, Clone, Serialize)]

@@ -3,7 +3,7 @@
 use super::desk::{self, Desk, Key};
 use super::execute::{self, Place};
 use super::lock::ActionLock;
-use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings};
+use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
 use super::plan::Plan;
 use super::reason;
 use super::select::{Selected, Selection};
@@ -106,7 +106,7 @@ impl Running<'_> {
         let forced = self.selected.forces(index);
         let found = self.store.action(&key)?;
         match found {
-            Lookup::Done(record) if !forced => return self.cached(index, record),
+            Lookup::Done(record) if !forced => return self.cached(index, *record),
             _ if !inside => return Ok(()),
             _ => {}
         }
@@ -115,7 +115,7 @@ impl Running<'_> {
         let mut waiting = || self.observer.note(id, "waiting for another run that does the same");
         let lock = ActionLock::take(self.store, &key.id(), &mut waiting);
         if let (false, Lookup::Done(record)) = (forced, self.store.action(&key)?) {
-            return self.cached(index, record);
+            return self.cached(index, *record);
         }
         let result = self.execute(index, key, reason);
         drop(lock);
@@ -142,11 +142,7 @@ impl Running<'_> {
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
-        let published = if self.selected.forces(index) {
-            self.store.republish(&key, products, account)?
-        } else {
-            self.store.publish(&key, products, account)?
-        };
+        let published = self.store.publish(&key, products, account)?;
         self.manifest.stages[index].status = StageStatus::Executed;
         if let Some(conflict) = published.conflict {
             self.observer.warn(&stage.id, &conflict);

@@ -17,17 +17,36 @@ pub const KEY_FORMAT: u32 = 1;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageKey {
     pub key_format: u32,
+    /// The stage's id: the `step` of its tables.
+    pub id: String,
     pub stage: String,
     pub implementation: u32,
     /// Resolved settings, defaults filled in.
     pub settings: Value,
     /// Input tables by port.
-    pub reads: BTreeMap<String, Vec<TableHash>>,
+    pub reads: BTreeMap<String, Vec<ReadKey>>,
     /// Raw input files, by their place in the settings.
-    pub files: BTreeMap<String, FileHash>,
+    pub files: BTreeMap<String, FileKey>,
     /// Output schemas (`name/version`) by port.
     pub schemas: BTreeMap<String, String>,
     pub seed: u64,
+}
+
+/// An input table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReadKey {
+    /// The stage that wrote it, where the port takes several and the reader sees whose they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stage: Option<String>,
+    pub table: TableHash,
+}
+
+/// A raw input file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FileKey {
+    /// Its name without folders, which tables of rejected rows show.
+    pub name: String,
+    pub content: FileHash,
 }
 
 /// The hash of a [`StageKey`], as 64 hex digits.

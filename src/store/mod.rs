@@ -19,7 +19,7 @@ pub mod writer;
 
 pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
 pub use content::TableHash;
-pub use key::{ActionId, FileHash, KEY_FORMAT, StageKey};
+pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
 pub use runs::Run;
 pub use writer::{FinishedFile, TableWriter};
 

@@ -1,0 +1,54 @@
+//! `calib check`: reads and wires a pipeline and prints its graph, or every fault at once.
+
+use super::emit;
+use crate::error::Result;
+use crate::pipeline::{Override, Plan};
+use crate::stage::STAGES;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Check a pipeline: print the graph of its stages and tables, or every fault with its line.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib check pipelines/ur10/pipeline.yaml
+  calib check pipelines/case/pipeline.yaml --set case=recordings/robot-7")]
+pub(super) struct CheckArguments {
+    /// The pipeline's YAML file
+    #[arg(value_name = "PIPELINE")]
+    pipeline: PathBuf,
+    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+}
+
+pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
+    emit(&graph(&Plan::load(&arguments.pipeline, &arguments.set, STAGES)?))
+}
+
+fn graph(plan: &Plan) -> String {
+    let mut text = format!("pipeline {}, seed {}, {} stages\n", plan.name, plan.seed, plan.stages.len());
+    for stage in &plan.stages {
+        let uses = if stage.id == stage.entry.name { String::new() } else { format!(" (uses {})", stage.entry.name) };
+        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
+        let width = stage.inputs.iter().map(|input| input.port.name.len()).max().unwrap_or(0);
+        for input in &stage.inputs {
+            let from = input.from.iter().map(|origin| {
+                let writer = &plan.stages[origin.stage];
+                format!("{}.{}", writer.id, writer.outputs[origin.port].name)
+            });
+            let from: Vec<String> = from.collect();
+            let from = if from.is_empty() { "(none)".into() } else { from.join(", ") };
+            text.push_str(&format!("  reads   {:width$}  <- {from}\n", input.port.name));
+        }
+        for file in &stage.files {
+            text.push_str(&format!("  file    {} = {}\n", file.place, file.path.display()));
+        }
+        let outputs: Vec<String> = stage
+            .outputs
+            .iter()
+            .map(|port| if port.name == port.kind { port.name.into() } else { format!("{} ({})", port.name, port.kind) })
+            .collect();
+        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
+    }
+    text
+}

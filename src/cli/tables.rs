@@ -1,0 +1,72 @@
+//! The result of a run as text and as JSON: errors step by step, rejected rows.
+
+use crate::error::Result;
+use crate::pipeline::Outcome;
+use crate::store::Store;
+use crate::table::{Statistics, StatisticsRow, Table};
+use serde_json::json;
+
+fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
+    let mut rows = Vec::new();
+    for output in outcome.tables(Statistics::KIND) {
+        rows.extend(Statistics::from_frame(&store.load(&output.table)?)?.0);
+    }
+    Ok(rows)
+}
+
+/// Two tables: points that no model has seen, and those that the models were fitted to.
+pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
+    let rows = rows(outcome, store)?;
+    let mut text = String::new();
+    for (held_out, title) in
+        [(false, "training points (the models were fitted to these: flattered)"), (true, "held-out points (no model has seen these)")]
+    {
+        let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.held_out == held_out).collect();
+        if !rows.is_empty() {
+            text.push_str(&block(title, &rows));
+        }
+    }
+    Ok(text)
+}
+
+fn block(title: &str, rows: &[&StatisticsRow]) -> String {
+    let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
+        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+    };
+    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let mut text = format!(
+        "{title}, error in mm\n  {:step$}  {:set$}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}\n",
+        "step", "set", "points", "mean", "std", "p95", "max"
+    );
+    for row in rows {
+        text.push_str(&format!(
+            "  {:step$}  {:set$}  {:>6}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}\n",
+            row.step, row.set, row.points, row.mean_mm, row.std_mm, row.p95_mm, row.max_mm
+        ));
+    }
+    text + "\n"
+}
+
+pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+    let row = |row: StatisticsRow| {
+        json!({
+            "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
+            "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
+            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm,
+        })
+    };
+    Ok(rows(outcome, store)?.into_iter().map(row).collect())
+}
+
+pub(super) fn rejected_rows(outcome: &Outcome) -> u64 {
+    outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
+}
+
+/// Nothing where nothing was rejected.
+pub(super) fn rejected(outcome: &Outcome) -> String {
+    let line = |output: &crate::pipeline::OutputRecord| {
+        let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        format!("rejected rows: {}, each with its reason in {path}\n", output.table.rows)
+    };
+    outcome.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
+}
