@@ -77,12 +77,8 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
     // `--force` without a stage stands for all of them.
     let force = arguments.force.as_ref().map(|ids| ids.iter().filter(|id| !id.is_empty()).cloned().collect());
-    let selection = Selection {
-        only: arguments.only.clone(),
-        from: arguments.from.clone(),
-        until: arguments.until.clone(),
-        force,
-    };
+    let selection =
+        Selection { only: arguments.only.clone(), from: arguments.from.clone(), until: arguments.until.clone(), force };
     if arguments.dry_run {
         let forecasts = preview(&plan, &store, &selection)?;
         return if arguments.json {

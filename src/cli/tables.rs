@@ -18,9 +18,10 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
 pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     let mut text = String::new();
-    for (held_out, title) in
-        [(false, "training points (the models were fitted to these: flattered)"), (true, "held-out points (no model has seen these)")]
-    {
+    for (held_out, title) in [
+        (false, "training points (the models were fitted to these: flattered)"),
+        (true, "held-out points (no model has seen these)"),
+    ] {
         let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.held_out == held_out).collect();
         if !rows.is_empty() {
             text.push_str(&block(title, &rows));

@@ -3,9 +3,9 @@
 use super::plan::{Plan, PlannedStage};
 use super::services::label;
 use crate::error::{Error, Result};
+use crate::stage::Arity;
 use crate::store::schema;
 use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
-use crate::stage::Arity;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};

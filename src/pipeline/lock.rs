@@ -1,6 +1,5 @@
 //! One advisory lock per action, so that two runs share work instead of doing it twice. Correctness does not depend on it.
 
-use crate::error::Result;
 use crate::store::{ActionId, Store};
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -13,22 +12,20 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Held while a stage runs; the kernel frees it when the process dies.
 pub(super) struct ActionLock {
     held: Option<(File, PathBuf)>,
-    /// Another run held the lock first: it may have done the work.
-    pub waited: bool,
 }
 
 impl ActionLock {
     /// Takes the lock of an action, waiting for whoever has it; `waiting` is told once.
-    pub fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Result<Self> {
+    pub fn take(store: &Store, action: &ActionId, waiting: &mut dyn FnMut()) -> Self {
         let folder = store.root().join("locks");
         let path = folder.join(format!("{action}.lock"));
         let open = || fs::create_dir_all(&folder).and_then(|()| File::options().create(true).append(true).open(&path));
         // Where locks cannot be had the work may be done twice, which is harmless.
-        let Ok(file) = open() else { return Ok(Self { held: None, waited: false }) };
+        let Ok(file) = open() else { return Self { held: None } };
         let mut waited = Duration::ZERO;
         loop {
             match file.try_lock() {
-                Ok(()) => return Ok(Self { held: Some((file, path)), waited: !waited.is_zero() }),
+                Ok(()) => return Self { held: Some((file, path)) },
                 Err(fs::TryLockError::WouldBlock) if waited < PATIENCE => {
                     if waited.is_zero() {
                         waiting();
@@ -36,7 +33,7 @@ impl ActionLock {
                     std::thread::sleep(PAUSE);
                     waited += PAUSE;
                 }
-                Err(_) => return Ok(Self { held: None, waited: !waited.is_zero() }),
+                Err(_) => return Self { held: None },
             }
         }
     }

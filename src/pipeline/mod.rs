@@ -13,6 +13,8 @@ mod schema;
 mod select;
 mod services;
 mod spec;
+#[cfg(test)]
+mod tests;
 mod wiring;
 
 pub use manifest::{Host, Manifest, OutputRecord, StageReport, StageStatus, Surroundings, Tool};

@@ -161,10 +161,10 @@ fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> 
             Piece::Variable(name) => name,
         };
         let Some(variable) = variables.get(name) else {
-            let hint = nearest(name, variables.keys().map(String::as_str)).map(|near| format!(" did you mean `${{{near}}}`?"));
+            let hint = nearest(name, variables.keys().map(String::as_str)).map(|near| format!("; did you mean `${{{near}}}`?"));
             return Err(format!(
-                "`${{{name}}}` is not defined;{} Give it under `variables` or by --set {name}=VALUE",
-                hint.unwrap_or_default()
+                "`${{{name}}}` is not defined{} Give it under `variables` or by --set {name}=VALUE",
+                hint.unwrap_or_else(|| ".".into())
             ));
         };
         if matches!(variable.value, Value::Null) {
@@ -198,7 +198,8 @@ fn pieces(text: &str) -> impl Iterator<Item = Piece<'_>> {
             rest = &rest[name.len() + 3..];
             return Some(Piece::Variable(name));
         }
-        let end = rest.char_indices().skip(1).find(|(at, _)| variable_at(&rest[*at..]).is_some()).map_or(rest.len(), |(at, _)| at);
+        let end =
+            rest.char_indices().skip(1).find(|(at, _)| variable_at(&rest[*at..]).is_some()).map_or(rest.len(), |(at, _)| at);
         let (plain, after) = rest.split_at(end);
         rest = after;
         Some(Piece::Plain(plain))

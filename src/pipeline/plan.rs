@@ -37,7 +37,10 @@ impl Plan {
     pub fn load(file: &Path, overrides: &[Override], stages: &'static [StageEntry]) -> Result<Self> {
         let label = file.display().to_string();
         let text = std::fs::read(file).map_err(|error| {
-            Error::spec(&label, if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() })
+            Error::spec(
+                &label,
+                if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() },
+            )
         })?;
         let text = String::from_utf8(text).map_err(|_| Error::spec(&label, "not a text file: expected YAML in UTF-8"))?;
         Self::parse(file, text, overrides, stages)
@@ -51,19 +54,20 @@ impl Plan {
         for index in 0..draft.stages.len() {
             let (wired, troubles) = wiring::wire(&draft.stages, index, registry);
             inputs.push(wired);
-            draft.faults.extend(troubles.into_iter().map(|trouble| trouble.below(&format!("stages[{index}]")).fault(&label)));
+            draft.troubles.extend(troubles.into_iter().map(|trouble| trouble.below(&format!("stages[{index}]"))));
         }
+        let mut faults = draft.all_faults(&label);
         let mut stages = Vec::new();
         for (stage, inputs) in draft.stages.into_iter().zip(inputs) {
             if let (Some(entry), Some(body)) = (stage.entry, stage.stage) {
                 let outputs = (entry.writes)();
                 stages.push(PlannedStage { id: stage.id, entry, stage: body, files: stage.files, inputs, outputs });
-            } else if draft.faults.is_empty() {
-                draft.faults.push(Fault::new(&label, format!("stage `{}` could not be read", stage.id)));
+            } else if faults.is_empty() {
+                faults.push(Fault::new(&label, format!("stage `{}` could not be read", stage.id)));
             }
         }
-        if !draft.faults.is_empty() {
-            return Err(Error::Spec(draft.faults));
+        if !faults.is_empty() {
+            return Err(Error::Spec(faults));
         }
         Ok(Self {
             file: file.into(),

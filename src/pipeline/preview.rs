@@ -13,9 +13,13 @@ use serde::Serialize;
 #[serde(rename_all = "snake_case", tag = "status")]
 pub enum Prospect {
     Cached,
-    Run { reason: String },
+    Run {
+        reason: String,
+    },
     /// Not known before another stage has run.
-    Pending { on: String },
+    Pending {
+        on: String,
+    },
     /// Outside of `--only`, `--from`, `--until`, and not cached.
     NotSelected,
 }

@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use crate::error::Result;
-use crate::store::{Lookup, StageKey, Store};
+use crate::store::{FileHash, Lookup, StageKey, Store};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,8 +30,9 @@ fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKe
             continue;
         }
         let stages = manifest["stages"].as_array().map(Vec::as_slice).unwrap_or_default();
-        let key = stages.iter().find(|entry| entry["id"] == stage).map(|entry| entry["key"].clone());
-        if let Some(Ok(key)) = key.filter(|key| !key.is_null()).map(serde_json::from_value) {
+        let done = |entry: &&Value| entry["id"] == stage && (entry["status"] == "executed" || entry["status"] == "cached");
+        let key = stages.iter().find(done).map(|entry| serde_json::from_value(entry["key"].clone()));
+        if let Some(Ok(key)) = key {
             return Ok(Some(key));
         }
     }
@@ -53,7 +54,7 @@ fn changes(before: &StageKey, now: &StageKey) -> String {
         reasons.push(format!("settings changed: {}", few(settings.into_iter().collect())));
     }
     reasons.extend(compare("input", &before.reads, &now.reads));
-    reasons.extend(compare("file", &before.files, &now.files));
+    reasons.extend(compare("file", &by_name(before), &by_name(now)));
     reasons.extend(compare("schema of", &before.schemas, &now.schemas));
     if before.seed != now.seed {
         reasons.push("seed changed".into());
@@ -62,6 +63,10 @@ fn changes(before: &StageKey, now: &StageKey) -> String {
         reasons.push("calib keys its results in another way now".into());
     }
     if reasons.is_empty() { "its tables are no longer in the store".into() } else { reasons.join("; ") }
+}
+
+fn by_name(key: &StageKey) -> BTreeMap<String, (&str, &FileHash)> {
+    key.files.iter().map(|(place, file)| (file.name.clone(), (place.as_str(), &file.content))).collect()
 }
 
 fn compare<T: PartialEq>(what: &str, before: &BTreeMap<String, T>, now: &BTreeMap<String, T>) -> Option<String> {

@@ -47,7 +47,8 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<Outcome> {
     let selected = options.selection.of(plan)?;
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
+    let threads =
+        rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
     let begun = (surroundings.now)();
     let manifest = Manifest::new(plan, surroundings, options.jobs, rfc3339(begun));
     let record = store.begin_run(&surroundings.run_id, &manifest)?;

@@ -19,7 +19,10 @@ pub(super) struct Draft {
     pub stages: Vec<StageDraft>,
     /// The YAML with variables and overrides filled in.
     pub resolved: serde_json::Value,
+    /// Of the command line.
     pub faults: Vec<Fault>,
+    /// Of the file.
+    pub troubles: Vec<Trouble>,
 }
 
 pub(super) struct StageDraft {
@@ -76,15 +79,17 @@ struct StageHead {
 
 /// Reads `text`, the content of the YAML `file`; relative paths in it start at the folder of the file.
 pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static [StageEntry]) -> Draft {
-    let label = file.display().to_string();
     let (tree, mut troubles) = yaml::parse(text);
-    let mut draft =
-        Draft { name: String::new(), seed: 0, stages: Vec::new(), resolved: serde_json::Value::Null, faults: Vec::new() };
-    let Some(mut tree) = tree else {
-        draft.faults.extend(troubles.into_iter().map(|trouble| trouble.fault(&label)));
-        return draft;
+    let mut draft = Draft {
+        name: String::new(),
+        seed: 0,
+        stages: Vec::new(),
+        resolved: serde_json::Value::Null,
+        faults: Vec::new(),
+        troubles: Vec::new(),
     };
-    let (variables, mut faults) = overrides::apply(&mut tree, sets);
+    let Some(mut tree) = tree else { return Draft { troubles, ..draft } };
+    let (variables, faults) = overrides::apply(&mut tree, sets);
     if let Err(more) = typed::<Head>(&tree) {
         troubles.extend(more);
     }
@@ -108,22 +113,26 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
             }
         }
     }
-    troubles.extend(non_finite(&tree));
+    let infinite = non_finite(&tree);
+    troubles.retain(|trouble| infinite.iter().all(|other| other.path != trouble.path));
+    troubles.extend(infinite);
     draft.resolved = json(&tree);
-    faults.extend(in_order(troubles).into_iter().map(|trouble| trouble.fault(&label)));
-    draft.faults = faults;
-    draft
+    Draft { faults, troubles, ..draft }
 }
 
-/// Faults in the order of the file, those without a line last.
-fn in_order(mut troubles: Vec<Trouble>) -> Vec<Trouble> {
-    troubles.sort_by_key(|trouble| match trouble.mark {
-        Some(Mark::Line { line, column }) => (line, column),
-        _ => (u64::MAX, 0),
-    });
-    let mut seen = BTreeSet::new();
-    troubles.retain(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
-    troubles
+impl Draft {
+    /// All faults, those of the file in its order; nothing where it is sound.
+    pub fn all_faults(&mut self, file: &str) -> Vec<Fault> {
+        self.troubles.sort_by_key(|trouble| match trouble.mark {
+            Some(Mark::Line { line, column }) => (line, column),
+            _ => (u64::MAX, 0),
+        });
+        let mut seen = BTreeSet::new();
+        let mut faults = std::mem::take(&mut self.faults);
+        let troubles = self.troubles.drain(..).filter(|trouble| seen.insert((trouble.path.clone(), trouble.message.clone())));
+        faults.extend(troubles.map(|trouble| trouble.fault(file)));
+        faults
+    }
 }
 
 fn check_head(tree: &Node) -> Vec<Trouble> {
@@ -134,7 +143,9 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
     };
     match tree.get("calib").map(|node| &node.value) {
         Some(Value::Integer(format)) if *format == FORMAT.into() => {}
-        Some(Value::Integer(format)) => fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}")),
+        Some(Value::Integer(format)) => {
+            fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}"))
+        }
         _ => {}
     }
     if let Some(name) = tree.get("name").and_then(Node::text)
@@ -242,9 +253,9 @@ fn unreadable(path: &Path) -> Option<String> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Some(format!("`{shown}` is a folder; expected a file")),
         Ok(_) => None,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            Some(format!("no such file: `{shown}` (paths are relative to the YAML file; those given by --set to the working directory)"))
-        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Some(format!(
+            "no such file: `{shown}` (paths are relative to the YAML file; those given by --set to the working directory)"
+        )),
         Err(error) => Some(format!("`{shown}` cannot be read: {error}")),
     }
 }

@@ -44,7 +44,8 @@ pub(super) fn wire(stages: &[StageDraft], index: usize, registry: &[StageEntry])
             // A stage that is not known may write anything: its own fault is enough.
             let blind = stages[..index].iter().any(|stage| stage.entry.is_none());
             if from.is_empty() && port.arity == Arity::One && !blind && !stage.reads.contains_key(port.name) {
-                let writers: Vec<&str> = registry.iter().filter(|entry| writes(entry, port.kind)).map(|entry| entry.name).collect();
+                let writers: Vec<&str> =
+                    registry.iter().filter(|entry| writes(entry, port.kind)).map(|entry| entry.name).collect();
                 troubles.push(
                     Trouble::new(format!(
                         "stage `{}` reads a `{}` table and no stage before it writes one; put one of these before it: {}",

@@ -3,7 +3,10 @@
 /// Where a value was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
-    Line { line: u64, column: u64 },
+    Line {
+        line: u64,
+        column: u64,
+    },
     /// `--set`.
     CommandLine,
     Unknown,
@@ -87,9 +90,7 @@ impl Node {
             return Some(self);
         }
         match &self.value {
-            Value::Map(entries) => {
-                entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest)))
-            }
+            Value::Map(entries) => entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest))),
             Value::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get(index)?.at(rest)
@@ -102,9 +103,9 @@ impl Node {
             return Some(self);
         }
         match &mut self.value {
-            Value::Map(entries) => entries
-                .iter_mut()
-                .find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at_mut(rest))),
+            Value::Map(entries) => {
+                entries.iter_mut().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at_mut(rest)))
+            }
             Value::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get_mut(index)?.at_mut(rest)
