@@ -4,12 +4,12 @@
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate`) has no files
 //! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
-//! YAML -> `Spec` -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
+//! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`] | errors by reader, units of stored columns | - |
-//! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | error |
+//! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
@@ -18,8 +18,8 @@
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | report, table, numerics |
-//! | [`pipeline`] | the YAML, the plan, the run | stage, store |
+//! | [`stage`] | one file per step of a pipeline | report, table, numerics, yaml |
+//! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants

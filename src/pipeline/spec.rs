@@ -98,19 +98,17 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
     draft.seed = tree.get("seed").and_then(|seed| typed(seed).ok()).unwrap_or_default();
 
     let mut known = BTreeSet::new();
-    if let Some(list) = tree.at_mut("stages") {
-        if let Value::List(items) = &mut list.value {
-            for (index, item) in items.iter_mut().enumerate() {
-                let path = format!("stages[{index}]");
-                troubles.extend(overrides::substitute(item, &path, &variables));
-                let (stage, more) = read_stage(file, item, stages);
-                troubles.extend(more.into_iter().map(|trouble| trouble.at(item.mark).below(&path)));
-                if !stage.id.is_empty() && !known.insert(stage.id.clone()) {
-                    let message = format!("two stages have the id `{}`; give one of them another `id`", stage.id);
-                    troubles.push(Trouble::new(message).at(item.mark).below(&path));
-                }
-                draft.stages.push(stage);
+    if let Some(Value::List(items)) = tree.at_mut("stages").map(|list| &mut list.value) {
+        for (index, item) in items.iter_mut().enumerate() {
+            let path = format!("stages[{index}]");
+            troubles.extend(overrides::substitute(item, &path, &variables));
+            let (stage, more) = read_stage(file, item, stages);
+            troubles.extend(more.into_iter().map(|trouble| trouble.at(item.mark).below(&path)));
+            if !stage.id.is_empty() && !known.insert(stage.id.clone()) {
+                let message = format!("two stages have the id `{}`; give one of them another `id`", stage.id);
+                troubles.push(Trouble::new(message).at(item.mark).below(&path));
             }
+            draft.stages.push(stage);
         }
     }
     let infinite = non_finite(&tree);

@@ -72,7 +72,7 @@ fn by_kind(earlier: &[StageDraft], port: Port) -> Vec<Origin> {
             Arity::Every => origins.extend(matching().map(|(port, _)| Origin { stage, port })),
             // Of several outputs of one kind, the one that bears the kind's name.
             Arity::One | Arity::Optional => {
-                let best = matching().find(|(_, output)| output.name == port.kind).or_else(|| matching().last());
+                let best = matching().find(|(_, output)| output.name == port.kind).or_else(|| matching().next_back());
                 if let Some((port, _)) = best {
                     origins = vec![Origin { stage, port }];
                 }

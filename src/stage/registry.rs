@@ -2,7 +2,7 @@
 
 use super::{Context, Output, Port, RawFile, Reads, Stage, Writes};
 use crate::error::{Fault, Result};
-use crate::store::frame::Frame;
+use crate::table::Frame;
 use crate::yaml::{Node, Trouble, typed};
 use schemars::{Schema, SchemaGenerator};
 
@@ -31,6 +31,9 @@ impl<T: Stage> ErasedStage for T {
     }
 }
 
+/// A stage whose settings are typed, or all their faults.
+pub type Parsed = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
+
 /// One kind of stage, as the pipeline's YAML names it.
 #[derive(Debug, Clone, Copy)]
 pub struct StageEntry {
@@ -40,7 +43,7 @@ pub struct StageEntry {
     pub reads: fn() -> Vec<Port>,
     pub writes: fn() -> Vec<Port>,
     /// Types the settings; all their faults, with paths below `with`.
-    pub parse: fn(&Node) -> Result<Box<dyn ErasedStage>, Vec<Trouble>>,
+    pub parse: fn(&Node) -> Parsed,
     pub schema: fn(&mut SchemaGenerator) -> Schema,
 }
 

@@ -44,7 +44,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
         let path = entry.unwrap().path();
         if path.is_dir() {
             found.extend(files(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs") && !path.ends_with("tests.rs") {
             found.push(path);
         }
     }
@@ -52,7 +52,7 @@ fn files(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// `crate::a::b` -> (`a`, `a::b`), outside comments and the unit tests at the end of the file.
+/// `crate::a::b` -> (`a`, `a::b`), outside comments and unit tests.
 fn uses(text: &str) -> Vec<(usize, String, String)> {
     let body = text.lines().take_while(|line| line.trim() != "#[cfg(test)]").enumerate();
     let code = body.filter(|(_, line)| !line.trim_start().starts_with("//"));

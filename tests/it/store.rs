@@ -12,6 +12,7 @@ use std::sync::Arc;
 pub(super) fn key(stage: &str, seed: u64) -> StageKey {
     StageKey {
         key_format: KEY_FORMAT,
+        id: stage.into(),
         stage: stage.into(),
         implementation: 1,
         settings: serde_json::json!({"every": 4, "tolerance": 1.0}),
