@@ -242,4 +242,9 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
 }
 
 /// Every kind of stage, one line each.
-pub const STAGES: &[StageEntry] = &[];
+pub const STAGES: &[StageEntry] = &[
+    StageEntry::of::<ingest::Ingest>(),
+    StageEntry::of::<split::SplitBy>(),
+    StageEntry::of::<Validate>(),
+    StageEntry::of::<Report>(),
+];
