@@ -243,8 +243,11 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
 
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[
+    StageEntry::of::<ReadRobot>(),
     StageEntry::of::<ingest::Ingest>(),
     StageEntry::of::<split::SplitBy>(),
+    StageEntry::of::<Identify>(),
+    StageEntry::of::<Stiffness>(),
     StageEntry::of::<Validate>(),
     StageEntry::of::<Report>(),
 ];
