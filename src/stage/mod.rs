@@ -245,6 +245,7 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
 pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<ReadRobot>(),
     StageEntry::of::<ingest::Ingest>(),
+    StageEntry::of::<Simulate>(),
     StageEntry::of::<split::SplitBy>(),
     StageEntry::of::<Identify>(),
     StageEntry::of::<Stiffness>(),
