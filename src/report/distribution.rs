@@ -16,6 +16,11 @@ pub(super) struct Errors {
 }
 
 const WIDTH: f64 = 420.0;
+const TOP: f64 = 12.0;
+/// Height of one histogram.
+const ROW: f64 = 62.0;
+/// Width of a bold letter, roughly: enough to keep labels apart.
+const GLYPH: f64 = 6.6;
 const BINS: usize = 36;
 /// Points of a cumulative curve: more would not be seen.
 const CURVE: usize = 240;
@@ -30,8 +35,7 @@ fn scale(all: &[Errors]) -> Scale {
 
 /// Points per equal bin (equal on the axis as drawn), a row per step, one height scale for all.
 pub(super) fn histogram(all: &[Errors], title: &str) -> String {
-    const ROW: f64 = 62.0;
-    let area = Area { left: 10.0, top: 8.0, right: WIDTH - 10.0, bottom: 8.0 + ROW * all.len() as f64 };
+    let area = Area { left: 16.0, top: TOP, right: WIDTH - 12.0, bottom: TOP + ROW * all.len() as f64 };
     let scale = scale(all).over(area.left, area.right);
     let counts: Vec<[usize; BINS]> = all.iter().map(|errors| bins(&errors.sorted_mm, scale, area)).collect();
     let highest = counts.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
@@ -51,11 +55,12 @@ pub(super) fn histogram(all: &[Errors], title: &str) -> String {
         baseline(&mut svg, Area { bottom: foot, ..area });
         let mean = scale.at(errors.mean_mm);
         svg.line("mean", [mean, foot - ROW + 22.0], [mean, foot]);
-        // The name stands on the side that the mean leaves free.
-        let (name, number) = if mean > (area.left + area.right) / 2.0 { ("name", "value end") } else { ("name end", "value") };
-        let (name_at, gap) = if name == "name" { (area.left, -4.0) } else { (area.right, 4.0) };
-        svg.text(name, [name_at, foot - ROW + 18.0], &errors.step);
-        svg.text(number, [mean + gap, foot - ROW + 18.0], &format!("mean {}", mm(errors.mean_mm)));
+        svg.text("name", [area.left, foot - ROW + 18.0], &errors.step);
+        // Clear of the name on the left, and of the edge on the right.
+        let clear = area.left + GLYPH * errors.step.chars().count() as f64 + 8.0;
+        let (class, x) =
+            if mean > (area.left + area.right) / 2.0 { ("value end", mean - 4.0) } else { ("value", clear.max(mean + 4.0)) };
+        svg.text(class, [x, foot - ROW + 18.0], &format!("mean {}", mm(errors.mean_mm)));
     }
     name_x(&mut svg, area, "position error, mm");
     svg.finish(title)
@@ -72,7 +77,7 @@ fn bins(errors: &[f64], scale: Scale, area: Area) -> [usize; BINS] {
 
 /// Share of the points whose error is at most so large, a curve per step.
 pub(super) fn cumulative(all: &[Errors], title: &str) -> String {
-    let area = Area { left: 44.0, top: 26.0, right: WIDTH - 10.0, bottom: 262.0 };
+    let area = Area { left: 44.0, top: 26.0, right: WIDTH - 12.0, bottom: (TOP + ROW * all.len() as f64).clamp(190.0, 330.0) };
     let scale = scale(all).over(area.left, area.right);
     let share = Scale::linear(0.0, 100.0).over(area.bottom, area.top);
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);

@@ -67,6 +67,8 @@ struct Row {
     step: String,
     colour: String,
     points: String,
+    /// Of the last step of the pipeline.
+    last: bool,
     /// mean, std, p95, max, rms, median, rms x, y, z, noise.
     values: Vec<String>,
 }
@@ -140,6 +142,7 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         step: row.step.clone(),
         colour: steps.colour(row.order),
         points: count(row.points),
+        last: Some(row.order) == steps.last(),
         values: values.into_iter().map(mm).collect(),
     }
 }
@@ -147,6 +150,10 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
 /// The first step with held-out rows of the same set as `after`.
 fn before<'a>(rows: &'a [StatisticsRow], after: &StatisticsRow) -> Option<&'a StatisticsRow> {
     rows.iter().filter(|r| r.held_out && r.set == after.set && r.order < after.order).min_by_key(|r| r.order)
+}
+
+fn points(number: i64) -> String {
+    if number == 1 { "one point".into() } else { format!("{} points", count(number)) }
 }
 
 fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
@@ -163,21 +170,21 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
         };
     };
     let before_row = before(rows, after);
-    let points = format!("{} points of the set \u{201c}{}\u{201d}, to which nothing was fitted", count(after.points), after.set);
+    let sample = format!("{} of the set \u{201c}{}\u{201d}, to which nothing was fitted", points(after.points), after.set);
     let (kind, sentence) = match before_row {
         Some(before) if after.mean_mm < before.mean_mm => (
             "better",
-            format!("The mean position error fell from {} mm to {} mm on {points}.", mm(before.mean_mm), mm(after.mean_mm)),
+            format!("The mean position error fell from {} mm to {} mm on {sample}.", mm(before.mean_mm), mm(after.mean_mm)),
         ),
         Some(before) => (
             "worse",
             format!(
-                "The calibration did not help: the mean position error went from {} mm to {} mm on {points}.",
+                "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
                 mm(before.mean_mm),
                 mm(after.mean_mm)
             ),
         ),
-        None => ("unknown", format!("The mean position error is {} mm on {points}.", mm(after.mean_mm))),
+        None => ("unknown", format!("The mean position error is {} mm on {sample}.", mm(after.mean_mm))),
     };
     let uneven = before_row.filter(|before| before.points != after.points).map(|before| {
         format!("Before, the set had {} held-out points; the two means are not of the same points.", count(before.points))

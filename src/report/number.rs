@@ -29,11 +29,19 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
         return "0".into();
     }
     let power = value.abs().log10().floor();
-    if (-5.0..7.0).contains(&power) {
+    if (-3.0..7.0).contains(&power) {
         fixed(value, (digits as f64 - 1.0 - power).max(0.0) as usize)
     } else {
         format!("{value:.*e}", digits.saturating_sub(1))
     }
+}
+
+/// The same without trailing zeros, for a number that is to be copied.
+pub(super) fn exact(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
+    let (number, power) = text.split_once('e').map_or((text.as_str(), None), |(number, power)| (number, Some(power)));
+    let short = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
+    power.map_or_else(|| short.to_owned(), |power| format!("{short}e{power}"))
 }
 
 /// A count with its thousands set apart.
@@ -69,7 +77,7 @@ pub(super) fn readings(stored: &str) -> Option<(Reading, Reading)> {
         Quantity::Angle => Some((into(Unit::Degree, 4), into(Unit::Arcsecond, 1))),
         Quantity::Compliance => same(per("arcsec/Nm", 4)),
         Quantity::CurrentCompliance => same(per("arcsec/A", 3)),
-        Quantity::Number => same(reading(1.0, "", 6)),
+        Quantity::Number => Some((reading(1.0, "", 6), reading(1e6, "\u{d7}10\u{207b}\u{2076}", 1))),
         _ => same(reading(1.0, unit.symbol(), 4)),
     }
 }
@@ -88,5 +96,33 @@ impl Reading {
     }
     pub fn show_signed(&self, value: f64, decimals: usize) -> String {
         signed(value * self.factor, decimals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_a_person_writes_them() {
+        assert_eq!(mm(-0.0004), "0.000");
+        assert_eq!(signed(0.0004, 3), "0.000");
+        assert_eq!(signed(1.25, 1), "+1.2");
+        assert_eq!(
+            [0.0, 812.44, 0.0183, 1e-5, 4.2e9].map(|v| significant(v, 4)),
+            ["0", "812.4", "0.01830", "1.000e-5", "4.200e9"]
+        );
+        assert_eq!([12.5, 0.0, 120.0, 8.2e-7].map(|v| exact(v, 9)), ["12.5", "0", "120", "8.2e-7"]);
+        assert_eq!([7, -1234, 10_000_000].map(count), ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]);
+    }
+
+    #[test]
+    fn angles_read_in_degrees_and_their_changes_in_arcseconds() {
+        let (coarse, fine) = readings("rad").expect("a unit of the tables");
+        let sigma = Some(1e-7);
+        assert_eq!(coarse.show(std::f64::consts::FRAC_PI_2, coarse.decimals_for(None)), "90.0000");
+        // A sigma of 0.0206 arcsec is shown with two digits.
+        assert_eq!(fine.show(1e-7, fine.decimals_for(sigma)), "0.021");
+        assert_eq!((coarse.symbol, fine.symbol), ("deg", "arcsec"));
     }
 }

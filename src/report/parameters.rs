@@ -1,6 +1,6 @@
 //! The identified parameters in people's units, and what the data could not tell.
 
-use super::number::{Reading, readings, significant};
+use super::number::{Reading, exact, readings, significant};
 use crate::table::{ParameterRow, Parameters};
 use serde::Serialize;
 
@@ -45,16 +45,20 @@ struct Remark {
 
 impl Section {
     pub fn new(parameters: &Parameters) -> Self {
-        let mut groups: Vec<Group> = Vec::new();
+        let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
         for parameter in &parameters.0 {
-            match groups.iter_mut().find(|group| group.effect == parameter.effect) {
-                Some(group) => group.rows.push(row(parameter)),
-                None => groups.push(Group { effect: parameter.effect.clone(), rows: vec![row(parameter)] }),
+            match effects.iter_mut().find(|(effect, _)| *effect == parameter.effect) {
+                Some((_, rows)) => rows.push(parameter),
+                None => effects.push((&parameter.effect, vec![parameter])),
             }
         }
+        let groups = effects.into_iter().map(|(effect, rows)| Group {
+            effect: effect.into(),
+            rows: rows.iter().map(|parameter| row(parameter, &rows)).collect(),
+        });
         let remarked = parameters.0.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
         Self {
-            groups,
+            groups: groups.collect(),
             remarks: remarked
                 .map(|p| Remark {
                     name: p.name.clone(),
@@ -67,9 +71,10 @@ impl Section {
     }
 }
 
-fn row(p: &ParameterRow) -> Row {
+/// A parameter among those of its effect, with which it shares its decimals.
+fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
     let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
-        Some((coarse, fine)) => read(p, coarse, fine),
+        Some((coarse, fine)) => read(p, group, coarse, fine),
         // A unit that calib does not know is shown as it is stored.
         None => (
             significant(p.nominal, 6),
@@ -91,20 +96,26 @@ fn row(p: &ParameterRow) -> Row {
         fine_unit,
         status: p.status.clone(),
         step: p.step.clone(),
-        stored: format!("{} {}", significant(p.value, 9), p.unit),
+        stored: if p.unit == "1" { exact(p.value, 9) } else { format!("{} {}", exact(p.value, 9), p.unit) },
     }
 }
 
-fn read(p: &ParameterRow, coarse: Reading, fine: Reading) -> (String, String, String, String, String, String) {
-    let decimals = fine.decimals_for(p.sigma);
-    let same = coarse.symbol == fine.symbol;
-    let coarse_decimals = if same { decimals } else { coarse.decimals_for(p.sigma) };
+fn read(
+    p: &ParameterRow,
+    group: &[&ParameterRow],
+    coarse: Reading,
+    fine: Reading,
+) -> (String, String, String, String, String, String) {
+    let decimals = |reading: Reading| {
+        let alike = group.iter().filter(|other| other.unit == p.unit);
+        alike.map(|other| reading.decimals_for(other.sigma)).max().unwrap_or_default()
+    };
     (
-        coarse.show(p.nominal, coarse_decimals),
-        coarse.show(p.value, coarse_decimals),
+        coarse.show(p.nominal, decimals(coarse)),
+        coarse.show(p.value, decimals(coarse)),
         coarse.symbol.into(),
-        fine.show_signed(p.value - p.nominal, decimals),
-        p.sigma.map_or_else(String::new, |s| fine.show(s, decimals)),
+        fine.show_signed(p.value - p.nominal, decimals(fine)),
+        p.sigma.map_or_else(String::new, |s| fine.show(s, decimals(fine))),
         fine.symbol.into(),
     )
 }

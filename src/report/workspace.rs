@@ -1,6 +1,6 @@
 //! Where in the workspace the error is: points from above and from the side, coloured by error, with residual vectors.
 
-use super::axis::{Area, Scale, baseline, label, name_x, name_y, round_down, round_up};
+use super::axis::{Area, Scale, baseline, label, name_x, name_y, round_down};
 use super::svg::Svg;
 use crate::table::{Prediction, PredictionRow};
 
@@ -29,14 +29,14 @@ pub(super) struct Colours {
 }
 
 impl Colours {
-    /// Round edges from below the median error of `after` to above most errors of `before`.
+    /// Round edges from below the median error of `after` to within the largest errors of `before`.
     pub fn new(before: &Prediction, after: &Prediction) -> Self {
         let quantile = |table: &Prediction, share: f64| {
             let mut errors: Vec<f64> = table.0.iter().map(|row| row.error_mm).collect();
             errors.sort_by(f64::total_cmp);
             errors.get(((errors.len() as f64 * share) as usize).min(errors.len().saturating_sub(1))).copied().unwrap_or(1.0)
         };
-        let upper = round_up(quantile(before, 0.9).max(quantile(after, 0.9)).max(1e-6));
+        let upper = round_down(quantile(before, 0.9).max(quantile(after, 0.9)).max(1e-6));
         let lower = quantile(after, 0.4).max(upper * 1e-6);
         let count = CLASSES - 1;
         let digits: [&[f64]; 3] = [&[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
@@ -82,12 +82,12 @@ pub(super) fn scatter(
 ) -> (String, String) {
     const WIDTH: f64 = 420.0;
     let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 300.0 };
-    let extent = |axis: usize| {
-        let values = frame.iter().flat_map(|table| &table.0).map(view.axes[axis].1);
+    let extent = |axis: Axis| {
+        let values = frame.iter().flat_map(|table| &table.0).map(axis.1);
         let (lower, upper) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
         if lower > upper { (0.0, 0.0) } else { (lower, upper) }
     };
-    let ((x0, x1), (y0, y1)) = (extent(0), extent(1));
+    let ((x0, x1), (y0, y1)) = (extent(view.axes[0]), extent(view.axes[1]));
     // One millimetre is as long in both directions; a margin leaves room for the vectors.
     let per_unit = ((x1 - x0) / (area.right - area.left)).max((y1 - y0) / (area.bottom - area.top)).max(1e-3) * 1.16;
     let half = [per_unit * (area.right - area.left) / 2.0, per_unit * (area.bottom - area.top) / 2.0];
@@ -98,8 +98,9 @@ pub(super) fn scatter(
     let mut errors: Vec<f64> = rows.0.iter().map(|row| row.error_mm).collect();
     errors.sort_by(f64::total_cmp);
     let large = errors.get(errors.len() * 9 / 10).copied().unwrap_or(0.0);
-    // A large residual is drawn a twelfth of the picture long.
-    let magnified = if large > 0.0 { round_down((half[0] / 6.0 / large).max(1.0)) } else { 1.0 };
+    // A large residual is drawn a tenth of the workspace long, the same in all views.
+    let widest = [X, Y, Z].map(extent).into_iter().map(|(lower, upper)| upper - lower).fold(0.0, f64::max);
+    let magnified = if large > 0.0 { round_down((widest / 10.0 / large).max(1.0)) } else { 1.0 };
 
     let mut svg = Svg::new(WIDTH, area.bottom + 38.0);
     x.grid_x(&mut svg, area, 5);
@@ -114,7 +115,7 @@ pub(super) fn scatter(
         svg.circle(
             &format!("dot e{class}{}", if row.held_out { "" } else { " fitted" }),
             from,
-            if row.held_out { 2.6 } else { 1.8 },
+            if row.held_out { 2.3 } else { 1.7 },
         );
     }
     baseline(&mut svg, area);
