@@ -42,8 +42,8 @@ pub(super) fn course(lines: &[Line], x_name: &str, y_name: &str, title: &str) ->
     svg.finish(title)
 }
 
-/// Singular values as (number, value), on a logarithmic axis; those after `rank` are drawn as not seen.
-pub(super) fn spectrum(values: &[(i64, f64)], rank: Option<i64>, title: &str) -> String {
+/// Singular values as (number, value), on a logarithmic axis.
+pub(super) fn spectrum(values: &[(i64, f64)], title: &str) -> String {
     let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 220.0 };
     let upper = values.iter().map(|v| v.1).fold(0.0, f64::max);
     let lower = values.iter().map(|v| v.1).filter(|v| *v > 0.0).fold(upper, f64::min);
@@ -57,10 +57,9 @@ pub(super) fn spectrum(values: &[(i64, f64)], rank: Option<i64>, title: &str) ->
         svg.text("tick mid", [x.at(tick), area.bottom + 14.0], &format!("{tick:.0}"));
     }
     for (number, value) in values {
-        let seen = if rank.is_some_and(|rank| *number > rank) { "unseen" } else { "seen" };
         let top = [x.at(*number as f64), y.at(*value)];
-        svg.line(&format!("stem {seen}"), [top[0], area.bottom], top);
-        svg.circle(&format!("mark {seen}"), top, 2.4);
+        svg.line("stem seen", [top[0], area.bottom], top);
+        svg.circle("mark seen", top, 2.4);
     }
     baseline(&mut svg, area);
     name_x(&mut svg, area, "number of the singular value");

@@ -34,6 +34,8 @@ struct Seen {
     /// Quantity, value, meaning.
     quantities: Vec<(String, String, String)>,
     spectrum: Option<String>,
+    /// What the singular values are of.
+    meaning: String,
 }
 
 #[derive(Serialize)]
@@ -100,10 +102,11 @@ fn fit(step: &str, last: &FitRow) -> FitView {
 fn see(step: String, rows: &[&ObservabilityRow]) -> Seen {
     let values: Vec<(i64, f64)> =
         rows.iter().filter(|row| row.quantity == "singular_value").map(|row| (row.index, row.value)).collect();
-    let rank = rows.iter().find(|row| row.quantity == "rank").map(|row| row.value as i64);
+    let meaning = rows.iter().find(|row| row.quantity == "singular_value").map_or("", |row| &row.meaning);
     let others = rows.iter().filter(|row| row.quantity != "singular_value");
     Seen {
-        spectrum: (!values.is_empty()).then(|| spectrum(&values, rank, &format!("Singular values of the step {step}"))),
+        spectrum: (!values.is_empty()).then(|| spectrum(&values, &format!("Singular values of the step {step}"))),
+        meaning: meaning.into(),
         quantities: others
             .map(|row| {
                 let whole = row.value.fract() == 0.0 && row.value.abs() < 1e6;

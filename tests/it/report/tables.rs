@@ -191,8 +191,8 @@ fn observability() -> Vec<Labelled<Observability>> {
         row("O1", 0, 0.0183, "root of the product of the singular values over the root of the rows"),
     ];
     rows.extend((1..=35).map(|k| {
-        let value = if k <= 27 { 120.0 * 0.79f64.powi(k as i32) } else { 1e-13 };
-        row("singular_value", k, value, "of the scaled Jacobian")
+        let value = 12_000.0 * 0.79f64.powi(k as i32);
+        row("singular_value", k, value, "of the whitened Jacobian, columns scaled to unit prior sigma")
     }));
     vec![Labelled { stage: "geometry".into(), table: Observability(rows) }]
 }
