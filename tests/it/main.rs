@@ -8,6 +8,7 @@ mod identify;
 mod ingest;
 mod layers;
 mod network;
+mod readme;
 mod report;
 mod robot;
 mod split;

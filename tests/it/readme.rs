@@ -1,0 +1,24 @@
+//! The examples of the README are what calib reads.
+
+use calib::robot::import::{Text, read_calib};
+use std::path::Path;
+
+/// The README's YAML blocks that contain `key` at the start of a line.
+pub fn example(key: &str) -> String {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("a README");
+    let blocks = text.split("```yaml\n").skip(1).filter_map(|rest| rest.split_once("```")).map(|(block, _)| block);
+    let found: Vec<&str> = blocks.filter(|block| block.lines().any(|line| line.starts_with(key))).collect();
+    assert_eq!(found.len(), 1, "{key}");
+    found[0].to_string()
+}
+
+#[test]
+fn the_robot_file_of_the_readme_is_read() {
+    let text = example("calib_robot:");
+    let robot = read_calib(Text { label: "README.md", text: &text }, None).unwrap_or_else(|e| panic!("{e}")).robot;
+    assert_eq!(robot.joints.len(), 6);
+    // Its one twist is the axis of a wrist: through the axis of joint 4, parallel to joint 3.
+    let wrist = &robot.joints[4];
+    assert_eq!(wrist.axis, [0.0, -1.0, 0.0]);
+    assert!((wrist.point[0] - 1.594).abs() < 1e-12 && (wrist.point[2] - 1.310).abs() < 1e-12);
+}
