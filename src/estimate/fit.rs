@@ -46,6 +46,10 @@ pub struct Fitted {
 
 /// Median of the squared length of three unit normals.
 const MEDIAN_CHI2_3: f64 = 2.366;
+/// Limit of accepted steps; calibration problems need four to ten.
+const ITERATIONS: usize = 60;
+/// Steps of the first round, which only finds out how large the residual is and what it lets one see.
+const FIRST_ITERATIONS: usize = 4;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
 
@@ -78,7 +82,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
                 model.x[*k] = 0.0;
             }
         }
-        let (steps, stop, factor) = minimise(&problem, model, &free);
+        let (steps, stop, factor) = minimise(&problem, model, &free, if round == 0 { FIRST_ITERATIONS } else { ITERATIONS });
         course.extend(steps);
         let next = unmodelled(&problem, model, free.len());
         let settled = (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();

@@ -42,17 +42,15 @@ pub struct Iteration {
     pub damping: f64,
 }
 
-/// Limit of accepted steps; calibration problems need four to ten.
-const ITERATIONS: usize = 60;
 /// A relative fall of the cost below this is rounding.
 const COST_TOLERANCE: f64 = 1e-10;
-/// A step that moves the whitened predictions by less than this in all changes nothing.
-const STEP_TOLERANCE: f64 = 1e-7;
+/// A step that moves all whitened predictions together by less than this (sigmas) changes nothing that data could show.
+const STEP_TOLERANCE: f64 = 1e-4;
 
-/// Minimises the problem in the `free` parameters, from and into `model.x`.
+/// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps.
 ///
 /// Returns the course, why it stopped, and the factor at the end.
-pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> (Vec<Iteration>, Stop, Factor) {
+pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], limit: usize) -> (Vec<Iteration>, Stop, Factor) {
     let (mut cost, rms) = problem.cost(model);
     let mut factor = problem.linearise(model, free);
     let mut course = vec![Iteration { cost, rms, gradient: cosine(&factor, cost), step_norm: 0.0, damping: 0.0 }];
@@ -60,7 +58,7 @@ pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize]) -> 
         return (course, Stop::NothingFree, factor);
     }
     let mut damping = 0.0;
-    for _ in 0..ITERATIONS {
+    for _ in 0..limit {
         let mut tries = 0;
         let (step, trial_cost, rms) = loop {
             tries += 1;

@@ -2,7 +2,7 @@
 
 use crate::effect::Load;
 use crate::estimate::{Fitted, Model};
-use crate::robot::Measurements;
+use crate::robot::{Measurements, RobotModel};
 use crate::stage::Context;
 use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split};
 use schemars::JsonSchema;
@@ -62,7 +62,7 @@ impl Identified {
         for row in fitting.rows {
             held_out[*row] = false;
         }
-        note(context, fitted, fitting);
+        note(context, model, fitted, fitting);
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
             fit: Fit::of(step, fitted),
@@ -72,7 +72,7 @@ impl Identified {
     }
 }
 
-fn note(context: &Context, fitted: &Fitted, fitting: &Fitting) {
+fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     let services = context.services;
     let free = fitted.singular.len();
     let asked = fitted.singular_all.len();
@@ -85,7 +85,8 @@ fn note(context: &Context, fitted: &Fitted, fitting: &Fitting) {
     if let Some((rank, expected)) = fitting.geometry
         && rank < expected
     {
-        services.warn(format!("the data see {rank} of the {expected} geometric parameters of this arm: some joints hardly move"));
+        services
+            .note(format!("the data see {rank} of the {expected} geometric parameters of this arm: {}", why_not(&model.robot)));
     }
     if 3 * fitting.rows.len() < 2 * free {
         services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));
@@ -101,5 +102,19 @@ fn note(context: &Context, fitted: &Fitted, fitting: &Fitting) {
     }
     if fitted.downweighted > 0 {
         services.note(format!("{} rows stand far off and count less", fitted.downweighted));
+    }
+}
+
+/// A measured point closer to the last axis than this (m) says next to nothing about that axis.
+const NEAR_AXIS: f64 = 5e-3;
+
+fn why_not(robot: &RobotModel) -> String {
+    let last = robot.joints() - 1;
+    let arm = robot.home().translation - robot.point(last);
+    let distance = arm.cross(robot.axis(last)).norm();
+    if robot.is_revolute(last) && distance < NEAR_AXIS {
+        format!("the measured point lies {:.1} mm off the axis of joint {}", distance * 1e3, last + 1)
+    } else {
+        "some joints hardly move, or only together".into()
     }
 }

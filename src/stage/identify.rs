@@ -138,20 +138,22 @@ fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
 const PLAUSIBLE_RATIO: f64 = 5e-4;
 
 fn question_ratios(model: &Model, fitted: &Fitted, context: &Context) {
-    let compliant = model.stack.effects().any(|(effect, _)| effect.name() == "joint_compliance");
-    for (k, spec) in model.stack.specs().iter().enumerate() {
-        let value = model.x[k];
-        if let Fate::Free(sigma) = &fitted.fates[k]
-            && spec.name.starts_with("reduction_ratio.")
-            && value.abs() > PLAUSIBLE_RATIO.max(3.0 * sigma)
-        {
-            let hint = if compliant { "" } else { "; self-weight deflection looks like this: add `joint_compliance`" };
-            context.services.warn(format!(
-                "{}: {:.1}e-4 is implausible, a ratio is a quotient of tooth counts{hint}",
-                spec.name,
-                value * 1e4
-            ));
+    if model.stack.effects().any(|(effect, _)| effect.name() == "joint_compliance") {
+        return;
+    }
+    let implausible = model.stack.specs().iter().enumerate().filter_map(|(k, spec)| match &fitted.fates[k] {
+        Fate::Free(sigma) if spec.name.starts_with("reduction_ratio.") && model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => {
+            Some(format!("{} {:+.1}e-4", spec.place, model.x[k] * 1e4))
         }
+        _ => None,
+    });
+    let implausible: Vec<String> = implausible.collect();
+    if !implausible.is_empty() {
+        context.services.warn(format!(
+            "reduction ratios of {} are implausible: a ratio is a quotient of tooth counts, but self-weight deflection looks like \
+             this; identify `joint_compliance` with them",
+            implausible.join(", ")
+        ));
     }
 }
 
