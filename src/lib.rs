@@ -18,7 +18,7 @@
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | report, table, numerics, yaml |
+//! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!

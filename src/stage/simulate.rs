@@ -195,7 +195,8 @@ impl Simulate {
             usage: shots.iter().map(|shot| Some(self.blocks[shot.block].usage.clone())).collect(),
             q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
             position: shots.iter().map(|shot| shot.position).collect(),
-            position_sigma: Some(shots.iter().map(|shot| [shot.sigma; 3]).collect()),
+            // A tracker states its noise once, not per point; whoever fits the recording states it too.
+            position_sigma: None,
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
             payload: Some(shots.iter().map(|shot| self.blocks[shot.block].payload_kg).collect()),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),

@@ -125,11 +125,15 @@ impl TrueRobot {
             }
             let per_ampere = described.reduction_ratio.unwrap_or(1.0) * described.motor_constant.unwrap_or(1.0);
             push("joint_compliance", "torque", "rad/Nm", self.compliance(joint, per_ampere));
-            let (error, tag, place) = (self.link_error(joint), format!("l{}", joint + 1), format!("link {}", joint + 1));
+            let (error, link) = (self.link_error(joint), format!("l{}", joint + 1));
             for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-                let name = "link_geometry";
-                out.push(true_value(name, &tag, place.clone(), letter, "mm", 1e3 * error.shift[axis]));
-                out.push(true_value(name, &tag, place.clone(), &format!("r{letter}"), "rad", error.tilt[axis]));
+                if joint + 1 == robot.joints.len() {
+                    out.push(true_value("tool_offset", letter, "tool".into(), "", "mm", 1e3 * error.shift[axis]));
+                    continue;
+                }
+                let place = format!("link {}", joint + 1);
+                out.push(true_value("link_geometry", &link, place.clone(), letter, "mm", 1e3 * error.shift[axis]));
+                out.push(true_value("link_geometry", &link, place, &format!("r{letter}"), "rad", error.tilt[axis]));
             }
         }
         for wrong in &self.couplings {

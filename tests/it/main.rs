@@ -12,6 +12,7 @@ mod readme;
 mod report;
 mod robot;
 mod split;
+mod sr210d;
 mod store;
 mod swarm;
 mod tables;
