@@ -82,26 +82,31 @@ impl ContentHasher {
     }
 }
 
-/// Feeds the cells of a column, presence first, in blocks that are large enough for blake3 to be fast.
+/// Feeds the cells of a column, presence first.
 fn hash_cells(hasher: &mut blake3::Hasher, array: &ArrayRef) {
-    const BLOCK: usize = 1 << 16; // bytes
+    match array.data_type() {
+        DataType::Float64 => feed(hasher, array.as_primitive::<Float64Type>().iter(), |block, value| {
+            block.extend_from_slice(&value.to_bits().to_le_bytes());
+        }),
+        DataType::Int64 => feed(hasher, array.as_primitive::<Int64Type>().iter(), |block, value| {
+            block.extend_from_slice(&value.to_le_bytes());
+        }),
+        DataType::Boolean => feed(hasher, array.as_boolean().iter(), |block, value| block.push(u8::from(value))),
+        DataType::Utf8 => feed(hasher, array.as_string::<i32>().iter(), |block, value| {
+            block.extend_from_slice(&(value.len() as u64).to_le_bytes());
+            block.extend_from_slice(value.as_bytes());
+        }),
+        other => unreachable!("no schema has a column of type {other}"),
+    }
+}
+
+fn feed<T>(hasher: &mut blake3::Hasher, cells: impl Iterator<Item = Option<T>>, encode: impl Fn(&mut Vec<u8>, T)) {
+    const BLOCK: usize = 1 << 16; // bytes; large enough for blake3 to be fast
     let mut block = Vec::with_capacity(BLOCK + 64);
-    for row in 0..array.len() {
-        block.push(u8::from(array.is_valid(row)));
-        if array.is_valid(row) {
-            match array.data_type() {
-                DataType::Float64 => {
-                    block.extend_from_slice(&array.as_primitive::<Float64Type>().value(row).to_bits().to_le_bytes())
-                }
-                DataType::Int64 => block.extend_from_slice(&array.as_primitive::<Int64Type>().value(row).to_le_bytes()),
-                DataType::Boolean => block.push(u8::from(array.as_boolean().value(row))),
-                DataType::Utf8 => {
-                    let text = array.as_string::<i32>().value(row);
-                    block.extend_from_slice(&(text.len() as u64).to_le_bytes());
-                    block.extend_from_slice(text.as_bytes());
-                }
-                other => unreachable!("no schema has a column of type {other}"),
-            }
+    for cell in cells {
+        block.push(u8::from(cell.is_some()));
+        if let Some(value) = cell {
+            encode(&mut block, value);
         }
         if block.len() >= BLOCK {
             hasher.update(&block);

@@ -2,12 +2,13 @@
 
 use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
-use arrow::datatypes::SchemaRef;
+use arrow::datatypes::{DataType, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, SortingColumn};
 use parquet::file::properties::WriterProperties;
+use parquet::schema::types::ColumnPath;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -174,12 +175,17 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef) -> Result<WriterPr
         ("calib.units", super::key::canonical(&units.into())),
     ];
     let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
-    Ok(WriterProperties::builder()
+    let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(level))
         .set_max_row_group_row_count(Some(GROUP_ROWS))
         .set_sorting_columns(Some(sorting))
         .set_key_value_metadata(Some(key_values.map(|(key, value)| KeyValue::new(key.into(), value)).into()))
-        .build())
+        .set_dictionary_enabled(false);
+    // Measured numbers hardly ever repeat; names of sets, steps and files do.
+    for field in arrow_schema.fields().iter().filter(|field| field.data_type() == &DataType::Utf8) {
+        properties = properties.set_column_dictionary_enabled(ColumnPath::from(field.name().as_str()), true);
+    }
+    Ok(properties.build())
 }
 
 /// The disk's own words, where there are any.

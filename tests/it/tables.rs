@@ -170,3 +170,29 @@ fn a_recording_without_joints_or_with_degrees_for_radians_is_refused() {
         "table recording, column q1_rad, sequence 0: 90 rad is out of range; allowed: -20 to 20 rad (and 1 more rows)"
     );
 }
+
+/// Runs where Python has the four readers; `CALIB_PYTHON` names another interpreter than `python3`.
+#[test]
+fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
+    let python = std::env::var("CALIB_PYTHON").unwrap_or_else(|_| "python3".into());
+    let run = |arguments: &[&std::ffi::OsStr]| std::process::Command::new(&python).args(arguments).output();
+    let import = "import duckdb, pandas, polars, pyarrow";
+    if !run(&["-c".as_ref(), import.as_ref()]).is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: {python} has not all of duckdb, pandas, pyarrow and polars");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    for (case, rows) in [("empty", &[][..]), ("extreme", &[Extreme::Lowest, Extreme::Highest, Extreme::Least])].into_iter() {
+        for kind in KINDS {
+            let products = vec![("out".to_string(), Product::Frame(frame(kind, rows)))];
+            let record = store.publish(&key(&format!("{case} {kind}"), 0), products, Account::default()).unwrap().record;
+            store.expose(case, kind, "out", &record.tables["out"]).unwrap();
+        }
+    }
+    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/read_tables.py");
+    let output = run(&[script.as_os_str(), folder.path().as_os_str()]).unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains(&format!("{} tables read alike", 2 * KINDS.len())), "{said}");
+}
