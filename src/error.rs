@@ -69,7 +69,8 @@ pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
     allowed
         .into_iter()
         .map(|name| (strsim::damerau_levenshtein(given, name), name))
-        .filter(|(distance, name)| *distance <= 1 + name.len() / 3)
+        // A single letter is not near to another.
+        .filter(|(distance, name)| *distance <= 1 + name.len() / 3 && *distance < given.len().max(name.len()))
         .min()
         .map(|(_, name)| name)
 }

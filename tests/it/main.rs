@@ -1,6 +1,7 @@
 //! Integration tests, one module a capability.
 
 mod arms;
+mod cmd;
 mod desk;
 mod effects;
 mod fixture;

@@ -30,7 +30,8 @@ impl<'a> Reading<'a> {
         let mut record = Record::default();
         if !lines.next(&mut record)? {
             let message = match (lines.bytes, layout.header) {
-                (0, _) => "is empty".to_string(),
+                (0, true) => "is empty; allowed: a header and at least one data row".to_string(),
+                (0, false) => "is empty; allowed: at least one data row".to_string(),
                 (_, true) => format!("has no header: its {} lines are empty, comments or skipped", lines.lines),
                 (_, false) => format!("has no data row: its {} lines are empty, comments or skipped", lines.lines),
             };

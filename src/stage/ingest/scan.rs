@@ -166,7 +166,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
     scan.lines = reading.lines.lines;
     scan.read = reading.row.number;
     if scan.read == 0 {
-        return Err(Error::data(scan.label, "has a header but no data row"));
+        return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
     }
     Ok(scan)
 }

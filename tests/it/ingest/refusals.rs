@@ -18,8 +18,8 @@ fn a_missing_column_is_named_with_those_that_are_there() {
 
 #[test]
 fn a_file_that_is_none_says_what_it_is() {
-    assert_eq!(with("", TWO), "a.csv: is empty");
-    assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row");
+    assert_eq!(with("", TWO), "a.csv: is empty; allowed: a header and at least one data row");
+    assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row; allowed: at least one");
     assert_eq!(with("\n\n", TWO), "a.csv: has no header: its 2 lines are empty, comments or skipped");
     let utf16 = Desk::default().with("a.csv", [0xff, 0xfe, b'i', 0]);
     assert_eq!(refusal(&utf16, TWO, robot("rr", 1.0)), "a.csv: is UTF-16; allowed: UTF-8 (with or without a byte-order mark)");
