@@ -12,6 +12,7 @@ mod network;
 mod readme;
 mod report;
 mod robot;
+mod robot_faults;
 mod split;
 mod sr210d;
 mod store;

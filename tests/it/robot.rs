@@ -1,9 +1,11 @@
 //! Robot files: every description of one arm is the same arm, and the same as another program's.
 
 use crate::arms::{ARMS, Arm};
+use crate::desk::{Desk, shared};
 use calib::robot::RobotModel;
 use calib::robot::description::{Coupling, JointKind, RobotDescription};
 use calib::robot::import::{Imported, Text, read_calib, read_case};
+use calib::stage::{RawFile, ReadRobot, RobotFormat, RobotReads, Stage};
 use calib::table::{Robot, Table};
 use nalgebra::{Matrix3, Vector3};
 use rand::rngs::ChaCha8Rng;
@@ -189,4 +191,34 @@ fn a_practice_robot_is_read_in_its_units() {
     assert!((Vector3::from(robot.payload_centre) - Vector3::new(2.034, 0.040, 1.370)).norm() < 1e-12);
     assert_eq!(robot.couplings, [Coupling { moved: 1, by: 0, ratio: 0.0 }]);
     assert_eq!(notes, ["robot.json: the key `colour` is not used"]);
+}
+
+#[test]
+fn the_stage_reads_every_practice_robot() {
+    let Some(folder) = shared("practice") else { return };
+    let mut cases: Vec<_> = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+    cases.retain(|path| path.is_dir());
+    cases.sort();
+    assert!(!cases.is_empty());
+    for case in cases {
+        let desk = Desk::default().with("robot.json", std::fs::read(case.join("robot.json")).expect("a robot.json"));
+        let stage = ReadRobot { file: RawFile("robot.json".into()), format: RobotFormat::Case, urdf: None };
+        let tables = desk.run(&stage, RobotReads {}).unwrap_or_else(|e| panic!("{}: {e}", case.display()));
+        let robot = Robot::from_frame(&tables["robot"][0]).and_then(|table| table.to_description()).expect("a robot");
+        assert!(matches!(robot.joints.len(), 6 | 7), "{}", case.display());
+        assert!(robot.joints.iter().all(|joint| joint.mass.is_some_and(|mass| mass > 0.0)));
+        assert!(desk.warnings.lock().unwrap().is_empty(), "{}", case.display());
+    }
+}
+
+#[test]
+fn the_stage_reads_the_urdf_beside_a_robot_file() {
+    let text = format!("{HEAD}kinematics: {{urdf: {{base: world_base, tip: tool0}}}}\n");
+    let desk = Desk::default().with("robot.yaml", text).with("arm.urdf", reference("seven.urdf"));
+    let urdf = Some(RawFile("arm.urdf".into()));
+    let stage = ReadRobot { file: RawFile("robot.yaml".into()), format: RobotFormat::Calib, urdf };
+    assert_eq!(stage.files().len(), 2, "both contents are part of the key");
+    let tables = desk.run(&stage, RobotReads {}).expect("a robot");
+    let robot = Robot::from_frame(&tables["robot"][0]).and_then(|table| table.to_description()).expect("a robot");
+    assert!(distance(&robot, &read_urdf("seven")) < 1e-12);
 }

@@ -263,16 +263,15 @@ impl<'a> Value<'a> {
     }
     /// The one of `allowed` that is named here.
     pub fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
-        let names = || allowed.iter().map(|(name, _)| *name);
-        let list = names().collect::<Vec<_>>().join(", ");
+        let list = allowed.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         let Some(Node::Text(text)) = self.node() else {
             self.expected(&format!("one of {list}"));
             return None;
         };
         let found = allowed.iter().find(|(name, _)| name == text).map(|(_, value)| *value);
         if found.is_none() {
-            let hint = nearest(text, names()).map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
-            self.fault(format!("unknown value `{text}`{hint} (allowed: {list})"));
+            // No nearest name: for units it would mislead (`cm` is not `m`).
+            self.fault(format!("unknown value `{text}` (allowed: {list})"));
         }
         found
     }

@@ -1,0 +1,234 @@
+//! What a faulty robot file says: every fault at once, each with its place and what is allowed.
+
+use calib::robot::import::{Text, read_calib, read_case};
+
+const GOOD: &str = "calib_robot: 1
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [300, 0, 0]}
+tool: {point: [900, 0, 0]}
+";
+
+fn calib(text: &str) -> String {
+    match read_calib(Text { label: "robot.yaml", text }, None) {
+        Ok(_) => "no fault".into(),
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2);
+            error.to_string()
+        }
+    }
+}
+
+/// The faults of the good file with one text replaced by another.
+fn changed(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "{from}");
+    calib(&GOOD.replace(from, to))
+}
+
+fn added(text: &str) -> String {
+    calib(&format!("{GOOD}{text}\n"))
+}
+
+fn urdf(text: &str, base: &str, tip: &str) -> String {
+    let file = format!("calib_robot: 1\nunits: {{length: mm, angle: deg}}\nkinematics: {{urdf: {{base: {base}, tip: {tip}}}}}\n");
+    let urdf = Text { label: "arm.urdf", text };
+    read_calib(Text { label: "robot.yaml", text: &file }, Some(urdf)).map_or_else(|e| e.to_string(), |_| "no fault".into())
+}
+
+#[test]
+fn the_good_file_is_good() {
+    assert_eq!(calib(GOOD), "no fault");
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest() {
+    assert_eq!(
+        changed("tool: {point", "tool: {pont"),
+        "robot.yaml: tool: unknown key `pont`; did you mean `point`? (allowed: point, orientation)\n\
+         robot.yaml: tool.point: missing; expected a list of 3 numbers"
+    );
+    assert_eq!(
+        added("payloda: {mass: 3}"),
+        "robot.yaml: unknown key `payloda`; did you mean `payload`? (allowed: calib_robot, name, units, kinematics, tool, joints, \
+         couplings, links, payload, gravity)"
+    );
+}
+
+#[test]
+fn all_faults_come_at_once() {
+    let text = "calib_robot: 2
+units: {length: mm, angle: grad}
+kinematics: {screws: [{axis: [0, 0, 1], point: [0, x, 0]}]}
+tool: {point: [1, 2]}
+joints: [{limits: [10, -10], reduction_ratio: 0}]
+links: [{mass: -3, centre: [0, 0, 0], frame: link}]
+gravity: [0, 0, -9810]
+";
+    assert_eq!(
+        calib(text),
+        "robot.yaml: calib_robot: format 2 is not known to this calib; expected 1\n\
+         robot.yaml: units.angle: unknown value `grad` (allowed: rad, deg, mrad, arcsec)\n\
+         robot.yaml: kinematics.screws[0].point[1]: expected a finite number, found the text `x`\n\
+         robot.yaml: tool.point: expected a list of 3 numbers, found a list of 2\n\
+         robot.yaml: joints[0].limits: expected [lower, upper] with lower < upper, found [10, -10]\n\
+         robot.yaml: joints[0].reduction_ratio: expected a number other than 0\n\
+         robot.yaml: links[0].frame: screws know no link frames; expected `base`\n\
+         robot.yaml: links[0].mass: expected a mass in kg, not less than 0, found -3\n\
+         robot.yaml: gravity: is 9810 m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"
+    );
+}
+
+#[test]
+fn an_axis_has_a_direction() {
+    assert_eq!(
+        changed("axis: [0, 1, 0]", "axis: [0, 0, 0]"),
+        "robot.yaml: kinematics.screws[1].axis: has no direction: its length is zero"
+    );
+    assert_eq!(
+        changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 0, 0, 0, 0, 0]"),
+        "robot.yaml: kinematics.screws[1].twist: is no screw: all six numbers are zero"
+    );
+    assert_eq!(
+        changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 5, 0, 0, 1, 0]"),
+        "robot.yaml: kinematics.screws[1].twist: moves 5 along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"
+    );
+}
+
+#[test]
+fn numbers_are_finite() {
+    assert_eq!(
+        changed("point: [900, 0, 0]", "point: [900, .nan, .inf]"),
+        "robot.yaml: tool.point[1]: expected a finite number, found `NaN`\n\
+         robot.yaml: tool.point[2]: expected a finite number, found `inf`"
+    );
+    assert_eq!(
+        changed("point: [900, 0, 0]", "point: [900, '12,5', 0]"),
+        "robot.yaml: tool.point[1]: expected a finite number, found the text `12,5`"
+    );
+}
+
+#[test]
+fn units_are_stated_and_known() {
+    assert_eq!(changed("length: mm", "length: cm"), "robot.yaml: units.length: unknown value `cm` (allowed: mm, um, m, in)");
+    assert_eq!(
+        changed("units: {length: mm, angle: deg}\n", ""),
+        "robot.yaml: units: missing; expected a map with the keys length, angle"
+    );
+    assert_eq!(
+        calib(&format!("{}joints: [{{limits: [-185, 185]}}, ]\n", GOOD.replace("deg", "rad"))),
+        "robot.yaml: joints: 1 entries for 2 joints; expected one per joint\n\
+         robot.yaml: joints[0].limits: [-185, 185] rad is more than ten turns; is it in another unit?"
+    );
+}
+
+#[test]
+fn lists_have_one_entry_per_joint() {
+    let message = added("links: [{mass: 1, centre: [0, 0, 0]}, null, null]");
+    assert_eq!(message, "robot.yaml: links: 3 entries for 2 joints; expected one per joint");
+    let message = added("couplings: [{moved: 3, by: 1}, {moved: 1, by: 1}, {moved: 2, by: 0.5}]");
+    assert_eq!(
+        message,
+        "robot.yaml: couplings[0].moved: there is no joint 3; expected a number from 1 to 2\n\
+         robot.yaml: couplings[1]: a joint cannot move itself; expected two different joints\n\
+         robot.yaml: couplings[2].by: there is no joint 0.5; expected a number from 1 to 2"
+    );
+}
+
+#[test]
+fn a_file_describes_one_arm_once() {
+    assert_eq!(
+        changed("kinematics:\n", "kinematics:\n  dh: [{d: 1, a: 0, alpha: 0}]\n"),
+        "robot.yaml: kinematics: more than one description of the arm; expected one of screws, dh, mdh, urdf"
+    );
+    assert_eq!(
+        calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {}\n"),
+        "robot.yaml: kinematics: no description of the arm; expected one of screws, dh, mdh, urdf"
+    );
+    assert_eq!(
+        calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {dh: []}\n"),
+        "robot.yaml: kinematics: no joints; expected at least one"
+    );
+    let urdf = calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: a, tip: b}}\n");
+    assert!(urdf.starts_with("robot.yaml: kinematics.urdf: the URDF itself is missing; name it in the pipeline"), "{urdf}");
+}
+
+#[test]
+fn a_key_twice_and_broken_yaml_show_the_line() {
+    let twice = added("tool: {point: [0, 0, 0]}");
+    assert!(twice.starts_with("robot.yaml: ") && twice.contains("duplicate") && twice.contains("line 8"), "{twice}");
+    let broken = changed("tool: {point: [900, 0, 0]}", "tool: {point: [900, 0, 0]");
+    assert!(broken.starts_with("robot.yaml: ") && broken.contains("line"), "{broken}");
+    for text in ["", "just text", "[1, 2]", "# nothing\n"] {
+        assert!(calib(text).contains("expected a map with the keys calib_robot, name"), "{}", calib(text));
+    }
+}
+
+const ARM: &str = r#"<robot name="a">
+<link name="base_link"/><link name="upper"/><link name="tool0"/>
+<joint name="j1" type="revolute"><parent link="base_link"/><child link="upper"/><axis xyz="0 0 1"/></joint>
+<joint name="j2" type="fixed"><parent link="upper"/><child link="tool0"/><origin xyz="1 0 0"/></joint>
+</robot>"#;
+
+#[test]
+fn a_urdf_fault_names_its_line() {
+    assert_eq!(urdf(ARM, "base_link", "tool0"), "no fault");
+    assert_eq!(
+        urdf(ARM, "base_link", "tool"),
+        "arm.urdf:1: no link `tool`; did you mean `tool0`? (links: base_link, tool0, upper)"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("child link=\"upper\"", "child link=\"uper\""), "base_link", "tool0"),
+        "arm.urdf:3: joint `j1` refers to link `uper`, which does not exist; did you mean `upper`?"
+    );
+    assert_eq!(
+        urdf(ARM, "upper", "base_link"),
+        "arm.urdf:1: no chain from `upper` to `base_link`: the way up from `base_link` ends at `base_link`"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("0 0 1", "0 0 0"), "base_link", "tool0"),
+        "arm.urdf:3: joint `j1`: the axis has no direction, its length is zero"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("0 0 1", "0 0 one"), "base_link", "tool0"),
+        "arm.urdf:3: <axis xyz>: expected 3 finite numbers, found `0 0 one`"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("revolute", "floating"), "base_link", "tool0"),
+        "arm.urdf:3: joint `j1` has the type `floating` (allowed: revolute, continuous, prismatic, fixed)"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("<axis xyz=\"0 0 1\"/>", "\n<mimic joint=\"j2\"/>"), "base_link", "tool0"),
+        "arm.urdf:4: joint `j1` mimics another joint; expected a serial chain of independent joints"
+    );
+    assert_eq!(
+        urdf(&ARM.replace("revolute", "fixed"), "base_link", "tool0"),
+        "robot.yaml: kinematics: no joints; expected at least one"
+    );
+    assert_eq!(urdf("<sdf/>", "a", "b"), "arm.urdf:1: expected a URDF, whose root is <robot>, found <sdf>");
+    assert!(urdf("<robot", "a", "b").starts_with("arm.urdf: not readable as XML: "));
+    let circle = ARM.replace("child link=\"tool0\"", "child link=\"base_link\"");
+    assert_eq!(urdf(&circle, "tool0", "upper"), "arm.urdf:1: the joints from `upper` run in a circle; expected a tree");
+    assert!(
+        urdf(&ARM.replace("<robot ", "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" "), "base_link", "tool0")
+            .contains("no fault")
+    );
+}
+
+#[test]
+fn a_practice_robot_is_checked_too() {
+    let case = |text: &str| read_case(Text { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
+    assert_eq!(
+        case(r#"{"axes": [[0, 0, 1], [0, 0, 0]], "points": [[0, 0, 0]], "mass": [1, -2], "coupling": [[2, 0]]}"#),
+        "robot.json: points: 1 entries for 2 joints; expected one per joint\n\
+         robot.json: axes[1]: has no direction: its length is zero\n\
+         robot.json: mass[1]: expected a mass in kg, not less than 0, found -2\n\
+         robot.json: tool: missing; expected a list of 3 numbers\n\
+         robot.json: coupling[0]: expected two different joints (moved, by) counted from 0, below 2"
+    );
+    assert_eq!(case("{\"axes\": [[0, 0, NaN]]}"), "robot.json: expected value at line 1 column 18");
+    assert_eq!(case("{\"tool\": 1, \"tool\": 2}"), "robot.json: the key `tool` is there twice at line 1 column 18");
+    assert!(case("[]").starts_with("robot.json: expected a map with the keys name, axes"));
+    assert!(case("").starts_with("robot.json: EOF while parsing"));
+}
