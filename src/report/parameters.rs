@@ -96,7 +96,7 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
         fine_unit,
         status: p.status.clone(),
         step: p.step.clone(),
-        stored: if p.unit == "1" { exact(p.value, 9) } else { format!("{} {}", exact(p.value, 9), p.unit) },
+        stored: if p.unit == "1" { exact(p.value, 7) } else { format!("{} {}", exact(p.value, 7), p.unit) },
     }
 }
 
