@@ -27,7 +27,39 @@ pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
             text.push_str(&block(title, &rows));
         }
     }
+    text.push_str(&references(&rows));
     Ok(text)
+}
+
+/// Our figures beside those that the pipeline names; nothing where it names none.
+fn references(rows: &[StatisticsRow]) -> String {
+    let rows: Vec<(&str, &StatisticsRow)> = rows.iter().filter_map(|row| Some((row.reference.as_deref()?, row))).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let width = |names: &mut dyn Iterator<Item = &str>| names.map(|name| name.chars().count()).max().unwrap_or(0);
+    let label = width(&mut rows.iter().map(|row| row.0)).max("reference".len());
+    let step = width(&mut rows.iter().map(|row| row.1.step.as_str())).max("step".len());
+    let set = width(&mut rows.iter().map(|row| row.1.set.as_str())).max("set".len());
+    let mut text = format!(
+        "beside reference figures, error in mm: ours | theirs\n  {:label$}  {:step$}  {:set$}  {:>17}  {:>17}  {:>17}\n",
+        "reference", "step", "set", "mean", "std", "max"
+    );
+    let pair = |ours: f64, theirs: Option<f64>| match theirs {
+        Some(theirs) => format!("{ours:>7.4} | {theirs:>7.4}"),
+        None => format!("{ours:>7.4} | {:>7}", ""),
+    };
+    for (name, row) in rows {
+        text.push_str(&format!(
+            "  {name:label$}  {:step$}  {:set$}  {}  {}  {}\n",
+            row.step,
+            row.set,
+            pair(row.mean_mm, row.reference_mean_mm),
+            pair(row.std_mm, row.reference_std_mm),
+            pair(row.max_mm, row.reference_max_mm)
+        ));
+    }
+    text + "\n"
 }
 
 fn block(title: &str, rows: &[&StatisticsRow]) -> String {
@@ -54,6 +86,8 @@ pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
             "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
             "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm,
+            "reference": row.reference, "reference_mean_mm": row.reference_mean_mm,
+            "reference_std_mm": row.reference_std_mm, "reference_max_mm": row.reference_max_mm,
         })
     };
     Ok(rows(outcome, store)?.into_iter().map(row).collect())

@@ -7,10 +7,34 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Has no settings: what is held out follows from the split and the steps.
+/// What is held out follows from the split and the steps.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Validate {}
+pub struct Validate {
+    /// Figures from elsewhere (a paper, a data sheet, last year's report) to stand beside ours.
+    #[serde(default)]
+    pub reference: Vec<Reference>,
+}
+
+/// Published or agreed statistics of one step on one set.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Where the figures stand, e.g. `Table 9`.
+    pub label: String,
+    /// The step of ours that they belong beside.
+    pub step: String,
+    /// The set of ours that they belong beside.
+    pub set: String,
+    /// Mean of the position error, mm.
+    pub mean_mm: f64,
+    /// Its standard deviation, mm.
+    #[serde(default)]
+    pub std_mm: Option<f64>,
+    /// The largest error, mm.
+    #[serde(default)]
+    pub max_mm: Option<f64>,
+}
 
 reads! {
     pub struct ValidateReads {
@@ -41,6 +65,20 @@ impl Stage for Validate {
         for (order, step) in (0..).zip(&reads.prediction) {
             for ((name, set, held_out), rows) in groups(step)? {
                 statistics.0.push(describe(order, name, set, held_out, &rows));
+            }
+        }
+        for reference in &self.reference {
+            let mut beside =
+                statistics.0.iter_mut().filter(|row| row.step == reference.step && row.set == reference.set).peekable();
+            if beside.peek().is_none() {
+                let message = format!("reference: no statistics of step `{}` on set `{}`", reference.step, reference.set);
+                return Err(Error::spec(context.id, message));
+            }
+            for row in beside {
+                row.reference = Some(reference.label.clone());
+                row.reference_mean_mm = Some(reference.mean_mm);
+                row.reference_std_mm = reference.std_mm;
+                row.reference_max_mm = reference.max_mm;
             }
         }
         if !statistics.0.iter().any(|row| row.held_out) {
@@ -91,6 +129,10 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         rms_y_mm: rms(|row| row.dy_mm),
         rms_z_mm: rms(|row| row.dz_mm),
         noise_rms_mm: rms(|row| row.noise_mm),
+        reference: None,
+        reference_mean_mm: None,
+        reference_std_mm: None,
+        reference_max_mm: None,
     }
 }
 

@@ -28,5 +28,10 @@ crate::table::rows! { "statistics",
         rms_z_mm: f64,
         /// Expected rms from the measurement noise alone: root mean square of `noise_mm`.
         noise_rms_mm: f64,
+        /// A published or agreed figure of the same quantity, named by the pipeline.
+        reference: Option<String>,
+        reference_mean_mm: Option<f64>,
+        reference_std_mm: Option<f64>,
+        reference_max_mm: Option<f64>,
     }
 }
