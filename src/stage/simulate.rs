@@ -43,7 +43,7 @@ pub struct Simulate {
     /// The motors as the controller logs them.
     #[serde(default)]
     pub motors: Motors,
-    /// Standard deviation of each joint from move to move, arcsec; empty: none.
+    /// Standard deviation of each joint from move to move, arcsec (um for a prismatic joint); empty: none.
     #[serde(default)]
     pub repeatability_arcsec: Vec<f64>,
     /// Which poses may be measured.

@@ -30,7 +30,7 @@ pub struct Experiment<'a> {
     pub effects: &'a [Physical],
     pub tracker: &'a Tracker,
     pub motors: &'a Motors,
-    /// Standard deviation of each joint from move to move, arcsec; empty: none.
+    /// Standard deviation of each joint from move to move, arcsec (um for a prismatic joint); empty: none.
     pub repeatability_arcsec: &'a [f64],
     pub poses: &'a Poses,
     pub blocks: &'a [Block],
@@ -67,8 +67,8 @@ impl Experiment<'_> {
         let mut shots = Vec::with_capacity(points.len());
         for point in points {
             let mut drive = self.truth.drive(self.robot, &point.q);
-            for (angle, sigma) in drive.iter_mut().zip(self.repeatability_arcsec) {
-                *angle += sigma * ARCSEC * play.normal();
+            for ((position, sigma), link) in drive.iter_mut().zip(self.repeatability_arcsec).zip(&arm.links) {
+                *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
             let payload_kg = self.blocks[point.block].payload_kg;
             let (time_s, temperature_c) = (point.time_s, point.temperature_c);
