@@ -3,6 +3,7 @@
 mod identified;
 mod identify;
 pub mod ingest;
+pub mod learn;
 mod registry;
 mod report;
 mod robot;
@@ -12,6 +13,7 @@ mod stiffness;
 mod validate;
 
 pub use identify::{Identify, IdentifyReads};
+pub use learn::{Learn, LearnReads, LearnWrites};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
@@ -249,6 +251,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<split::SplitBy>(),
     StageEntry::of::<Identify>(),
     StageEntry::of::<Stiffness>(),
+    StageEntry::of::<Learn>(),
     StageEntry::of::<Validate>(),
     StageEntry::of::<Report>(),
 ];
