@@ -48,7 +48,8 @@ pub struct Learn {
     /// Weight decay: half of it times the squared weights stands beside half the squared standardised errors of all rows. Chosen by
     /// cross-validation if not given.
     pub decay: Option<f64>,
-    /// Share of the training rows that each network keeps back to stop in time, below 0.5; 0 trains to the end.
+    /// Share of the training rows that each network keeps back to stop in time, below 0.5. With the decay chosen by cross-validation the
+    /// rows are worth more in training than kept back, hence 0.
     pub keep_back: f64,
     /// Folds of the cross-validation.
     pub folds: usize,
@@ -67,7 +68,7 @@ impl Default for Learn {
             generations: 200,
             iterations: 200,
             decay: None,
-            keep_back: 0.1,
+            keep_back: 0.0,
             folds: 5,
         }
     }

@@ -8,6 +8,7 @@ mod fixture;
 mod identify;
 mod ingest;
 mod layers;
+mod learn;
 mod network;
 mod readme;
 mod report;
