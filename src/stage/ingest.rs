@@ -1,4 +1,4 @@
-//! `ingest`: from raw delimited files to one recording; what is not used goes to `rejected` with file, line and reason.
+//! `ingest`: from raw files (delimited text or Parquet) to one recording; what is not used goes to `rejected` with file, line and reason.
 //!
 //! Files are read twice: first to judge rows and find duplicates and partners, then to write; so nothing is written of a
 //! file that is refused, and memory stays bounded. Per file, accepted + rejected = read.
@@ -10,6 +10,7 @@ mod layout;
 mod lines;
 mod number;
 mod pair;
+mod parquet;
 mod reading;
 mod row;
 mod scan;

@@ -120,7 +120,10 @@ fn unit(symbol: Option<&str>) -> Result<Unit> {
 
 impl Binder<'_> {
     fn fault(&mut self, message: String) {
-        self.faults.push(Fault::new(format!("{}:{}", self.head.label, self.head.line), message));
+        let Head { label, line, .. } = self.head;
+        // Column names of a Parquet file stand on no line.
+        let place = if *line == 0 { label.clone() } else { format!("{label}:{line}") };
+        self.faults.push(Fault::new(place, message));
     }
     fn name(&self, column: usize) -> String {
         let name = self.head.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());

@@ -9,11 +9,12 @@ use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// One raw file of delimited text.
+/// One raw file: delimited text, or Parquet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
-    /// Path of the file: UTF-8 text (with or without a byte-order mark), rows ending in LF or CRLF.
+    /// Path of the file: UTF-8 text (with or without a byte-order mark), rows ending in LF or CRLF; or a flat Parquet file, for
+    /// which only `columns` matters.
     pub file: RawFile,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]

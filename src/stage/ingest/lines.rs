@@ -5,16 +5,17 @@
 use super::check::{Delimiter, delimiter};
 use super::layout::FileLayout;
 use crate::error::{Error, Result};
-use crate::stage::Source;
 use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 
 /// Longest row, bytes: a file of another kind, or a quote that is never closed, must not fill the memory.
 const LONGEST: usize = 1 << 20;
 
+pub(super) type Buffered = BufReader<Box<dyn Read + Send>>;
+
 /// Reads one file from its first line to its last.
 pub(super) struct Lines {
-    reader: BufReader<Box<dyn Read + Send>>,
+    reader: Buffered,
     label: String,
     delimiter: Delimiter,
     comment: Option<Vec<u8>>,
@@ -37,6 +38,21 @@ pub(super) struct Record {
 }
 
 impl Record {
+    /// Starts a row whose fields are pushed one by one.
+    pub(super) fn begin(&mut self, line: u64) {
+        self.line = line;
+        self.text.clear();
+        self.fields.clear();
+        self.quoted = false;
+    }
+    pub(super) fn push(&mut self, field: &[u8]) {
+        if !self.fields.is_empty() {
+            self.text.push(b',');
+        }
+        let start = self.text.len();
+        self.text.extend_from_slice(field);
+        self.fields.push(start..self.text.len());
+    }
     pub(super) fn len(&self) -> usize {
         self.fields.len()
     }
@@ -56,21 +72,16 @@ impl Record {
 
 impl Lines {
     /// Opens a file and skips what stands above header and data; `None` where nothing is left.
-    pub(super) fn open(source: Source, layout: &FileLayout) -> Result<Self> {
+    pub(super) fn open(reader: Buffered, label: &str, layout: &FileLayout) -> Result<Self> {
         let delimiter = delimiter(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
         let comment = layout.comment.as_ref().map(|text| text.as_bytes().to_vec());
-        let reader = BufReader::with_capacity(1 << 16, source.reader);
-        let mut lines = Self { reader, label: source.label, delimiter, comment, lines: 0, bytes: 0 };
+        let mut lines = Self { reader, label: label.into(), delimiter, comment, lines: 0, bytes: 0 };
         lines.byte_order_mark()?;
         lines.skip(layout.skip)?;
         Ok(lines)
     }
     fn byte_order_mark(&mut self) -> Result<()> {
-        // A reader may hand out fewer bytes than asked: the first buffer is at least one read, marks are at most 4 bytes.
         let head = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
-        if head.starts_with(b"PAR1") {
-            return Err(Error::data(&self.label, "is a Parquet file; allowed: delimited text in UTF-8"));
-        }
         if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
             return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark)"));
         }
@@ -144,7 +155,7 @@ impl Lines {
     }
 }
 
-fn failed(label: &str, error: &std::io::Error) -> Error {
+pub(super) fn failed(label: &str, error: &std::io::Error) -> Error {
     Error::store(label, format!("could not be read: {error}"))
 }
 
@@ -234,8 +245,8 @@ mod tests {
             comment: comment.map(Into::into),
             columns: Default::default(),
         };
-        let source = Source { label: "a.csv".into(), reader: Box::new(std::io::Cursor::new(text.to_string())), size: None };
-        let mut lines = Lines::open(source, &layout).unwrap();
+        let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);
+        let mut lines = Lines::open(reader, "a.csv", &layout).unwrap();
         let (mut record, mut rows) = (Record::default(), Vec::new());
         while lines.next(&mut record).unwrap() {
             let fields = (0..record.len()).map(|index| String::from_utf8_lossy(record.field(index).unwrap()).into()).collect();

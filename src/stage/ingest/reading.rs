@@ -2,19 +2,56 @@
 
 use super::arm::Arm;
 use super::bind::{Head, bind};
-use super::layout::{FileLayout, Limits};
-use super::lines::{Lines, Record};
+use super::layout::{Decimal, FileLayout, Limits};
+use super::lines::{Lines, Record, failed};
+use super::parquet::Columns;
 use super::row::{Refusal, Row, RowReader};
 use crate::error::{Error, Result};
 use crate::stage::{Context, Source};
+use std::io::{BufRead, BufReader};
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
 
+/// The rows of a file of either kind.
+enum Rows {
+    Text(Lines),
+    Parquet(Box<Columns>),
+}
+
+impl Rows {
+    fn open(source: Source, layout: &FileLayout) -> Result<Self> {
+        let mut reader = BufReader::with_capacity(1 << 16, source.reader);
+        // The mark of four bytes is in the first buffer of any file that is long enough to be one.
+        if reader.fill_buf().map_err(|error| failed(&source.label, &error))?.starts_with(b"PAR1") {
+            return Ok(Self::Parquet(Box::new(Columns::open(reader, &source.label)?)));
+        }
+        Ok(Self::Text(Lines::open(reader, &source.label, layout)?))
+    }
+    fn next(&mut self, record: &mut Record) -> Result<bool> {
+        match self {
+            Self::Text(lines) => lines.next(record),
+            Self::Parquet(columns) => columns.next(record),
+        }
+    }
+    fn lines(&self) -> u64 {
+        match self {
+            Self::Text(lines) => lines.lines,
+            Self::Parquet(columns) => columns.rows,
+        }
+    }
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Text(lines) => lines.bytes,
+            Self::Parquet(columns) => columns.bytes(),
+        }
+    }
+}
+
 /// An opened file below its header.
 pub(super) struct Reading<'a> {
     pub label: String,
-    pub lines: Lines,
+    rows: Rows,
     pub record: Record,
     pub row: Row,
     reader: RowReader<'a>,
@@ -26,19 +63,24 @@ impl<'a> Reading<'a> {
     /// Opens a file and finds its columns.
     pub(super) fn open(source: Source, layout: &FileLayout, arm: &'a Arm, limits: Limits) -> Result<Self> {
         let label = source.label.clone();
-        let mut lines = Lines::open(source, layout)?;
+        let mut rows = Rows::open(source, layout)?;
+        let (header, decimal) = match &rows {
+            Rows::Text(_) => (layout.header, layout.decimal),
+            Rows::Parquet(_) => (true, Decimal::Point),
+        };
         let mut record = Record::default();
-        if !lines.next(&mut record)? {
-            let message = match (lines.bytes, layout.header) {
+        if !rows.next(&mut record)? {
+            let lines = rows.lines();
+            let message = match (rows.bytes(), header) {
                 (0, true) => "is empty; allowed: a header and at least one data row".to_string(),
                 (0, false) => "is empty; allowed: at least one data row".to_string(),
-                (_, true) => format!("has no header: its {} lines are empty, comments or skipped", lines.lines),
-                (_, false) => format!("has no data row: its {} lines are empty, comments or skipped", lines.lines),
+                (_, true) => format!("has no header: its {lines} lines are empty, comments or skipped"),
+                (_, false) => format!("has no data row: its {lines} lines are empty, comments or skipped"),
             };
             return Err(Error::data(label, message));
         }
         let mut head = Head { label: label.clone(), line: record.line, width: record.len(), names: None };
-        if layout.header {
+        if header {
             let name = |index| String::from_utf8_lossy(record.field(index).unwrap_or_default()).into_owned();
             let mut names: Vec<String> = (0..record.len()).map(name).collect();
             // A delimiter at the end of the header makes no column.
@@ -47,11 +89,21 @@ impl<'a> Reading<'a> {
             }
             head.width = names.len();
             head.names = Some(names);
-            lines.skip(layout.skip_below_header)?;
+            if let Rows::Text(lines) = &mut rows {
+                lines.skip(layout.skip_below_header)?;
+            }
         }
         let binding = bind(layout, &head, arm)?;
-        let reader = RowReader { binding, decimal: layout.decimal, limits, arm, last_sequence: None };
-        Ok(Self { label, lines, record, row: Row::default(), reader, ahead: !layout.header })
+        let reader = RowReader { binding, decimal, limits, arm, last_sequence: None };
+        Ok(Self { label, rows, record, row: Row::default(), reader, ahead: !header })
+    }
+    /// Lines of the file read so far; of a Parquet file its rows.
+    pub(super) fn lines(&self) -> u64 {
+        self.rows.lines()
+    }
+    /// Bytes read so far.
+    pub(super) fn bytes(&self) -> u64 {
+        self.rows.bytes()
     }
     /// The slots that the file fills, and what it lacks.
     pub(super) fn binding(&self) -> &super::bind::Binding {
@@ -59,7 +111,7 @@ impl<'a> Reading<'a> {
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
     pub(super) fn next(&mut self) -> Result<Option<Result<(), Refusal>>> {
-        if !std::mem::take(&mut self.ahead) && !self.lines.next(&mut self.record)? {
+        if !std::mem::take(&mut self.ahead) && !self.rows.next(&mut self.record)? {
             return Ok(None);
         }
         self.row.number += 1;

@@ -160,10 +160,10 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
                 packed.usage.push(row.usage.clone());
             }
         }
-        pace.row(reading.lines.bytes);
+        pace.row(reading.bytes());
     }
-    context.services.advance(reading.lines.bytes, "");
-    scan.lines = reading.lines.lines;
+    context.services.advance(reading.bytes(), "");
+    scan.lines = reading.lines();
     scan.read = reading.row.number;
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));

@@ -177,6 +177,41 @@ fn a_file_without_header_is_read_by_numbers() {
 }
 
 #[test]
+fn a_parquet_file_gives_what_its_text_gives() {
+    use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
+    use std::sync::Arc;
+    let column = |values: Vec<Option<f64>>| Arc::new(Float64Array::from(values)) as ArrayRef;
+    let batch = RecordBatch::try_from_iter([
+        ("id", Arc::new(StringArray::from(vec!["A, 1", "B", "C"])) as ArrayRef),
+        ("q1", Arc::new(Int64Array::from(vec![1, 2, 3])) as ArrayRef),
+        ("q2", column(vec![Some(0.1 + 0.2), Some(-1e-7), Some(12.0)])),
+        ("x", column(vec![Some(1_234.567_890_123_456_7), None, Some(f64::NAN)])),
+        ("y", column(vec![Some(2.0); 3])),
+        ("z", column(vec![Some(3.0); 3])),
+    ])
+    .unwrap();
+    let mut file = Vec::new();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(&mut file, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    let yaml = TWO.to_string() + "max_rejected_fraction: 0.9\n";
+    let binary = take(&Desk::default().with("a.csv", file.clone()), &yaml, robot("rr", 1.0)).unwrap();
+    let text = "\"A, 1\",1,0.30000000000000004,1234.5678901234567,2,3\nB,2,-1e-7,,2,3\nC,3,12,NaN,2,3\n";
+    let text = take(&rows(text), &yaml, robot("rr", 1.0)).unwrap();
+    assert_eq!(binary.recording, text.recording);
+    assert_eq!(
+        refused(&binary.rejected),
+        [("a.csv", 2, "blank", "x is blank"), ("a.csv", 3, "not_a_number", "x: `NaN` is not a finite number")]
+    );
+    assert_eq!(binary.rejected.0[0].text, "B,2,-1e-7,,2.0,3.0");
+    let mapped = yaml.replace("column: z", "column: depth");
+    let message = super::refusal(&Desk::default().with("a.csv", file), &mapped, robot("rr", 1.0));
+    assert_eq!(message, "a.csv: no column `depth`, mapped to `z`; found: id, q1, q2, x, y, z");
+    let message = super::refusal(&Desk::default().with("a.csv", "PAR1 and nothing else"), TWO, robot("rr", 1.0));
+    assert!(message.starts_with("a.csv: is a Parquet file that cannot be read: "), "{message}");
+}
+
+#[test]
 fn what_the_schema_refuses_is_refused_row_by_row() {
     let schema: serde_json::Value = serde_json::from_str(include_str!("../../../schemas/recording.json")).unwrap();
     let fields = [
