@@ -40,6 +40,7 @@ pub(super) struct Errors {
     /// Sets still held out after the last step, the verdict's first; then those that a later step was fitted to.
     held_out: Vec<Block>,
     training: Vec<Block>,
+    references: Vec<Beside>,
     pictures: Vec<Picture>,
     legend: Vec<(String, String)>,
 }
@@ -71,6 +72,17 @@ struct Row {
     last: bool,
     /// mean, std, p95, max, rms, median, rms x, y, z, noise.
     values: Vec<String>,
+}
+
+/// Our figures of one step and set beside those that the pipeline names.
+#[derive(Serialize)]
+struct Beside {
+    label: String,
+    step: String,
+    set: String,
+    points: &'static str,
+    /// Ours and theirs: mean, std, max.
+    figures: [(String, String); 3],
 }
 
 #[derive(Serialize)]
@@ -108,6 +120,7 @@ impl Errors {
             verdict: verdict(rows, &last),
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
+            references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
             legend: steps.0.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
         })
@@ -145,6 +158,21 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         last: Some(row.order) == steps.last(),
         values: values.into_iter().map(mm).collect(),
     }
+}
+
+fn beside(row: &StatisticsRow) -> Option<Beside> {
+    let figure = |ours, theirs: Option<f64>| (mm(ours), theirs.map_or_else(String::new, mm));
+    Some(Beside {
+        label: row.reference.clone()?,
+        step: row.step.clone(),
+        set: row.set.clone(),
+        points: if row.held_out { "held out" } else { "training" },
+        figures: [
+            figure(row.mean_mm, row.reference_mean_mm),
+            figure(row.std_mm, row.reference_std_mm),
+            figure(row.max_mm, row.reference_max_mm),
+        ],
+    })
 }
 
 /// The first step with held-out rows of the same set as `after`.

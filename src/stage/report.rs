@@ -44,7 +44,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 

@@ -50,7 +50,7 @@ writes! {
 impl Stage for Validate {
     const NAME: &'static str = "validate";
     const SUMMARY: &'static str = "States the position error after every step, on held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 

@@ -101,6 +101,9 @@ fn a_report_stands_alone_and_its_pictures_are_sound() {
     for foreign in ["http://", "https://", "src=", "href=", "<script", "@import", "url("] {
         assert!(!page.contains(foreign), "the report refers to something outside itself: {foreign}");
     }
+    for command in page.split("<code>calib ").skip(1).filter_map(|rest| rest.split([' ', '<']).next()) {
+        assert!(["run", "check", "schema"].contains(&command), "the report names `calib {command}`, which does not exist");
+    }
     // Two held-out sets with two pictures each, four views, one spectrum, one convergence, two trainings.
     assert_eq!(pictures(&page), 12);
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report.html");
@@ -155,6 +158,22 @@ fn hostile_names_are_shown_and_not_run() {
     assert!(!page.contains("\" onmouseover=\""), "an attribute from a name came through");
     assert!(page.contains("&lt;script&gt;alert(1)"));
     assert!(pictures(&page) > 10);
+}
+
+#[test]
+fn reference_figures_stand_beside_ours_only_where_there_are_any() {
+    assert!(!html(Report::default(), tables("Heavy 6R, cell 4")).contains("Beside reference figures"));
+    let mut reads = tables("Heavy 6R, cell 4");
+    let row = reads.statistics.0.iter_mut().find(|row| row.step == "network" && row.set == "check").expect("a row");
+    row.reference = Some("Table 9 <paper>".into());
+    row.reference_mean_mm = Some(0.6522);
+    row.reference_max_mm = Some(0.9834);
+    let ours = format!("{:.3}", row.mean_mm);
+    let page = html(Report::default(), reads);
+    let table = page.split("Beside reference figures").nth(1).and_then(|rest| rest.split("</table>").next()).expect("a table");
+    assert!(table.contains("Table 9 &lt;paper&gt;") && table.contains("held out"), "{table}");
+    assert!(table.contains(&format!("<b>{ours}</b></td><td>0.652</td>")), "{table}");
+    assert!(table.contains("<td>0.983</td>"), "{table}");
 }
 
 #[test]
