@@ -2,7 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{EFFECTS, EffectStack, Setting, entry};
+use crate::effect::{EFFECTS, Effect, EffectStack, Setting, entry};
 use crate::error::{Fault, Result, nearest};
 use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
 use crate::robot::{Instrument, RobotModel};
@@ -101,7 +101,6 @@ impl Stage for Identify {
             }
         }
         let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
-        question_ratios(&model, &fitted, context);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -112,6 +111,7 @@ impl Stage for Identify {
             seen_before: &vec![false; data.rows()],
             geometry: geometric_rank(&model, &fitted),
         };
+        question_ratios(&model, &fitted, &fitting, &setting, context);
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }
 }
@@ -136,25 +136,63 @@ fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
 const PLAUSIBLE_RATIO: f64 = 5e-4;
+const COMPLIANCE: &str = "joint_compliance";
 
-fn question_ratios(model: &Model, fitted: &Fitted, context: &Context) {
-    if model.stack.effects().any(|(effect, _)| effect.name() == "joint_compliance") {
+/// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
+fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &Setting, context: &Context) {
+    let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
+        let specs = model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("reduction_ratio."));
+        let free = specs.filter_map(|(k, _)| match &fitted.fates[k] {
+            Fate::Free(sigma) if model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => Some(k),
+            _ => None,
+        });
+        free.collect()
+    };
+    let suspects = implausible(model, fitted);
+    let Some(compliance) = entry(COMPLIANCE).map(|entry| (entry.make)(setting)) else { return };
+    let asked = model.stack.effects().any(|(effect, _)| effect.name() == COMPLIANCE);
+    if suspects.is_empty() || asked {
         return;
     }
-    let implausible = model.stack.specs().iter().enumerate().filter_map(|(k, spec)| match &fitted.fates[k] {
-        Fate::Free(sigma) if spec.name.starts_with("reduction_ratio.") && model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => {
-            Some(format!("{} {:+.1}e-4", spec.place, model.x[k] * 1e4))
-        }
-        _ => None,
-    });
-    let implausible: Vec<String> = implausible.collect();
-    if !implausible.is_empty() {
-        context.services.warn(format!(
-            "reduction ratios of {} are implausible: a ratio is a quotient of tooth counts, but self-weight deflection looks like \
-             this; identify `joint_compliance` with them",
-            implausible.join(", ")
-        ));
+    let list = |model: &Model, which: &[usize]| -> String {
+        let one = |k: &usize| format!("{} {:+.1}e-4", model.stack.specs()[*k].place, model.x[*k] * 1e4);
+        which.iter().map(one).collect::<Vec<_>>().join(", ")
+    };
+    let opening = format!("reduction ratios are quotients of tooth counts, yet {}", list(model, &suspects));
+    if let Some(reason) = compliance.missing(&model.robot, fitting.data) {
+        context.services.warn(format!("{opening}; compliance under self-weight cannot be tried as the explanation: {reason}"));
+        return;
     }
+    // Known names first, compliance behind them: numbers of the first model stay valid in the second.
+    let mut effects: Vec<Box<dyn Effect>> =
+        model.stack.effects().filter_map(|(effect, _)| entry(effect.name())).map(|entry| (entry.make)(setting)).collect();
+    effects.push(compliance);
+    let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
+    let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
+    let refitted = fit(&mut rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
+    let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
+    if gain > DECISIVE {
+        context.services.warn(format!(
+            "{opening}; with `{COMPLIANCE}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
+             by {gain:.0})",
+            list(&rival, &suspects),
+            fitted.unmodelled * 1e3,
+            refitted.unmodelled * 1e3
+        ));
+    } else {
+        context.services.note(format!("{opening}; compliance under self-weight does not explain it better"));
+    }
+}
+
+/// A difference of BIC beyond this is very strong evidence (Kass and Raftery, 1995).
+const DECISIVE: f64 = 10.0;
+
+/// BIC of a fit from its robust residual scale.
+fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
+    let rows = fitting.rows.len() as f64;
+    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row).powi(2) / 3.0).sum::<f64>() / rows;
+    let values = 3.0 * rows;
+    values * (noise + fitted.unmodelled * fitted.unmodelled).ln() + fitted.singular.len() as f64 * values.ln()
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
