@@ -1,6 +1,8 @@
 //! The examples of the README are what calib reads.
 
+use calib::pipeline::Plan;
 use calib::robot::import::{Text, read_calib};
+use calib::stage::STAGES;
 use std::path::Path;
 
 /// The README's YAML blocks that contain `key` at the start of a line.
@@ -21,4 +23,20 @@ fn the_robot_file_of_the_readme_is_read() {
     let wrist = &robot.joints[4];
     assert_eq!(wrist.axis, [0.0, -1.0, 0.0]);
     assert!((wrist.point[0] - 1.594).abs() < 1e-12 && (wrist.point[2] - 1.310).abs() < 1e-12);
+}
+
+#[test]
+fn the_pipeline_of_the_readme_is_understood() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        std::fs::write(path, text).expect("a file");
+    };
+    put("robot.yaml", &example("calib_robot:"));
+    put("monday/controller.csv", "");
+    put("monday/tracker.csv", "");
+    put("pipeline.yaml", &example("calib:"));
+    let plan = Plan::load(&folder.path().join("pipeline.yaml"), &[], STAGES).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(plan.stages.len(), 7);
 }
