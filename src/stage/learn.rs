@@ -31,7 +31,7 @@ pub struct Learn {
     pub on: Vec<String>,
     /// What the networks see.
     pub inputs: Inputs,
-    /// Whether they also see the payload; the recording must have it in every row.
+    /// Whether they also see the payload; the recording must have it in every row to train on.
     pub payload: bool,
     /// Neurons of the hidden layer.
     pub hidden: usize,
@@ -115,7 +115,7 @@ writes! {
 impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str = "learns what the model leaves over, and keeps the correction only where it helps";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -154,7 +154,7 @@ impl Stage for Learn {
             return Err(Error::data("table prediction", "it belongs to another recording than the one beside it"));
         }
         let rows = split.rows(&recording, &self.on)?;
-        let sources = self.sources(&recording)?;
+        let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
         let samples = Samples {
             sources: near.iter().map(|row| sources[*row].clone()).collect(),
@@ -166,21 +166,24 @@ impl Stage for Learn {
 }
 
 impl Learn {
-    /// What the networks see of each row: joints, and the payload if wanted.
-    fn sources(&self, recording: &Recording) -> Result<Vec<Vec<f64>>> {
+    /// Joints of each row, and the payload where all training rows have it: it bounds where the correction is valid even where the
+    /// networks do not see it.
+    fn sources(&self, recording: &Recording, trained: &[usize]) -> Result<Vec<Vec<f64>>> {
         let mut sources: Vec<Vec<f64>> = (0..recording.rows()).map(|row| recording.q(row).to_vec()).collect();
-        if self.payload {
-            let payload = recording.payload.as_ref().filter(|column| column.iter().all(|value| value.is_finite()));
-            let payload = payload.ok_or_else(|| Error::data("with.payload", "the recording has no payload in some rows"))?;
-            for (row, value) in sources.iter_mut().zip(payload) {
-                row.push(*value);
+        let payload = recording.payload.as_ref().filter(|column| trained.iter().all(|row| column[*row].is_finite()));
+        match payload {
+            Some(payload) => sources.iter_mut().zip(payload).for_each(|(row, value)| row.push(*value)),
+            None if self.payload => {
+                return Err(Error::data("with.payload", "the recording has no payload in some of the rows to train on"));
             }
+            None => (),
         }
         Ok(sources)
     }
 
     fn recipe(&self, prismatic: &[bool], context: &Context) -> Recipe {
         Recipe {
+            joints: prismatic.len(),
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
             hidden: self.hidden,
             activation: match self.activation {
@@ -287,7 +290,7 @@ fn corrected(
     }
     if fading + outside > 0 {
         context.services.note(format!(
-            "{} of {} rows lie outside the joint range that the network saw: it fades out on {fading} and is silent on {outside}",
+            "{} of {} rows lie outside the joint range or payload that the network saw: it fades out on {fading} and is silent on {outside}",
             fading + outside,
             rows.len()
         ));

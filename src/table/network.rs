@@ -13,7 +13,8 @@ crate::table::rows! { "network",
         /// The network from 1; 0 for what all networks share.
         member: i64,
         /// `weight`, `bias`; shared: `input_value`, `input_sin`, `input_cos` (of source `from`), `input_mean`, `input_scale`,
-        /// `output_mean`, `output_scale`, `valid_lower`, `valid_upper` (of source `to`), `sigmoid`, `tanh`.
+        /// `output_mean`, `output_scale`, `valid_lower`, `valid_upper`, `valid_margin` (of source `to`; the correction is gone one
+        /// margin beyond the range), `sigmoid`, `tanh`.
         part: String,
         layer: i64,
         to: i64,
@@ -57,6 +58,7 @@ impl Network {
             let unit = unit_of(Feature { source, map: Map::Value }, prismatic);
             put(0, "valid_lower", 0, source + 1, 0, valid.lower * unit);
             put(0, "valid_upper", 0, source + 1, 0, valid.upper * unit);
+            put(0, "valid_margin", 0, source + 1, 0, valid.margin * unit);
         }
         for (m, parameters) in correction.members.iter().enumerate() {
             for (index, value) in parameters.iter().enumerate() {
@@ -95,7 +97,8 @@ impl Network {
         let valid = (0..count("valid_lower"))
             .map(|source| {
                 let unit = unit_of(Feature { source, map: Map::Value }, prismatic);
-                Ok(Valid { lower: shared("valid_lower", source + 1)? / unit, upper: shared("valid_upper", source + 1)? / unit })
+                let bound = |part: &str| Ok::<f64, Error>(shared(part, source + 1)? / unit);
+                Ok(Valid { lower: bound("valid_lower")?, upper: bound("valid_upper")?, margin: bound("valid_margin")? })
             })
             .collect::<Result<Vec<Valid>>>()?;
         if features.is_empty() || features.iter().any(|feature| feature.source >= valid.len()) {

@@ -189,6 +189,18 @@ fn gross_errors_are_not_learnt_and_rows_outside_the_range_are_left_alone() {
 }
 
 #[test]
+fn what_was_learnt_under_load_is_not_applied_without() {
+    let mut arm = arm(300, 0.5, 0.05, 5);
+    // Trained at 210 kg; of the other rows one is near that load, one empty, and one not known.
+    let mut payload = vec![210.0; 300];
+    (payload[297], payload[298], payload[299]) = (205.0, 0.0, f64::NAN);
+    arm.0.payload = Some(payload);
+    let after = learn(quick(), &arm, 1, &Desk::default()).unwrap().prediction;
+    let changed = |row: usize| after.0[row].dx_mm != arm.2.0[row].dx_mm;
+    assert_eq!([296, 297, 298, 299].map(changed), [true, true, false, false]);
+}
+
+#[test]
 fn settings_and_sets_that_make_no_sense_are_named() {
     let faults = settings::<Learn>(json!({"on": [], "hidden": 0, "keep_back": 0.5, "folds": 1, "decay": -1.0})).check();
     let places: Vec<&str> = faults.iter().map(|fault| fault.place.as_str()).collect();

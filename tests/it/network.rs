@@ -9,6 +9,7 @@ use rand::{RngExt, SeedableRng};
 
 fn recipe(joints: usize) -> Recipe {
     Recipe {
+        joints,
         features: features(&vec![false; joints], false, false),
         hidden: 12,
         activation: Activation::Sigmoid,
@@ -135,7 +136,8 @@ fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     q[1] = correction.valid[1].upper;
     let edge = correction.at(&q);
     assert_eq!(edge.share, 1.0);
-    let margin = 0.1 * (correction.valid[1].upper - correction.valid[1].lower);
+    let margin = correction.valid[1].margin;
+    assert!((margin - 0.1 * (correction.valid[1].upper - correction.valid[1].lower)).abs() < 1e-15);
     let length = |d: [f64; 3]| d.iter().map(|d| d * d).sum::<f64>().sqrt();
     let mut last = edge;
     for step in 1..=20 {
@@ -164,7 +166,7 @@ fn a_correction_comes_back_from_its_table() {
         shape,
         inputs: features.iter().map(|_| scaling()).collect(),
         outputs: [scaling(), scaling(), scaling()],
-        valid: (0..4).map(|_| Valid { lower: number(-2.0, -1.0), upper: number(1.0, 2.0) }).collect(),
+        valid: (0..4).map(|_| Valid { lower: number(-2.0, -1.0), upper: number(1.0, 2.0), margin: number(0.1, 0.5) }).collect(),
         members: (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect(),
         features,
     };

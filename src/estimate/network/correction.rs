@@ -8,7 +8,7 @@ use super::perceptron::{OUTPUTS, Shape};
 
 /// The margin as a share of the range that was seen.
 const MARGIN: f64 = 0.1;
-/// The margin where a source hardly moved: 0.01 rad, m or kg.
+/// The margin where a joint hardly moved, rad or m.
 const LEAST_MARGIN: f64 = 0.01;
 
 /// How an input comes from a source.
@@ -73,19 +73,32 @@ impl Scaling {
     }
 }
 
-/// The range of a source that the training saw.
+/// The range of a source that the training saw, and how far beyond it the correction is gone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Valid {
     pub lower: f64,
     pub upper: f64,
+    pub margin: f64,
 }
 
 impl Valid {
+    /// The range of a joint's positions, rad or m.
+    pub fn joint(values: impl Iterator<Item = f64> + Clone) -> Self {
+        Self::of(values, |_| LEAST_MARGIN)
+    }
+    /// The range of a payload, kg: what a load does is proportional to it, so a tenth of the load is as near as a tenth of the range.
+    pub fn payload(values: impl Iterator<Item = f64> + Clone) -> Self {
+        Self::of(values, |heaviest| MARGIN * heaviest.max(1.0))
+    }
+    fn of(values: impl Iterator<Item = f64> + Clone, least: impl Fn(f64) -> f64) -> Self {
+        let lower = values.clone().fold(f64::INFINITY, f64::min);
+        let upper = values.fold(f64::NEG_INFINITY, f64::max);
+        Self { lower, upper, margin: (MARGIN * (upper - lower)).max(least(upper)) }
+    }
     /// 1 inside, 0 from one margin outside on.
     fn share(&self, value: f64) -> f64 {
-        let margin = (MARGIN * (self.upper - self.lower)).max(LEAST_MARGIN);
         let outside = (self.lower - value).max(value - self.upper).max(0.0);
-        let s = (1.0 - outside / margin).max(0.0);
+        let s = (1.0 - outside / self.margin).max(0.0);
         s * s * (3.0 - 2.0 * s)
     }
 }
@@ -97,7 +110,7 @@ pub struct Correction {
     pub features: Vec<Feature>,
     pub inputs: Vec<Scaling>,
     pub outputs: [Scaling; OUTPUTS],
-    /// By source: the joints, and the payload where it is an input.
+    /// By source: the joints, and the payload where it was known in training, be it an input or not.
     pub valid: Vec<Valid>,
     /// Parameters of each network.
     pub members: Vec<Vec<f64>>,
@@ -113,7 +126,7 @@ pub struct Applied {
 }
 
 impl Correction {
-    /// The correction at `sources` (joints in rad or m, then payload in kg where it is an input).
+    /// The correction at `sources` (joints in rad or m, then payload in kg where it was known in training).
     ///
     /// A source that is missing or no number counts as outside the range: no correction.
     pub fn at(&self, sources: &[f64]) -> Applied {

@@ -37,6 +37,8 @@ impl Samples {
 /// How to train.
 #[derive(Debug, Clone)]
 pub struct Recipe {
+    /// How many of the sources are joints; one more is the payload.
+    pub joints: usize,
     pub features: Vec<Feature>,
     pub hidden: usize,
     pub activation: Activation,
@@ -101,11 +103,10 @@ pub(super) struct Prepared<'a> {
 
 impl<'a> Prepared<'a> {
     pub(super) fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
-        let sources = 1 + recipe.features.iter().map(|f| f.source).max().unwrap_or(0);
+        let sources = samples.sources.first().map_or(0, Vec::len);
         let column = |s: usize| samples.sources.iter().map(move |row| row[s]);
-        let valid = (0..sources)
-            .map(|s| Valid { lower: column(s).fold(f64::INFINITY, f64::min), upper: column(s).fold(f64::NEG_INFINITY, f64::max) })
-            .collect();
+        let valid =
+            (0..sources).map(|s| if s < recipe.joints { Valid::joint(column(s)) } else { Valid::payload(column(s)) }).collect();
         let inputs: Vec<Scaling> =
             recipe.features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
         let outputs = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
