@@ -12,10 +12,14 @@ pub fn json_schema(stages: &[StageEntry]) -> String {
         .iter()
         .map(|entry| {
             let settings = (entry.schema)(&mut generator).to_value();
-            stage(entry, settings)
+            stage(entry, with_variables(settings))
         })
         .collect();
-    let definitions = Value::Object(generator.take_definitions(true));
+    let mut definitions: Map<String, Value> =
+        generator.take_definitions(true).into_iter().map(|(name, schema)| (name, with_variables(schema))).collect();
+    let variable =
+        json!({ "type": "string", "pattern": "^\\$\\{[A-Za-z0-9_-]+\\}$", "description": "A variable of the pipeline." });
+    definitions.insert(VARIABLE.into(), variable);
     let schema = json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "calib pipeline",
@@ -40,6 +44,55 @@ pub fn json_schema(stages: &[StageEntry]) -> String {
     // Keys in order, so that the file does not depend on how its parts were built.
     let text = serde_json::to_string_pretty(&sorted(schema)).expect("a schema is plain data");
     text + "\n"
+}
+
+/// The definition of a `${variable}` that stands for a whole value.
+const VARIABLE: &str = "calib.variable";
+
+/// Lets a variable stand wherever a number, a boolean or one of a few words is expected; text may hold one anyway.
+fn with_variables(schema: Value) -> Value {
+    let Value::Object(map) = schema else { return schema };
+    let members = |key: &str| map.get(key).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let words = members("oneOf").iter().chain(members("anyOf")).any(is_word);
+    let scalar = |kind: &Value| matches!(kind.as_str(), Some("number" | "integer" | "boolean"));
+    let typed = map.get("type").is_some_and(|kind| scalar(kind) || kind.as_array().is_some_and(|kinds| kinds.iter().any(scalar)));
+    if typed || words || map.contains_key("enum") {
+        let description = map.get("description").cloned();
+        let mut either = json!({ "anyOf": [inside(map), { "$ref": format!("#/definitions/{VARIABLE}") }] });
+        if let (Some(description), Some(object)) = (description, either.as_object_mut()) {
+            object.insert("description".into(), description);
+        }
+        return either;
+    }
+    Value::Object(inside(map))
+}
+
+/// The same for the schemas within one; words that tell variants apart stay as they are.
+fn inside(map: Map<String, Value>) -> Map<String, Value> {
+    let each = |(key, value): (String, Value)| {
+        let value = match (key.as_str(), value) {
+            ("properties" | "patternProperties", Value::Object(fields)) => {
+                Value::Object(fields.into_iter().map(|(name, field)| (name, with_variables(field))).collect())
+            }
+            ("items" | "additionalProperties", value) => with_variables(value),
+            ("anyOf" | "oneOf" | "allOf", Value::Array(members)) => {
+                Value::Array(members.into_iter().map(|member| if is_word(&member) { member } else { plain(member) }).collect())
+            }
+            (_, value) => value,
+        };
+        (key, value)
+    };
+    map.into_iter().map(each).collect()
+}
+
+fn is_word(schema: &Value) -> bool {
+    schema.get("const").is_some() || schema.get("enum").is_some()
+}
+fn plain(schema: Value) -> Value {
+    match schema {
+        Value::Object(map) => Value::Object(inside(map)),
+        other => other,
+    }
 }
 
 fn stage(entry: &StageEntry, settings: Value) -> Value {

@@ -101,9 +101,13 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
     if let Some(Value::List(items)) = tree.at_mut("stages").map(|list| &mut list.value) {
         for (index, item) in items.iter_mut().enumerate() {
             let path = format!("stages[{index}]");
-            troubles.extend(overrides::substitute(item, &path, &variables));
+            let unfilled = overrides::substitute(item, &path, &variables);
             let (stage, more) = read_stage(file, item, stages);
-            troubles.extend(more.into_iter().map(|trouble| trouble.at(item.mark).below(&path)));
+            // What else is wrong with a value that holds no value yet is not known.
+            let more = more.into_iter().map(|trouble| trouble.at(item.mark).below(&path));
+            let more = more.filter(|trouble| unfilled.iter().all(|other| other.path != trouble.path));
+            troubles.extend(more.collect::<Vec<_>>());
+            troubles.extend(unfilled);
             if !stage.id.is_empty() && !known.insert(stage.id.clone()) {
                 let message = format!("two stages have the id `{}`; give one of them another `id`", stage.id);
                 troubles.push(Trouble::new(message).at(item.mark).below(&path));

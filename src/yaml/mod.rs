@@ -39,13 +39,17 @@ fn read(text: &str, duplicate_keys: DuplicateKeyPolicy) -> Result<Node, Trouble>
     };
     serde_saphyr::from_str_with_options::<Spanned<Tree>>(text, options).map(Tree::node).map_err(|error| {
         let formatted = error.render_with_formatter(&serde_saphyr::UserMessageFormatter);
-        Trouble::new(strip_place(&formatted)).at(error.location().map_or(Mark::Unknown, mark))
+        Trouble::new(in_words(&formatted)).at(error.location().map_or(Mark::Unknown, mark))
     })
 }
 
-/// The place is printed once, in front of the message.
-fn strip_place(message: &str) -> String {
+/// One line, in our words where it matters; the place is printed once, in front of it.
+fn in_words(message: &str) -> String {
     let first = message.lines().next().unwrap_or_default();
+    let twice = first.split_once("duplicate mapping key: ").and_then(|(_, rest)| rest.strip_suffix(" not allowed here"));
+    if let Some(key) = twice {
+        return format!("key `{key}` is given twice in this block");
+    }
     let first = first.split(" at line ").next().unwrap_or(first).trim_start_matches("error: ");
     match first.strip_prefix("line ").and_then(|rest| rest.split_once(": ")) {
         Some((_, message)) => message.into(),
@@ -164,6 +168,30 @@ mod tests {
                 "f.yaml:3:11: list[1]: expected a number; found `x`",
             ]
         );
+    }
+
+    /// serde reads such an enum through a buffer without places.
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
+    #[expect(dead_code, reason = "only its faults are looked at")]
+    enum Tagged {
+        Every { n: u32, list: Vec<f64> },
+    }
+
+    #[test]
+    fn faults_inside_variants_have_their_place() {
+        let faults = |text: &str| -> Vec<String> {
+            let troubles = typed::<Vec<Tagged>>(&parse(text).0.unwrap()).unwrap_err();
+            troubles.into_iter().map(|trouble| trouble.fault("f").to_string()).collect()
+        };
+        assert_eq!(faults("- {by: every, n: x, list: []}"), ["f:1:18: [0].n: expected a whole number, 0 or more; found `x`"]);
+        assert_eq!(faults("- {by: every, n: 1, list: [1, b]}"), ["f:1:31: [0].list[1]: expected a number; found `b`"]);
+        assert_eq!(
+            faults("- {by: evry, n: 1, list: []}"),
+            ["f:1:8: [0].by: unknown value `evry`; did you mean `every`? Allowed: every"]
+        );
+        let unknown = "- {by: every, n: 1, list: [], lst: 2}";
+        assert_eq!(faults(unknown), ["f:1:31: [0].lst: unknown key; did you mean `list`? Allowed: n, list"]);
     }
 
     #[test]

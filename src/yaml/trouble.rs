@@ -12,11 +12,23 @@ pub struct Trouble {
     pub message: String,
     /// The key that is missing, where that is the fault.
     pub(super) missing: Option<&'static str>,
+    /// What to look for where serde lost the place.
+    pub(super) clue: Option<Clue>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Clue {
+    /// A value that is not what was expected.
+    Expected(String),
+    /// A key that is not known.
+    Key(String),
+    /// A word that is not among those allowed.
+    Word(String),
 }
 
 impl Trouble {
     pub fn new(message: impl Into<String>) -> Self {
-        Self { path: String::new(), mark: None, message: message.into(), missing: None }
+        Self { path: String::new(), mark: None, message: message.into(), missing: None, clue: None }
     }
     /// Sets the place unless an inner one is known.
     pub fn at(mut self, mark: Mark) -> Self {
@@ -60,7 +72,9 @@ impl de::Error for Trouble {
         Self::new(message.to_string())
     }
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::new(format!("expected {}; found {}", wanted(&expected.to_string()), given(found)))
+        let expected = wanted(&expected.to_string());
+        let message = format!("expected {expected}; found {}", given(found));
+        Self { clue: Some(Clue::Expected(expected)), ..Self::new(message) }
     }
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
         Self::invalid_type(found, expected)
@@ -69,7 +83,8 @@ impl de::Error for Trouble {
         Self::new(format!("expected {}; found {found}", wanted(&expected.to_string())))
     }
     fn unknown_variant(found: &str, allowed: &'static [&'static str]) -> Self {
-        Self::new(format!("unknown value `{found}`{}", instead(found, allowed)))
+        let message = format!("unknown value `{found}`{}", instead(found, allowed));
+        Self { clue: Some(Clue::Word(found.into())), ..Self::new(message) }
     }
     fn unknown_field(found: &str, allowed: &'static [&'static str]) -> Self {
         let message = if allowed.is_empty() {
@@ -77,7 +92,7 @@ impl de::Error for Trouble {
         } else {
             format!("unknown key{}", instead(found, allowed))
         };
-        Self::new(message)
+        Self { clue: Some(Clue::Key(found.into())), ..Self::new(message) }
     }
     fn missing_field(field: &'static str) -> Self {
         Self { missing: Some(field), ..Self::new(format!("missing key `{field}`")) }

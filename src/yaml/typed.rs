@@ -1,5 +1,6 @@
 //! Trees as typed values: the serde deserializer over [`Node`].
 
+use super::trouble::Clue;
 use super::{Mark, Node, Trouble, Value};
 use serde::de::value::StrDeserializer;
 use serde::de::{
@@ -19,8 +20,10 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
             Ok(value) if troubles.is_empty() => return Ok(value),
             Ok(_) => return Err(troubles),
             Err(trouble) => {
+                let trouble = locate::<T>(trouble, &rest);
                 if let Some(field) = trouble.missing {
-                    if !removed.contains(&super::trouble::join(&trouble.path, field)) {
+                    let path = super::trouble::join(&trouble.path, field);
+                    if !removed.iter().any(|gone: &String| gone.starts_with(&path)) {
                         troubles.push(trouble);
                     }
                     return Err(troubles);
@@ -33,6 +36,37 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
                 removed.push(path);
             }
         }
+    }
+}
+
+/// Finds the place of a fault inside a block that serde had to buffer (variants told apart by a key), where places are lost:
+/// the value that, put out of shape, still is not what was expected there.
+fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
+    let (Some(clue), Some(block)) = (trouble.clue.clone(), root.at(&trouble.path)) else { return trouble };
+    let mut candidates: Vec<(String, Mark)> = Vec::new();
+    block.walk(&trouble.path, &mut |path, node| match &clue {
+        Clue::Expected(_) => candidates.push((path.into(), node.mark)),
+        Clue::Word(word) if matches!(&node.value, Value::Text(text) if text == word) => candidates.push((path.into(), node.mark)),
+        Clue::Key(key) => {
+            let entry = node.entries().iter().find(|(name, _, _)| name == key);
+            candidates.extend(entry.map(|(name, mark, _)| (super::trouble::join(path, name), *mark)));
+        }
+        Clue::Word(_) => {}
+    });
+    let still = |path: &str| {
+        let mut bent = root.clone();
+        let Some(place) = bent.at_mut(path) else { return false };
+        // Of the two, one is another value than what stands there.
+        place.value = if matches!(place.value, Value::Null) { Value::Bool(true) } else { Value::Null };
+        T::deserialize(&bent).is_err_and(|other| other.clue == trouble.clue && other.message != trouble.message)
+    };
+    let found = match clue {
+        Clue::Expected(_) => candidates.into_iter().rev().find(|(path, _)| still(path)),
+        Clue::Key(_) | Clue::Word(_) => candidates.into_iter().next(),
+    };
+    match found {
+        Some((path, mark)) => Trouble { path, mark: Some(mark), ..trouble },
+        None => trouble,
     }
 }
 

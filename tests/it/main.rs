@@ -2,6 +2,7 @@
 
 mod arms;
 mod cmd;
+mod commands;
 mod desk;
 mod effects;
 mod fixture;
@@ -10,10 +11,13 @@ mod ingest;
 mod layers;
 mod learn;
 mod network;
+mod pipelines;
 mod readme;
 mod report;
+mod resume;
 mod robot;
 mod robot_faults;
+mod schema;
 mod split;
 mod sr210d;
 mod store;

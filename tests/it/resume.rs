@@ -1,0 +1,118 @@
+//! A run that is killed goes on where it stood, and ends with the tables of an undisturbed one.
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+fn pipeline() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
+}
+fn calib(store: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+    command.arg("run").arg(pipeline()).args(["--json", "--quiet", "--store"]).arg(store);
+    command
+}
+fn run(command: &mut Command) -> Value {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+/// `stage.port` -> hash of the table's content.
+fn hashes(result: &Value) -> BTreeMap<String, String> {
+    let mut hashes = BTreeMap::new();
+    for stage in result["stages"].as_array().unwrap() {
+        for output in stage["outputs"].as_array().unwrap() {
+            let name = format!("{}.{}", stage["id"].as_str().unwrap(), output["port"].as_str().unwrap());
+            hashes.insert(name, output["table_hash"].as_str().unwrap().to_string());
+        }
+    }
+    assert!(hashes.len() > 8, "{hashes:?}");
+    hashes
+}
+/// Action records, the commit points.
+fn actions(store: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for folder in std::fs::read_dir(store.join("actions")).into_iter().flatten().flatten() {
+        found.extend(std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()));
+    }
+    found.sort();
+    found
+}
+fn executed(result: &Value) -> usize {
+    result["stages"].as_array().unwrap().iter().filter(|stage| stage["status"] == "executed").count()
+}
+
+#[test]
+fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let begun = Instant::now();
+    let undisturbed = run(&mut calib(&folder.path().join("undisturbed")));
+    let whole = begun.elapsed();
+    let mut random = ChaCha8Rng::seed_from_u64(20);
+    for round in 0..20 {
+        let store = folder.path().join(format!("killed-{round}"));
+        // Twice in a row: what a killed run left, and what a killed resumption left.
+        for _ in 0..2 {
+            let mut child = calib(&store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            std::thread::sleep(whole.mul_f64(random.random_range(0.0..1.1)));
+            child.kill().unwrap();
+            child.wait().unwrap();
+        }
+        let finished = actions(&store);
+        let modified: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
+        let resumed = run(&mut calib(&store));
+        let stages = resumed["stages"].as_array().unwrap().len();
+        assert_eq!(executed(&resumed), stages - finished.len(), "round {round}: finished stages are not redone");
+        let after: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
+        assert_eq!(modified, after, "round {round}: records stand");
+        assert_eq!(hashes(&resumed), hashes(&undisturbed), "round {round}");
+        assert_eq!(executed(&run(&mut calib(&store))), 0);
+        let left: Vec<_> = std::fs::read_dir(store.join("tmp")).unwrap().flatten().collect();
+        assert!(left.is_empty(), "round {round}: {left:?}");
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |jobs: &str| hashes(&run(calib(&folder.path().join(jobs)).args(["--jobs", jobs])));
+    assert_eq!(with("1"), with("2"));
+}
+
+#[test]
+fn two_runs_at_once_share_their_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = || calib(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let results = [start(), start()].map(|child| {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    });
+    let stages = results[0]["stages"].as_array().unwrap().len();
+    assert_eq!(executed(&results[0]) + executed(&results[1]), stages, "every stage was executed once");
+    assert_eq!(hashes(&results[0]), hashes(&results[1]));
+}
+
+#[test]
+fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = calib(folder.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let runs = folder.path().join("runs");
+    let begun = Instant::now();
+    let manifest = loop {
+        let found = std::fs::read_dir(&runs).into_iter().flatten().flatten().map(|entry| entry.path().join("manifest.json"));
+        if let Some(path) = found.into_iter().find(|path| path.is_file()) {
+            break path;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(20), "no manifest");
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    assert_eq!(manifest["status"], "running");
+    assert_eq!(manifest["seed"], 11);
+}

@@ -1,0 +1,36 @@
+//! The JSON Schema of the pipeline's YAML: what editors complete from.
+
+use calib::pipeline::json_schema;
+use calib::stage::STAGES;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+#[test]
+fn the_schema_in_the_repository_is_that_of_the_code() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/pipeline.v1.schema.json");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        kept == json_schema(STAGES),
+        "out of date; make it anew with: cargo run -- schema pipeline > schemas/pipeline.v1.schema.json"
+    );
+}
+
+#[test]
+fn every_stage_is_registered_once_and_documented() {
+    let names: BTreeSet<&str> = STAGES.iter().map(|entry| entry.name).collect();
+    assert_eq!(names.len(), STAGES.len());
+    for entry in STAGES {
+        assert!(!entry.summary.is_empty() && entry.implementation > 0, "{}", entry.name);
+        for port in (entry.reads)().iter().chain(&(entry.writes)()) {
+            assert!(calib::table::TABLES.contains(&port.kind), "{}: no table `{}`", entry.name, port.kind);
+        }
+    }
+}
+
+#[test]
+fn every_file_with_a_stage_is_in_the_list() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/stage");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_file());
+    let stages = files.filter(|path| std::fs::read_to_string(path).unwrap().contains("\nimpl Stage for ")).count();
+    assert_eq!(stages, STAGES.len(), "a stage is missing in STAGES (src/stage/mod.rs)");
+}
