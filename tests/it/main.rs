@@ -2,7 +2,6 @@
 
 mod arms;
 mod cmd;
-mod commands;
 mod desk;
 mod effects;
 mod fixture;
