@@ -1,7 +1,7 @@
 //! A rigid motion or frame, as rotation matrix and translation.
 
 use super::{Twist, hat};
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::Mul;
 
 /// Rotation (3x3) and translation (m); maps points of the right frame into the left one.
@@ -30,7 +30,8 @@ impl Pose {
 
     /// Returns the rotation vector (rad), angle in [0, pi].
     pub fn rotation_vector(&self) -> Vector3<f64> {
-        Rotation3::from_matrix_unchecked(self.rotation).scaled_axis()
+        // By way of a quaternion: the arc cosine of the trace would lose half the digits of a small angle.
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation)).scaled_axis()
     }
 
     /// Exponential of a twist (v; w): Modern Robotics, Eq. 3.88.
