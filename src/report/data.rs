@@ -5,7 +5,7 @@ use super::number::{count, fixed};
 use crate::table::{IntakeRow, RejectedRow, Robot};
 use crate::units::Unit;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Rejected rows that are listed; the table holds all.
 const LISTED: usize = 50;
@@ -19,7 +19,7 @@ pub(super) struct Section {
     /// Set and its rows.
     sets: Vec<(String, String)>,
     files: Vec<File>,
-    reasons: Vec<(String, String)>,
+    reasons: Vec<String>,
     rejected: Vec<Reject>,
     rejected_count: String,
     unlisted: bool,
@@ -78,19 +78,15 @@ impl Section {
             *sets.entry(&row.set).or_default() += 1;
         }
         let rejected: Vec<&RejectedRow> = tables.rejected.iter().flat_map(|table| &table.0).collect();
-        let mut reasons: BTreeMap<&str, i64> = BTreeMap::new();
-        for row in &rejected {
-            *reasons.entry(&row.reason).or_default() += 1;
-        }
-        let counted = |counts: BTreeMap<&str, i64>| counts.into_iter().map(|(name, n)| (name.into(), count(n))).collect();
+        let reasons: BTreeSet<&String> = rejected.iter().map(|row| &row.reason).collect();
         Self {
             joints: joints(&tables.robot),
             tool: tool(&tables.robot),
             points: count(recording.rows() as i64),
             quantities: quantities.into_iter().filter_map(|(there, name)| there.then_some(name)).collect(),
-            sets: counted(sets),
+            sets: sets.into_iter().map(|(name, rows)| (name.into(), count(rows))).collect(),
             files: tables.intake.iter().flat_map(|table| &table.0).map(file).collect(),
-            reasons: counted(reasons),
+            reasons: reasons.into_iter().cloned().collect(),
             rejected: rejected.iter().take(LISTED).map(|row| reject(row)).collect(),
             rejected_count: count(rejected.len() as i64),
             unlisted: rejected.len() > LISTED,

@@ -45,8 +45,12 @@ struct Remark {
 
 impl Section {
     pub fn new(parameters: &Parameters) -> Self {
+        let registered = parameters.effects();
+        let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
+        let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
+        sorted.sort_by_cached_key(|row| (place(row), row.effect.clone(), along_the_chain(&row.name)));
         let mut effects: Vec<(&str, Vec<&ParameterRow>)> = Vec::new();
-        for parameter in &parameters.0 {
+        for &parameter in &sorted {
             match effects.iter_mut().find(|(effect, _)| *effect == parameter.effect) {
                 Some((_, rows)) => rows.push(parameter),
                 None => effects.push((&parameter.effect, vec![parameter])),
@@ -56,7 +60,7 @@ impl Section {
             effect: effect.into(),
             rows: rows.iter().map(|parameter| row(parameter, &rows)).collect(),
         });
-        let remarked = parameters.0.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
+        let remarked = sorted.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
         Self {
             groups: groups.collect(),
             remarks: remarked
@@ -71,6 +75,22 @@ impl Section {
     }
 }
 
+/// Order of a name by its numbers (`j2` before `j10`), shifts before turns (`z` before `rx`).
+fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let (text, after) = rest.split_at(digits);
+        let end = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
+        let (number, next) = after.split_at(end);
+        let turn = [".rx", ".ry", ".rz"].iter().any(|turn| text.ends_with(turn));
+        parts.push((turn, text.to_owned(), number.parse().unwrap_or(0)));
+        rest = next;
+    }
+    parts
+}
+
 /// A parameter among those of its effect, with which it shares its decimals.
 fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
     let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
@@ -80,7 +100,7 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
             significant(p.nominal, 6),
             significant(p.value, 6),
             p.unit.clone(),
-            significant(p.value - p.nominal, 4),
+            significant(p.change, 4),
             p.sigma.map_or_else(String::new, |s| significant(s, 2)),
             p.unit.clone(),
         ),
@@ -114,8 +134,20 @@ fn read(
         coarse.show(p.nominal, decimals(coarse)),
         coarse.show(p.value, decimals(coarse)),
         coarse.symbol.into(),
-        fine.show_signed(p.value - p.nominal, decimals(fine)),
+        fine.show_signed(p.change, decimals(fine)),
         p.sigma.map_or_else(String::new, |s| fine.show(s, decimals(fine))),
         fine.symbol.into(),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::along_the_chain;
+
+    #[test]
+    fn names_are_in_the_order_of_the_chain() {
+        let mut names = ["j.l10.x", "j.l2.rx", "j.l2.z", "j.j12_j3", "j.j12", "j.j2", "b.rx", "b.z"];
+        names.sort_by_cached_key(|name| along_the_chain(name));
+        assert_eq!(names, ["b.z", "j.j2", "j.j12", "j.j12_j3", "j.l2.z", "j.l2.rx", "j.l10.x", "b.rx"]);
+    }
 }

@@ -12,6 +12,8 @@ crate::table::rows! { "parameters",
         unit: String,
         nominal: f64,
         value: f64,
+        /// Value minus nominal.
+        change: f64,
         /// One standard deviation; null where it was not estimated.
         sigma: Option<f64>,
         /// `free` (estimated), `earlier` (estimated by an earlier step), `held` (by the user), `redundant` (other free parameters do
@@ -73,13 +75,15 @@ impl Parameters {
                         Some("no plausible value of it would move the measured points beyond their noise".to_string()),
                     ),
                 };
+                let (nominal, value) = (spec.unit.from_si(nominal), spec.unit.from_si(value));
                 rows.push(ParameterRow {
                     name: spec.name.clone(),
                     effect: effect.name().into(),
                     place: spec.place.clone(),
                     unit: spec.unit.symbol().into(),
-                    nominal: spec.unit.from_si(nominal),
-                    value: spec.unit.from_si(value),
+                    nominal,
+                    value,
+                    change: value - nominal,
                     sigma: sigma.filter(|sigma| sigma.is_finite()),
                     status: status.into(),
                     step: step.into(),

@@ -70,6 +70,7 @@ fn parameter(
         unit: unit.into(),
         nominal,
         value,
+        change: value - nominal,
         sigma: (sigma > 0.0).then_some(sigma),
         status: status.into(),
         step: if effect == "joint_compliance" { "stiffness" } else { "geometry" }.into(),
