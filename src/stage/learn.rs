@@ -20,8 +20,10 @@ const FAR: f64 = 6.0;
 const DECAYS: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
 /// Generations of the swarm in each fold of the cross-validation: the start matters less there than the time.
 const FOLD_GENERATIONS: usize = 40;
-/// Rows times iterations times networks that the cross-validation may cost: about 20 s on one core in the dev profile.
-const FOLD_WORK: usize = 40_000_000;
+/// Rows times iterations times networks that the cross-validation may cost: about 20 s on one core in the dev profile. Long
+/// recordings have fewer networks per fold, then fewer iterations, but not below [`FOLD_ITERATIONS`].
+const FOLD_WORK: usize = 20_000_000;
+const FOLD_ITERATIONS: usize = 60;
 
 /// Settings of `learn`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -115,7 +117,7 @@ writes! {
 impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str = "learns what the model leaves over, and keeps the correction only where it helps";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -212,9 +214,10 @@ impl Learn {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
         let generations = self.generations.min(FOLD_GENERATIONS);
-        let work = samples.rows() * self.iterations * decays.len() * self.folds;
-        let members = (FOLD_WORK / work.max(1)).clamp(1, 3.min(self.ensemble));
-        let trial = Recipe { generations, members, ..recipe.clone() };
+        let affordable = FOLD_WORK / (samples.rows() * decays.len() * self.folds);
+        let members = (affordable / self.iterations).clamp(1, 3.min(self.ensemble));
+        let iterations = affordable.max(FOLD_ITERATIONS).min(self.iterations);
+        let trial = Recipe { generations, members, iterations, ..recipe.clone() };
         let total = self.folds * (generations + 1) + self.generations + 1;
         services.begin("training the network", Some(total as u64), "generations");
         let verdict = judge(samples, &trial, &decays, self.folds, |fold, generation| {

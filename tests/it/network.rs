@@ -66,7 +66,8 @@ fn the_gradient_is_that_of_central_differences() {
         let mut scratch = Scratch::new(shape);
         let mut w: Vec<f64> = (0..shape.parameters()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let mut gradient = vec![0.0; w.len()];
-        let value = loss.gradient(&w, &mut gradient, &mut scratch);
+        let (value, squares) = loss.gradient(&w, &mut gradient, &mut scratch);
+        assert_eq!(squares.map(|s| (s * 1e9).round()), loss.mean_squares(&w, &mut scratch).map(|s| (s * 1e9).round()));
         assert!((value - loss.value(&w, &mut scratch)).abs() < 1e-14);
         for i in 0..w.len() {
             let step = 1e-5;

@@ -49,7 +49,7 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
     let mut scratch = Scratch::new(train.shape);
     let mut x = start;
     let mut gradient = vec![0.0; x.len()];
-    let mut loss = train.gradient(&x, &mut gradient, &mut scratch);
+    let (mut loss, mut squares) = train.gradient(&x, &mut gradient, &mut scratch);
     let mut evaluations = 1;
     let mut memory: VecDeque<Pair> = VecDeque::new();
     let mut kept = (f64::INFINITY, x.clone());
@@ -60,8 +60,7 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
     let mut index = 0;
     let stop = loop {
         let checked = check.map(|check| check.mean_squares(&x, &mut scratch));
-        let train_squares = train.mean_squares(&x, &mut scratch);
-        history.push(Iteration { index, loss, train: train_squares, check: checked, evaluations });
+        history.push(Iteration { index, loss, train: squares, check: checked, evaluations });
         let judged = checked.map_or(loss, |squares| squares.iter().sum());
         if judged < kept.0 {
             kept = (judged, x.clone());
@@ -90,17 +89,17 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
             for ((n, x), d) in next.iter_mut().zip(&x).zip(&direction) {
                 *n = x + step * d;
             }
-            let value = train.gradient(&next, &mut next_gradient, &mut scratch);
+            let (value, at_next) = train.gradient(&next, &mut next_gradient, &mut scratch);
             evaluations += 1;
             if value <= loss + SUFFICIENT * step * slope {
-                break Some(value);
+                break Some((value, at_next));
             }
             step *= 0.5;
             if step * length < 1e-12 {
                 break None;
             }
         };
-        let Some(value) = found else { break Stop::Flat };
+        let Some((value, at_next)) = found else { break Stop::Flat };
         let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
         let y: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(n, g)| n - g).collect();
         let curvature = dot(&s, &y);
@@ -114,7 +113,7 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
         let flat = loss - value <= FLAT * loss.abs();
         std::mem::swap(&mut x, &mut next);
         std::mem::swap(&mut gradient, &mut next_gradient);
-        loss = value;
+        (loss, squares) = (value, at_next);
         index += 1;
         if flat {
             break Stop::Flat;

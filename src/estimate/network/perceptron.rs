@@ -155,22 +155,20 @@ impl Loss<'_> {
         sums.map(|sum| sum / self.batch.rows as f64)
     }
 
-    /// The loss, and its gradient written to `gradient`; allocates nothing.
-    pub fn gradient(&self, parameters: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> f64 {
+    /// The loss and the mean squared error of each output; the loss's gradient is written to `gradient`. Allocates nothing.
+    pub fn gradient(&self, parameters: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> (f64, [f64; OUTPUTS]) {
         let Shape { inputs, hidden, activation } = self.shape;
         let per_row = 1.0 / self.batch.rows as f64;
         gradient.fill(0.0);
-        let mut squares = 0.0;
+        let mut squares = [0.0; OUTPUTS];
         for start in (0..self.batch.rows).step_by(BLOCK) {
             let length = BLOCK.min(self.batch.rows - start);
             self.forward(parameters, start, length, scratch);
-            squares += (0..OUTPUTS)
-                .map(|k| scratch.errors[k * BLOCK..k * BLOCK + length].iter().map(|e| e * e).sum::<f64>())
-                .sum::<f64>();
             let out = self.shape.output_weights().start;
-            for k in 0..OUTPUTS {
-                gradient[self.shape.output_biases().start + k] +=
-                    scratch.errors[k * BLOCK..k * BLOCK + length].iter().sum::<f64>();
+            for (k, square) in squares.iter_mut().enumerate() {
+                let errors = &scratch.errors[k * BLOCK..k * BLOCK + length];
+                *square += dot(errors, errors);
+                gradient[self.shape.output_biases().start + k] += errors.iter().sum::<f64>();
             }
             for h in 0..hidden {
                 let a = &scratch.hidden[h * BLOCK..h * BLOCK + length];
@@ -201,7 +199,8 @@ impl Loss<'_> {
                 *g += self.decay * per_row * w;
             }
         }
-        0.5 * per_row * (squares + self.decay * self.weight_squares(parameters))
+        let loss = 0.5 * per_row * (squares.iter().sum::<f64>() + self.decay * self.weight_squares(parameters));
+        (loss, squares.map(|square| square * per_row))
     }
 
     fn column(&self, i: usize, start: usize, length: usize) -> &[f64] {
