@@ -23,7 +23,7 @@ pub(super) struct Section {
     rejected: Vec<Reject>,
     rejected_count: String,
     unlisted: bool,
-    /// Table kind and its rows, as read by the report.
+    /// Table kind and its rows, as read by the report; a sum where several stages wrote one.
     tables: Vec<(&'static str, String)>,
 }
 
@@ -151,7 +151,7 @@ fn reject(row: &RejectedRow) -> Reject {
 fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
     let of = |lengths: Vec<usize>| -> String {
         let texts: Vec<String> = lengths.into_iter().map(|n| count(n as i64)).collect();
-        if texts.is_empty() { "none".into() } else { texts.join(" + ") }
+        if texts.is_empty() { "not written".into() } else { format!("{} rows", texts.join(" + ")) }
     };
     vec![
         ("robot", of(vec![tables.robot.0.len()])),

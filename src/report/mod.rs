@@ -37,8 +37,6 @@ pub struct Wishes<'a> {
     pub title: Option<&'a str>,
     /// The held-out set of the first sentence; else the one with most points.
     pub set: Option<&'a str>,
-    /// Of the stage that makes the report; shown, not used.
-    pub seed: u64,
 }
 
 #[derive(Serialize)]
@@ -53,7 +51,6 @@ struct Page<'a> {
     fits: fits::Section,
     data: data::Section,
     choices: Vec<(&'static str, &'a str)>,
-    seed: String,
 }
 
 /// The report as HTML; fails where `wishes.set` is no held-out set.
@@ -73,7 +70,6 @@ pub fn html(tables: &Tables, wishes: &Wishes) -> Result<String> {
             .into_iter()
             .filter_map(|(name, value)| value.map(|value| (name, value)))
             .collect(),
-        seed: wishes.seed.to_string(),
         robot,
     };
     let mut environment = minijinja::Environment::new();

@@ -5,7 +5,7 @@ use super::svg::Svg;
 use crate::table::{Prediction, PredictionRow};
 
 /// Points drawn in one picture: more would hide each other.
-const DRAWN: usize = 500;
+const DRAWN: usize = 600;
 const CLASSES: usize = 7;
 
 /// Two coordinates of a point, as a view of the workspace.

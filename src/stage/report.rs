@@ -44,7 +44,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -62,7 +62,7 @@ impl Stage for Report {
             observability: unlabelled(reads.observability),
             training: unlabelled(reads.training),
         };
-        let wishes = Wishes { title: self.title.as_deref(), set: self.set.as_deref(), seed: context.seed };
+        let wishes = Wishes { title: self.title.as_deref(), set: self.set.as_deref() };
         let content = html(&tables, &wishes).map_err(|error| placed(error, context.id))?;
         let document = DocumentRow { name: "report.html".into(), media_type: "text/html".into(), content };
         Ok(ReportWrites { document: Document(vec![document]) })

@@ -1,5 +1,6 @@
 //! `validate` and `report`: statistics against hand-made numbers, and a document that is whole, safe and the same every time.
 
+mod browser;
 mod tables;
 
 use calib::stage::{Context, Labelled, Report, ReportReads, Services, Sink, Source, Stage, Validate, ValidateReads};
