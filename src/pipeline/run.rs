@@ -143,13 +143,14 @@ impl Running<'_> {
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
-        let published = self.store.publish(&key, products, account)?;
+        let published = self.store.publish(&key, products, account.clone())?;
         self.manifest.stages[index].status = StageStatus::Executed;
         if let Some(conflict) = published.conflict {
             self.observer.warn(&stage.id, &conflict);
             self.manifest.stages[index].warnings.push(conflict);
         }
-        self.settle(index, published.record)?;
+        // The record of an equal earlier result may stand; the report is of this execution.
+        self.settle(index, ActionRecord { account, ..published.record })?;
         self.store.write_manifest(&self.record, &self.manifest)
     }
 

@@ -3,6 +3,7 @@
 mod arms;
 mod cmd;
 mod desk;
+mod disk;
 mod effects;
 mod fixture;
 mod identify;

@@ -52,6 +52,7 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
     let undisturbed = run(&mut calib(&folder.path().join("undisturbed")));
     let whole = begun.elapsed();
     let mut random = ChaCha8Rng::seed_from_u64(20);
+    let mut midway = 0;
     for round in 0..20 {
         let store = folder.path().join(format!("killed-{round}"));
         // Twice in a row: what a killed run left, and what a killed resumption left.
@@ -65,6 +66,7 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         let modified: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
         let resumed = run(&mut calib(&store));
         let stages = resumed["stages"].as_array().unwrap().len();
+        midway += usize::from(!finished.is_empty() && finished.len() < stages);
         assert_eq!(executed(&resumed), stages - finished.len(), "round {round}: finished stages are not redone");
         let after: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
         assert_eq!(modified, after, "round {round}: records stand");
@@ -73,6 +75,7 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         let left: Vec<_> = std::fs::read_dir(store.join("tmp")).unwrap().flatten().collect();
         assert!(left.is_empty(), "round {round}: {left:?}");
     }
+    assert!(midway >= 3, "only {midway} of 20 runs were killed between their first and their last stage");
 }
 
 #[test]
