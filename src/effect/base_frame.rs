@@ -31,9 +31,7 @@ impl BaseFrame {
     }
 
     fn direction(&self, parameter: usize) -> Twist {
-        let mut unit = Vector3::zeros();
-        unit[parameter % 3] = 1.0;
-        let local = self.start.rotation.tr_mul(&unit);
+        let local: Vector3<f64> = self.start.rotation.row(parameter % 3).transpose();
         let mut twist = Twist::zeros();
         twist.fixed_rows_mut::<3>(if parameter < 3 { 0 } else { 3 }).copy_from(&local);
         twist

@@ -21,17 +21,41 @@ pub struct Deflection {
     /// (parameter of the stack, direction); a parameter may appear several times.
     pub partials: Vec<(usize, Direction)>,
     first: usize,
+    kept: Kept,
+}
+
+/// Sums at [`Deflection::keep`].
+#[derive(Debug, Clone, Default)]
+struct Kept {
+    joint: Vec<f64>,
+    station: Vec<Twist>,
+    partials: usize,
 }
 
 impl Deflection {
     pub fn new(joints: usize) -> Self {
-        Self { joint: vec![0.0; joints], station: vec![Twist::zeros(); joints + 1], partials: Vec::new(), first: 0 }
+        let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
+        Self { joint, station, partials: Vec::new(), first: 0, kept: Kept::default() }
     }
 
     pub(crate) fn clear(&mut self) {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
         self.partials.clear();
+    }
+
+    /// Remembers the motions so far for [`Deflection::restore`].
+    pub(crate) fn keep(&mut self) {
+        self.kept.joint.clone_from(&self.joint);
+        self.kept.station.clone_from(&self.station);
+        self.kept.partials = self.partials.len();
+    }
+
+    /// Drops all motions since [`Deflection::keep`].
+    pub(crate) fn restore(&mut self) {
+        self.joint.clone_from(&self.kept.joint);
+        self.station.clone_from(&self.kept.station);
+        self.partials.truncate(self.kept.partials);
     }
 
     /// The number of the current effect's first parameter within the stack.

@@ -7,31 +7,15 @@ use super::{ArmState, Deflection, Effect, ParameterSpec};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
-use nalgebra::Vector3;
 
 #[derive(Debug, Clone, Copy)]
 pub struct LinkGeometry;
 
-/// A parameter of link `link` (from 1): its axis letter, whether it is a tilt, and its twist.
-fn directions(robot: &RobotModel, link: usize) -> Vec<(char, bool, Twist)> {
-    let (axis, point) = (robot.axis(link), robot.point(link));
-    // The two base axes least along the joint's axis, made perpendicular to it.
-    let mut order = [0, 1, 2];
-    order.sort_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()));
-    let mut chosen = [order[0], order[1]];
-    chosen.sort_unstable();
-    let perpendicular = chosen.map(|k| {
-        let mut unit = Vector3::zeros();
-        unit[k] = 1.0;
-        let direction: Vector3<f64> = unit - axis * axis[k];
-        (['x', 'y', 'z'][k], direction.normalize())
-    });
-    let mut out = Vec::with_capacity(4);
-    if robot.is_revolute(link) {
-        out.extend(perpendicular.iter().map(|(letter, d)| (*letter, false, Twist::new(d.x, d.y, d.z, 0.0, 0.0, 0.0))));
-    }
-    out.extend(perpendicular.iter().map(|(letter, d)| (*letter, true, screw(d, point))));
-    out
+/// The parameters of link `link` (from 1): base axis (from 0), whether it is a tilt, twist.
+fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, bool, Twist)> {
+    let shifts = robot.is_revolute(link).then(|| robot.normals(link)).into_iter().flatten();
+    let shifts = shifts.map(|(axis, d)| (*axis, false, Twist::new(d.x, d.y, d.z, 0.0, 0.0, 0.0)));
+    shifts.chain(robot.normals(link).iter().map(move |(axis, d)| (*axis, true, screw(d, robot.point(link)))))
 }
 
 impl Effect for LinkGeometry {
@@ -42,7 +26,8 @@ impl Effect for LinkGeometry {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let mut out = Vec::new();
         for link in 1..robot.joints() {
-            for (letter, tilt, _) in directions(robot, link) {
+            for (axis, tilt, _) in directions(robot, link) {
+                let letter = ['x', 'y', 'z'][axis];
                 out.push(ParameterSpec {
                     name: format!("link_geometry.l{link}.{}{letter}", if tilt { "r" } else { "" }),
                     place: format!("link {link}"),

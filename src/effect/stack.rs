@@ -4,8 +4,8 @@
 
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
 use crate::robot::{Measurements, RobotModel};
-use crate::spatial::{Pose, Twist, left_jacobian};
-use nalgebra::{Matrix6, Vector3};
+use crate::spatial::{Pose, Twist, hat, left_jacobian};
+use nalgebra::{Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
 
 /// Effects in a fixed order with their parameters numbered through.
@@ -20,12 +20,31 @@ pub struct EffectStack {
 pub struct Scratch {
     deflection: Deflection,
     torque: Vec<f64>,
-    /// Frame before E_k, and J_left of the twist there.
-    before: Vec<(Pose, Option<Matrix6<f64>>)>,
+    stations: Vec<Station>,
+    /// Frame in front of E_k.
+    before: Vec<Pose>,
     /// Frame behind E_k, in front of joint k.
     behind: Vec<Pose>,
     /// Frame of the body moved by joint k.
     body: Vec<Pose>,
+    /// Velocity of the point by the twist of E_k.
+    by_station: Vec<Matrix3x6<f64>>,
+    /// Velocity of the point by the travel of joint k.
+    by_joint: Vec<Vector3<f64>>,
+}
+
+/// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
+#[derive(Clone)]
+struct Station {
+    twist: Twist,
+    motion: Pose,
+    jacobian: Matrix6<f64>,
+}
+
+impl Station {
+    fn of(twist: &Twist) -> Self {
+        Self { twist: *twist, motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
+    }
 }
 
 impl EffectStack {
@@ -61,21 +80,40 @@ impl EffectStack {
         Scratch {
             deflection: Deflection::new(n),
             torque: vec![0.0; n],
-            before: vec![(Pose::identity(), None); n + 1],
+            stations: vec![Station::of(&Twist::zeros()); n + 1],
+            before: vec![Pose::identity(); n + 1],
             behind: vec![Pose::identity(); n + 1],
             body: vec![Pose::identity(); n],
+            by_station: vec![Matrix3x6::zeros(); n + 1],
+            by_joint: vec![Vector3::zeros(); n],
         }
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
+    ///
+    /// Torques are taken at the arm's own geometry, first unwound, then wound up; what a third pass would add is of the order of
+    /// the wind-up (rad) cubed.
     pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
-        self.settle(robot, data, row, x, scratch)
+        let q = data.q(row);
+        scratch.torque.fill(0.0);
+        scratch.deflection.clear();
+        self.deflect(Needs::Nothing, robot, data, row, x, scratch);
+        let mut point = self.chain(robot, q, scratch);
+        if self.needs_torque {
+            scratch.deflection.keep();
+            for _ in 0..2 {
+                let Scratch { behind, body, torque, .. } = scratch;
+                // Gravity is known in the base frame as corrected, hence behind[0].
+                robot.gravity_torque(&behind[0], behind, body, data.payload[row], torque);
+                scratch.deflection.restore();
+                self.deflect(Needs::Torque, robot, data, row, x, scratch);
+                point = self.chain(robot, q, scratch);
+            }
+        }
+        point
     }
 
-    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`.
-    ///
-    /// A parameter may be emitted more than once; derivatives of one parameter add up. Torques are treated as constant: their
-    /// change with the parameters is of second order.
+    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`, as [`Self::partials`].
     pub fn derivatives(
         &self,
         robot: &RobotModel,
@@ -83,74 +121,81 @@ impl EffectStack {
         row: usize,
         x: &[f64],
         scratch: &mut Scratch,
-        mut emit: impl FnMut(usize, Vector3<f64>),
+        emit: impl FnMut(usize, Vector3<f64>),
     ) -> Vector3<f64> {
-        let point = self.settle(robot, data, row, x, scratch);
-        for (parameter, direction) in &scratch.deflection.partials {
-            let derivative = match direction {
-                Direction::Joint(joint, rate) => along(&scratch.behind[*joint], &point, &robot.screws()[*joint]) * *rate,
-                Direction::Station(station, rate) => {
-                    let (frame, jacobian) = &scratch.before[*station];
-                    match jacobian {
-                        Some(jacobian) => along(frame, &point, &(jacobian * rate)),
-                        None => along(frame, &point, rate),
-                    }
-                }
-            };
-            emit(*parameter, derivative);
-        }
+        let point = self.point(robot, data, row, x, scratch);
+        self.partials(robot, &point, scratch, emit);
         point
     }
 
-    /// The arm where it comes to rest. Torques are taken at the arm's own geometry, first unwound, then wound up; what a third
-    /// pass would add is of the order of the wind-up (rad) cubed.
-    fn settle(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
-        scratch.torque.fill(0.0);
-        let mut point = self.pass(robot, data, row, x, scratch);
-        if self.needs_torque {
-            for _ in 0..2 {
-                let Scratch { behind, body, torque, .. } = scratch;
-                // Gravity is known in the base frame as corrected, hence behind[0].
-                robot.gravity_torque(&behind[0], behind, body, data.payload[row], torque);
-                point = self.pass(robot, data, row, x, scratch);
-            }
+    /// Derivatives of the `point` that [`Self::point`] has just returned.
+    ///
+    /// A parameter may be emitted more than once; derivatives of one parameter add up. Torques are treated as constant: their
+    /// change with the parameters is of second order.
+    pub(crate) fn partials(
+        &self,
+        robot: &RobotModel,
+        point: &Vector3<f64>,
+        scratch: &mut Scratch,
+        mut emit: impl FnMut(usize, Vector3<f64>),
+    ) {
+        let Scratch { deflection, stations, before, behind, by_station, by_joint, .. } = scratch;
+        for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
+            // Of a twist (v; w) in the frame: R v + R w x arm.
+            let mut spatial = Matrix3x6::zeros();
+            spatial.fixed_view_mut::<3, 3>(0, 0).copy_from(&frame.rotation);
+            spatial.fixed_view_mut::<3, 3>(0, 3).copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
+            *velocity = spatial * station.jacobian;
         }
-        point
+        for (joint, velocity) in by_joint.iter_mut().enumerate() {
+            let axis = behind[joint].rotation * robot.axis(joint);
+            *velocity =
+                if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
+        }
+        for (parameter, direction) in &deflection.partials {
+            emit(
+                *parameter,
+                match direction {
+                    Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
+                    Direction::Station(station, rate) => by_station[*station] * rate,
+                },
+            );
+        }
     }
 
-    fn pass(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
-        scratch.deflection.clear();
+    /// Adds the motions of the effects with the given need.
+    fn deflect(&self, needs: Needs, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
         let payload = data.payload[row];
         let state = ArmState { q: data.q(row), torque: &scratch.torque, current: data.current(row), payload };
-        for (effect, range) in &self.effects {
+        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.needs_torque() == (needs == Needs::Torque)) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
-        self.chain(robot, data.q(row), scratch)
     }
 
     fn chain(&self, robot: &RobotModel, q: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
         let n = robot.joints();
         let mut frame = self.base;
-        for (station, twist) in scratch.deflection.station.iter().enumerate() {
-            let still = twist.iter().all(|value| *value == 0.0);
-            scratch.before[station] = (frame, (!still).then(|| left_jacobian(twist)));
-            if !still {
-                frame = frame * Pose::exp(twist);
+        for (k, (twist, station)) in scratch.deflection.station.iter().zip(&mut scratch.stations).enumerate() {
+            if *twist != station.twist {
+                *station = Station::of(twist);
             }
-            scratch.behind[station] = frame;
-            if station < n {
-                frame = frame * Pose::exp(&(robot.screws()[station] * (q[station] + scratch.deflection.joint[station])));
-                scratch.body[station] = frame;
+            scratch.before[k] = frame;
+            frame = frame * station.motion;
+            scratch.behind[k] = frame;
+            if k < n {
+                frame = frame * robot.motion(k, q[k] + scratch.deflection.joint[k]);
+                scratch.body[k] = frame;
             }
         }
         frame.point(&robot.home().translation)
     }
 }
 
-/// Velocity of `point` under the twist, given in `frame`: R (v + w x y), y the point in that frame.
-fn along(frame: &Pose, point: &Vector3<f64>, twist: &Twist) -> Vector3<f64> {
-    let v: Vector3<f64> = twist.fixed_rows::<3>(0).into();
-    let w: Vector3<f64> = twist.fixed_rows::<3>(3).into();
-    frame.rotation * (v + w.cross(&frame.inverse_point(point)))
+/// What an effect must know before it can deflect.
+#[derive(Clone, Copy, PartialEq)]
+enum Needs {
+    Nothing,
+    /// Gravity torque, known only once the arm stands somewhere.
+    Torque,
 }

@@ -1,6 +1,8 @@
 //! The triangular factor of a tall least-squares problem, built chunk by chunk: bounded memory, no squared condition number.
 
-use faer::Mat;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
+use faer::{Mat, MatMut, Par};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
 #[derive(Debug, Clone)]
@@ -9,18 +11,57 @@ pub struct Factor {
     r: Mat<f64>,
 }
 
+/// Rows `[J | r]` on their way into a factor: chunks are written below the factor of those before them.
+pub(crate) struct Tall {
+    /// Column-major; the first `top` rows hold the factor so far.
+    rows: Mat<f64>,
+    top: usize,
+    reflectors: Mat<f64>,
+    memory: MemBuffer,
+}
+
+impl Tall {
+    /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
+    pub fn new(columns: usize, chunk: usize) -> Self {
+        let height = columns + chunk;
+        let block = recommended_block_size::<f64>(height, columns);
+        let memory = MemBuffer::new(qr_in_place_scratch::<f64>(height, columns, block, Par::Seq, Default::default()));
+        Self { rows: Mat::zeros(height, columns), top: 0, reflectors: Mat::zeros(block, columns), memory }
+    }
+
+    /// The next chunk of `height` rows; all zero.
+    pub fn chunk(&mut self, height: usize) -> MatMut<'_, f64> {
+        self.rows.as_mut().subrows_mut(self.top, height)
+    }
+
+    /// Takes the `height` rows written to [`Tall::chunk`] into the factor.
+    pub fn absorb(&mut self, height: usize) {
+        let (used, columns) = (self.top + height, self.rows.ncols());
+        let reflectors = self.reflectors.as_mut().subcols_mut(0, columns.min(used));
+        let rows = self.rows.as_mut().subrows_mut(0, used);
+        qr_in_place(rows, reflectors, Par::Seq, MemStack::new(&mut self.memory), Default::default());
+        self.top = columns.min(used);
+        for j in 0..columns {
+            // What faer leaves below the diagonal are its reflectors.
+            let below = (j + 1).min(used);
+            self.rows.as_mut().col_mut(j).subrows_mut(below, used - below).fill(0.0);
+        }
+    }
+
+    /// The factor of all chunks.
+    pub fn factor(&self) -> Factor {
+        let columns = self.rows.ncols();
+        Factor { r: Mat::from_fn(columns, columns, |i, j| if i <= j && i < self.top { self.rows[(i, j)] } else { 0.0 }) }
+    }
+}
+
 impl Factor {
     /// The factor of rows `[J | r]` (m x (p + 1)).
     pub fn of(rows: &Mat<f64>) -> Self {
-        let columns = rows.ncols();
-        let thin = rows.qr().thin_R().to_owned();
-        let mut r = Mat::zeros(columns, columns);
-        for j in 0..columns {
-            for i in 0..=j.min(thin.nrows().saturating_sub(1)) {
-                r[(i, j)] = thin[(i, j)];
-            }
-        }
-        Self { r }
+        let mut tall = Tall::new(rows.ncols(), rows.nrows());
+        tall.chunk(rows.nrows()).copy_from(rows);
+        tall.absorb(rows.nrows());
+        tall.factor()
     }
 
     /// The factor of both sets of rows together.
@@ -29,6 +70,13 @@ impl Factor {
         let rows =
             Mat::from_fn(2 * columns, columns, |i, j| if i < columns { self.r[(i, j)] } else { other.r[(i - columns, j)] });
         Self::of(&rows)
+    }
+
+    /// The factor of the problem in some of the parameters only.
+    pub fn select(&self, parameters: &[usize]) -> Self {
+        let columns = self.r.ncols();
+        let p = self.parameters();
+        Self::of(&Mat::from_fn(columns, parameters.len() + 1, |i, j| self.r[(i, parameters.get(j).copied().unwrap_or(p))]))
     }
 
     pub fn parameters(&self) -> usize {
@@ -58,17 +106,14 @@ impl Factor {
         if scale.iter().any(|norm| *norm <= 0.0 || !norm.is_finite()) {
             return None;
         }
-        let root = damping.sqrt();
-        let rows = Mat::from_fn(2 * p, p + 1, |i, j| {
-            if i < p {
-                if j < p { self.r[(i, j)] / scale[j] } else { self.r[(i, p)] }
-            } else if i - p == j {
-                root
-            } else {
-                0.0
-            }
-        });
-        let small = Self::of(&rows);
+        let scaled = |i: usize, j: usize| if j < p { self.r[(i, j)] / scale[j] } else { self.r[(i, p)] };
+        let small = if damping == 0.0 {
+            Self { r: Mat::from_fn(p, p + 1, scaled) }
+        } else {
+            let root = damping.sqrt();
+            let damped = |i: usize, j: usize| if i - p == j { root } else { 0.0 };
+            Self::of(&Mat::from_fn(2 * p, p + 1, |i, j| if i < p { scaled(i, j) } else { damped(i, j) }))
+        };
         let mut step = vec![0.0; p];
         for i in (0..p).rev() {
             let diagonal = small.r[(i, i)];

@@ -1,11 +1,11 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
-use super::factor::Factor;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{HUBER, Problem};
 use crate::robot::Measurements;
+use nalgebra::Vector3;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
 pub struct FitOptions<'a> {
@@ -61,13 +61,13 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let mut course = Vec::new();
     let mut candidates = options.candidates.to_vec();
     let mut fates: Vec<Fate> = vec![Fate::Kept; specs.len()];
-    let mut last: Option<(Stop, Factor, Vec<usize>)> = None;
+    let mut last: Option<(Stop, Vec<usize>)> = None;
 
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
-    problem.unmodelled = unmodelled(&problem, model, 0);
+    let mut sight = problem.evaluate(model, &candidates);
+    problem.unmodelled = unmodelled(&problem, &sight.residuals, 0);
     for round in 0..ROUNDS {
-        let sight = Problem { data, rows: options.rows, unmodelled: if round == 0 { 0.0 } else { problem.unmodelled } };
-        let seen = visibility(&sight.linearise(model, &candidates), &prior(&candidates));
+        let seen = visibility(&sight.factor, &prior(&candidates));
         for (k, verdict) in candidates.iter().zip(&seen) {
             fates[*k] = match verdict {
                 Visibility::Seen => Fate::Free(f64::NAN),
@@ -82,20 +82,23 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
                 model.x[*k] = 0.0;
             }
         }
-        let (steps, stop, factor) = minimise(&problem, model, &free, if round == 0 { FIRST_ITERATIONS } else { ITERATIONS });
+        let (steps, stop, end) = minimise(&problem, model, &free, if round == 0 { FIRST_ITERATIONS } else { ITERATIONS });
         course.extend(steps);
-        let next = unmodelled(&problem, model, free.len());
+        let next = unmodelled(&problem, &end.residuals, free.len());
         let settled = (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();
         problem.unmodelled = next;
         candidates = free.clone();
-        last = Some((stop, factor, free));
+        last = Some((stop, free));
         if settled {
             break;
         }
+        sight = problem.evaluate(model, &candidates);
     }
-    let (stop, _, free) = last.expect("at least one round");
-    let factor = problem.linearise(model, &free);
-    let errors = problem.errors(model);
+    let (stop, free) = last.expect("at least one round");
+    let all = problem.evaluate(model, options.candidates);
+    let errors = problem.errors(&all.residuals);
+    let chosen: Vec<usize> = options.candidates.iter().enumerate().filter(|(_, k)| free.contains(k)).map(|(j, _)| j).collect();
+    let factor = all.factor.select(&chosen);
     if let Some(inverse) = factor.inverse() {
         let scale = reduced(&errors, free.len()).sqrt();
         for (row, parameter) in free.iter().enumerate() {
@@ -104,7 +107,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         }
     }
     let singular = factor.singular_values(&prior(&free));
-    let singular_all = problem.linearise(model, options.candidates).singular_values(&prior(options.candidates));
+    let singular_all = all.factor.singular_values(&prior(options.candidates));
     Fitted {
         fates,
         course,
@@ -125,8 +128,7 @@ fn reduced(errors: &[f64], parameters: usize) -> f64 {
 }
 
 /// The extra standard deviation (m, per axis) that brings the median whitened error to what noise alone would give.
-fn unmodelled(problem: &Problem, model: &Model, parameters: usize) -> f64 {
-    let residuals = problem.residuals(model);
+fn unmodelled(problem: &Problem, residuals: &[Vector3<f64>], parameters: usize) -> f64 {
     let rows = residuals.len();
     if rows == 0 {
         return 0.0;

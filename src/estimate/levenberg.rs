@@ -2,7 +2,7 @@
 
 use super::factor::Factor;
 use super::model::Model;
-use super::problem::Problem;
+use super::problem::{Evaluation, Problem};
 
 /// Why the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,23 +49,22 @@ const STEP_TOLERANCE: f64 = 1e-4;
 
 /// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps.
 ///
-/// Returns the course, why it stopped, and the factor at the end.
-pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], limit: usize) -> (Vec<Iteration>, Stop, Factor) {
-    let (mut cost, rms) = problem.cost(model);
-    let mut factor = problem.linearise(model, free);
-    let mut course = vec![Iteration { cost, rms, gradient: cosine(&factor, cost), step_norm: 0.0, damping: 0.0 }];
+/// Returns the course, why it stopped, and the problem at the end.
+pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], limit: usize) -> (Vec<Iteration>, Stop, Evaluation) {
+    let mut now = problem.evaluate(model, free);
+    let mut course = vec![iteration(&now, 0.0, 0.0)];
     if free.is_empty() {
-        return (course, Stop::NothingFree, factor);
+        return (course, Stop::NothingFree, now);
     }
     let mut damping = 0.0;
     for _ in 0..limit {
         let mut tries = 0;
-        let (step, trial_cost, rms) = loop {
+        let (step, next) = loop {
             tries += 1;
             if tries > 20 {
-                return (course, Stop::Stalled, factor);
+                return (course, Stop::Stalled, now);
             }
-            let Some(step) = factor.solve(damping) else {
+            let Some(step) = now.factor.solve(damping) else {
                 damping = raise(damping);
                 continue;
             };
@@ -73,27 +72,31 @@ pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], lim
             for (parameter, change) in free.iter().zip(&step) {
                 model.x[*parameter] += change;
             }
-            let (trial_cost, rms) = problem.cost(model);
-            if trial_cost.is_finite() && trial_cost <= cost * (1.0 + 1e-12) {
-                break (step, trial_cost, rms);
+            // Nearly every step is taken, so that its derivatives are worth computing at once.
+            let next = problem.evaluate(model, free);
+            if next.cost.is_finite() && next.cost <= now.cost * (1.0 + 1e-12) {
+                break (step, next);
             }
             model.x = before;
-            if step_norm(&factor, &step) < STEP_TOLERANCE {
-                return (course, Stop::Converged, factor);
+            if step_norm(&now.factor, &step) < STEP_TOLERANCE {
+                return (course, Stop::Converged, now);
             }
             damping = raise(damping);
         };
-        let step_norm = step_norm(&factor, &step);
-        let fall = cost - trial_cost;
-        cost = trial_cost;
-        factor = problem.linearise(model, free);
-        course.push(Iteration { cost, rms, gradient: cosine(&factor, cost), step_norm, damping });
-        if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * cost {
-            return (course, Stop::Converged, factor);
+        let step_norm = step_norm(&now.factor, &step);
+        let fall = now.cost - next.cost;
+        now = next;
+        course.push(iteration(&now, step_norm, damping));
+        if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * now.cost {
+            return (course, Stop::Converged, now);
         }
         damping = if damping < 1e-9 { 0.0 } else { damping / 10.0 };
     }
-    (course, Stop::IterationLimit, factor)
+    (course, Stop::IterationLimit, now)
+}
+
+fn iteration(state: &Evaluation, step_norm: f64, damping: f64) -> Iteration {
+    Iteration { cost: state.cost, rms: state.rms, gradient: cosine(&state.factor, state.cost), step_norm, damping }
 }
 
 fn raise(damping: f64) -> f64 {

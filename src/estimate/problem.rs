@@ -1,14 +1,16 @@
 //! The calibration problem: weighted position residuals of some rows under some free parameters.
 
-use super::factor::Factor;
+use super::factor::{Factor, Tall};
 use super::model::Model;
 use crate::robot::Measurements;
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Rows of the recording handled at once: fixed, so that sums do not depend on the number of threads.
-const CHUNK: usize = 64;
+/// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
+const SPAN: usize = 4096;
+/// Rows whose derivatives are held at once: three lines each of some fifty columns stay in the processor's cache.
+const CHUNK: usize = 256;
 
 /// Beyond this whitened error length (three axes, one sigma each: 99.3 % of good rows are below) a row pulls with constant force.
 pub(crate) const HUBER: f64 = 3.5;
@@ -22,82 +24,77 @@ pub(crate) struct Problem<'a> {
     pub unmodelled: f64,
 }
 
+/// The state of a problem at some parameters.
+pub(crate) struct Evaluation {
+    /// Measured - predicted (m), in the order of the problem's rows.
+    pub residuals: Vec<Vector3<f64>>,
+    /// Sum of Huber's losses, dimensionless.
+    pub cost: f64,
+    /// Root mean square of the residual length, m.
+    pub rms: f64,
+    pub factor: Factor,
+}
+
 impl Problem<'_> {
     /// Inverse standard deviation per axis.
     fn weight(&self, row: usize) -> Vector3<f64> {
         self.data.sigma[row].map(|sigma| 1.0 / (sigma * sigma + self.unmodelled * self.unmodelled).sqrt())
     }
 
-    /// Measured - predicted of every row (m), in the order of `rows`.
-    pub fn residuals(&self, model: &Model) -> Vec<Vector3<f64>> {
-        self.rows
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map_init(
-                || model.stack.scratch(&model.robot),
-                |scratch, &row| self.data.position[row] - model.stack.point(&model.robot, self.data, row, &model.x, scratch),
-            )
-            .collect()
-    }
-
-    /// The whitened error length of every row, in the order of `rows`.
-    pub fn errors(&self, model: &Model) -> Vec<f64> {
-        let residuals = self.residuals(model);
+    /// The whitened error length of every residual.
+    pub fn errors(&self, residuals: &[Vector3<f64>]) -> Vec<f64> {
         residuals.iter().zip(self.rows).map(|(residual, row)| residual.component_mul(&self.weight(*row)).norm()).collect()
     }
 
-    /// Sum of Huber's losses (dimensionless), and the root mean square of the residual length (m).
-    pub fn cost(&self, model: &Model) -> (f64, f64) {
-        let residuals = self.residuals(model);
-        let (mut cost, mut squares) = (0.0, 0.0);
-        for (residual, row) in residuals.iter().zip(self.rows) {
-            cost += huber(residual.component_mul(&self.weight(*row)).norm());
-            squares += residual.norm_squared();
+    /// The problem at the model's parameters, linearised in the `free` ones.
+    pub fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
+        let mut column = vec![None; model.stack.specs().len()];
+        for (j, parameter) in free.iter().enumerate() {
+            column[*parameter] = Some(j);
         }
-        (cost, (squares / residuals.len().max(1) as f64).sqrt())
+        let spans: Vec<(Vec<Vector3<f64>>, Factor)> =
+            self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
+        let mut residuals = Vec::with_capacity(self.rows.len());
+        let mut sum: Option<Factor> = None;
+        for (some, factor) in spans {
+            residuals.extend(some);
+            sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
+        }
+        let cost = self.errors(&residuals).into_iter().map(huber).sum();
+        let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
+        let rms = (squares / residuals.len().max(1) as f64).sqrt();
+        let factor = sum.unwrap_or_else(|| Factor::of(&Mat::zeros(1, free.len() + 1)));
+        Evaluation { residuals, cost, rms, factor }
     }
 
-    /// The factor of the linearised problem in the `free` parameters of the model's stack.
-    pub fn linearise(&self, model: &Model, free: &[usize]) -> Factor {
-        let p = free.len();
-        let mut column = vec![usize::MAX; model.stack.specs().len()];
-        for (j, parameter) in free.iter().enumerate() {
-            column[*parameter] = j;
-        }
-        let factors: Vec<Factor> = self
-            .rows
-            .par_chunks(CHUNK)
-            .map(|chunk| {
-                let mut scratch = model.stack.scratch(&model.robot);
-                let mut rows = Mat::<f64>::zeros(3 * chunk.len(), p + 1);
-                for (i, &row) in chunk.iter().enumerate() {
-                    let point =
-                        model.stack.derivatives(&model.robot, self.data, row, &model.x, &mut scratch, |parameter, derivative| {
-                            let j = column[parameter];
-                            if j != usize::MAX {
-                                for axis in 0..3 {
-                                    rows[(3 * i + axis, j)] += derivative[axis];
-                                }
-                            }
-                        });
-                    let weight = self.weight(row);
-                    let residual = self.data.position[row] - point;
-                    let error = residual.component_mul(&weight).norm();
-                    let robust = if error > HUBER { (HUBER / error).sqrt() } else { 1.0 };
-                    for axis in 0..3 {
-                        let scale = weight[axis] * robust;
-                        for j in 0..p {
-                            rows[(3 * i + axis, j)] *= scale;
+    /// Residuals and factor of some rows, in memory of a chunk.
+    fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> (Vec<Vector3<f64>>, Factor) {
+        let mut scratch = model.stack.scratch(&model.robot);
+        let mut tall = Tall::new(p + 1, 3 * rows.len().min(CHUNK));
+        let mut residuals = Vec::with_capacity(rows.len());
+        for chunk in rows.chunks(CHUNK) {
+            let mut lines = tall.chunk(3 * chunk.len());
+            for (i, &row) in chunk.iter().enumerate() {
+                let point = model.stack.point(&model.robot, self.data, row, &model.x, &mut scratch);
+                let residual = self.data.position[row] - point;
+                let weight = self.weight(row);
+                let error = residual.component_mul(&weight).norm();
+                let scale = if error > HUBER { weight * (HUBER / error).sqrt() } else { weight };
+                model.stack.partials(&model.robot, &point, &mut scratch, |parameter, derivative| {
+                    if let Some(j) = column[parameter] {
+                        for axis in 0..3 {
+                            lines[(3 * i + axis, j)] += derivative[axis] * scale[axis];
                         }
-                        rows[(3 * i + axis, p)] = residual[axis] * scale;
                     }
+                });
+                for axis in 0..3 {
+                    lines[(3 * i + axis, p)] = residual[axis] * scale[axis];
                 }
-                Factor::of(&rows)
-            })
-            .collect();
-        let mut factors = factors.into_iter();
-        let first = factors.next().unwrap_or_else(|| Factor::of(&Mat::zeros(1, p + 1)));
-        factors.fold(first, |sum, factor| sum.stack(&factor))
+                residuals.push(residual);
+            }
+            tall.absorb(3 * chunk.len());
+        }
+        (residuals, tall.factor())
     }
 }
 

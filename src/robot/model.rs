@@ -1,7 +1,7 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::spatial::{Pose, Twist, screw};
+use crate::spatial::{Pose, Twist, hat, screw};
 use nalgebra::{Matrix3, Vector3};
 
 /// A serial robot ready for computing; immutable.
@@ -11,6 +11,9 @@ pub struct RobotModel {
     screws: Vec<Twist>,
     axes: Vec<Vector3<f64>>,
     points: Vec<Vector3<f64>>,
+    /// The matrix of `axis x` and its square.
+    turns: Vec<(Matrix3<f64>, Matrix3<f64>)>,
+    normals: Vec<[(usize, Vector3<f64>); 2]>,
     home: Pose,
 }
 
@@ -27,10 +30,12 @@ impl RobotModel {
                 JointKind::Prismatic => Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0),
             })
             .collect();
+        let turns = axes.iter().map(|axis| (hat(axis), hat(axis) * hat(axis))).collect();
+        let normals = axes.iter().map(normals).collect();
         let r = &description.tool_rotation;
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let home = Pose::new(rotation, Vector3::from(description.tool));
-        Self { description, screws, axes, points, home }
+        Self { description, screws, axes, points, turns, normals, home }
     }
 
     pub fn description(&self) -> &RobotDescription {
@@ -66,12 +71,37 @@ impl RobotModel {
         &self.home
     }
 
+    /// Two unit directions across the axis of joint `joint`, each with the number of the base axis that it comes from.
+    pub fn normals(&self, joint: usize) -> &[(usize, Vector3<f64>); 2] {
+        &self.normals[joint]
+    }
+
+    /// exp of the joint's screw times its travel (rad or m): Rodrigues' formula about the joint's own axis.
+    pub fn motion(&self, joint: usize, travel: f64) -> Pose {
+        if !self.is_revolute(joint) {
+            return Pose::new(Matrix3::identity(), self.axes[joint] * travel);
+        }
+        let (sine, cosine) = travel.sin_cos();
+        let (cross, square) = &self.turns[joint];
+        let turn = cross * sine + square * (1.0 - cosine);
+        Pose::new(Matrix3::identity() + turn, -(turn * self.points[joint]))
+    }
+
     /// Tool frame in the base frame for joint positions `q` (rad or m): exp(x1 q1) ... exp(xn qn) home.
     pub fn forward(&self, q: &[f64]) -> Pose {
         let mut pose = Pose::identity();
-        for (twist, angle) in self.screws.iter().zip(q) {
-            pose = pose * Pose::exp(&(twist * *angle));
+        for (joint, travel) in q.iter().enumerate().take(self.joints()) {
+            pose = pose * self.motion(joint, *travel);
         }
         pose * self.home
     }
+}
+
+/// The two base axes least along `axis`, in their order, made perpendicular to it.
+fn normals(axis: &Vector3<f64>) -> [(usize, Vector3<f64>); 2] {
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| axis[*a].abs().total_cmp(&axis[*b].abs()));
+    let mut chosen = [order[0], order[1]];
+    chosen.sort_unstable();
+    chosen.map(|k| (k, (Vector3::ith(k, 1.0) - axis * axis[k]).normalize()))
 }
