@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, RobotModel, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
@@ -19,6 +19,8 @@ pub struct EffectStack {
 /// Buffers of one evaluation, made once per thread.
 pub struct Scratch {
     deflection: Deflection,
+    /// Commanded travel of each joint.
+    commanded: Vec<Travel>,
     torque: Vec<f64>,
     stations: Vec<Station>,
     /// Frame in front of E_k.
@@ -79,6 +81,7 @@ impl EffectStack {
         let n = robot.joints();
         Scratch {
             deflection: Deflection::new(n),
+            commanded: vec![Travel::default(); n],
             torque: vec![0.0; n],
             stations: vec![Station::of(&Twist::zeros()); n + 1],
             before: vec![Pose::identity(); n + 1],
@@ -94,11 +97,13 @@ impl EffectStack {
     /// Torques are taken at the arm's own geometry, first unwound, then wound up; what a third pass would add is of the order of
     /// the wind-up (rad) cubed.
     pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
-        let q = data.q(row);
+        for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
+            *travel = Travel::new(*q);
+        }
         scratch.torque.fill(0.0);
         scratch.deflection.clear();
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
-        let mut point = self.chain(robot, q, scratch);
+        let mut point = self.chain(robot, scratch);
         if self.needs_torque {
             scratch.deflection.keep();
             for _ in 0..2 {
@@ -107,7 +112,7 @@ impl EffectStack {
                 robot.gravity_torque(&behind[0], behind, body, data.payload[row], torque);
                 scratch.deflection.restore();
                 self.deflect(Needs::Torque, robot, data, row, x, scratch);
-                point = self.chain(robot, q, scratch);
+                point = self.chain(robot, scratch);
             }
         }
         point
@@ -173,7 +178,7 @@ impl EffectStack {
         }
     }
 
-    fn chain(&self, robot: &RobotModel, q: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+    fn chain(&self, robot: &RobotModel, scratch: &mut Scratch) -> Vector3<f64> {
         let n = robot.joints();
         let mut frame = self.base;
         for (k, (twist, station)) in scratch.deflection.station.iter().zip(&mut scratch.stations).enumerate() {
@@ -184,7 +189,7 @@ impl EffectStack {
             frame = frame * station.motion;
             scratch.behind[k] = frame;
             if k < n {
-                frame = frame * robot.motion(k, q[k] + scratch.deflection.joint[k]);
+                frame = frame * robot.motion(k, &scratch.commanded[k].moved(scratch.deflection.joint[k]));
                 scratch.body[k] = frame;
             }
         }

@@ -82,7 +82,10 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
                 model.x[*k] = 0.0;
             }
         }
-        let (steps, stop, end) = minimise(&problem, model, &free, if round == 0 { FIRST_ITERATIONS } else { ITERATIONS });
+        let weighted_so = round > 0 || problem.unmodelled == 0.0;
+        let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
+        let limit = if round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
+        let (steps, stop, end) = minimise(&problem, model, &free, start, limit);
         course.extend(steps);
         let next = unmodelled(&problem, &end.residuals, free.len());
         let settled = (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();

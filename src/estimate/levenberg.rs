@@ -47,11 +47,17 @@ const COST_TOLERANCE: f64 = 1e-10;
 /// A step that moves all whitened predictions together by less than this (sigmas) changes nothing that data could show.
 const STEP_TOLERANCE: f64 = 1e-4;
 
-/// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps.
+/// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps; `now` is the problem
+/// there.
 ///
 /// Returns the course, why it stopped, and the problem at the end.
-pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], limit: usize) -> (Vec<Iteration>, Stop, Evaluation) {
-    let mut now = problem.evaluate(model, free);
+pub(crate) fn minimise(
+    problem: &Problem,
+    model: &mut Model,
+    free: &[usize],
+    mut now: Evaluation,
+    limit: usize,
+) -> (Vec<Iteration>, Stop, Evaluation) {
     let mut course = vec![iteration(&now, 0.0, 0.0)];
     if free.is_empty() {
         return (course, Stop::NothingFree, now);
@@ -68,6 +74,10 @@ pub(crate) fn minimise(problem: &Problem, model: &mut Model, free: &[usize], lim
                 damping = raise(damping);
                 continue;
             };
+            // What is left is below the noise, and the next step would be smaller by orders of magnitude.
+            if damping == 0.0 && step_norm(&now.factor, &step) < STEP_TOLERANCE {
+                return (course, Stop::Converged, now);
+            }
             let before = model.x.clone();
             for (parameter, change) in free.iter().zip(&step) {
                 model.x[*parameter] += change;

@@ -5,6 +5,8 @@ mod gravity;
 pub mod import;
 mod model;
 mod observation;
+mod travel;
 
 pub use model::RobotModel;
 pub use observation::{Instrument, Measurements};
+pub use travel::Travel;

@@ -1,6 +1,7 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
 use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};
 use nalgebra::{Matrix3, Vector3};
 
@@ -76,10 +77,10 @@ impl RobotModel {
         &self.normals[joint]
     }
 
-    /// exp of the joint's screw times its travel (rad or m): Rodrigues' formula about the joint's own axis.
-    pub fn motion(&self, joint: usize, travel: f64) -> Pose {
+    /// exp of the joint's screw times its travel: Rodrigues' formula about the joint's own axis.
+    pub fn motion(&self, joint: usize, travel: &Travel) -> Pose {
         if !self.is_revolute(joint) {
-            return Pose::new(Matrix3::identity(), self.axes[joint] * travel);
+            return Pose::new(Matrix3::identity(), self.axes[joint] * travel.value());
         }
         let (sine, cosine) = travel.sin_cos();
         let (cross, square) = &self.turns[joint];
@@ -91,7 +92,7 @@ impl RobotModel {
     pub fn forward(&self, q: &[f64]) -> Pose {
         let mut pose = Pose::identity();
         for (joint, travel) in q.iter().enumerate().take(self.joints()) {
-            pose = pose * self.motion(joint, *travel);
+            pose = pose * self.motion(joint, &Travel::new(*travel));
         }
         pose * self.home
     }
