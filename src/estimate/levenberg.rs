@@ -75,7 +75,7 @@ pub(crate) fn minimise(
                 continue;
             };
             // What is left is below the noise, and the next step would be smaller by orders of magnitude.
-            if damping == 0.0 && step_norm(&now.factor, &step) < STEP_TOLERANCE {
+            if damping == 0.0 && negligible(&now, &step) {
                 return (course, Stop::Converged, now);
             }
             let before = model.x.clone();
@@ -88,7 +88,7 @@ pub(crate) fn minimise(
                 break (step, next);
             }
             model.x = before;
-            if step_norm(&now.factor, &step) < STEP_TOLERANCE {
+            if negligible(&now, &step) {
                 return (course, Stop::Converged, now);
             }
             damping = raise(damping);
@@ -107,6 +107,12 @@ pub(crate) fn minimise(
 
 fn iteration(state: &Evaluation, step_norm: f64, damping: f64) -> Iteration {
     Iteration { cost: state.cost, rms: state.rms, gradient: cosine(&state.factor, state.cost), step_norm, damping }
+}
+
+/// Whether the step moves no prediction visibly, or promises to lower the cost by no more than rounding.
+fn negligible(state: &Evaluation, step: &[f64]) -> bool {
+    let norm = step_norm(&state.factor, step);
+    norm < STEP_TOLERANCE || 0.5 * norm * norm < COST_TOLERANCE * state.cost
 }
 
 fn raise(damping: f64) -> f64 {
