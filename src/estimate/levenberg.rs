@@ -45,7 +45,7 @@ pub struct Iteration {
 /// A relative fall of the cost below this is rounding.
 const COST_TOLERANCE: f64 = 1e-10;
 /// A step that moves all whitened predictions together by less than this (sigmas) changes nothing that data could show.
-const STEP_TOLERANCE: f64 = 1e-4;
+const STEP_TOLERANCE: f64 = 1e-3;
 
 /// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps; `now` is the problem
 /// there.
