@@ -32,6 +32,17 @@ fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
 
 /// A recording of a robot whose true parameters are drawn, with the names and values of what was drawn.
 fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed: usize) -> (Measurements, Model) {
+    recording_where(description, effects, rows, seed, |_| true)
+}
+
+/// The same with only those parameters off nominal that `drawn` accepts.
+fn recording_where(
+    description: &RobotDescription,
+    effects: &[&str],
+    rows: usize,
+    seed: usize,
+    drawn: impl Fn(usize) -> bool,
+) -> (Measurements, Model) {
     let robot = RobotModel::new(description.clone());
     let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2));
     let mut truth = model(&robot, base, effects);
@@ -42,7 +53,7 @@ fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed
             Some("reduction_ratio" | "coupling_ratio") => 3e-4,
             _ => 5e-4,
         };
-        truth.x[k] = size * normal(1000 * seed + k);
+        truth.x[k] = if drawn(k) { size * normal(1000 * seed + k) } else { 0.0 };
     }
     let mut data = Measurements {
         joints: robot.joints(),
@@ -158,4 +169,45 @@ fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
     let k = model.stack.specs().iter().position(|spec| spec.name == "reduction_ratio.j6").expect("joint 6");
     assert_eq!(fitted.fates[k], Fate::Unseen);
     assert_eq!(model.x[k], 0.0);
+}
+
+/// z-scores of every free parameter over many robots of one kinematics, their names, and whether the rank was right each time.
+fn scores(description: &RobotDescription, effects: &[&str], robots: usize, rows: usize) -> (Vec<String>, Vec<Vec<f64>>) {
+    let all: Vec<usize> = (0..rows).collect();
+    let (data, _) = recording(description, &[], rows, 0);
+    let (model, fitted) = identify(&data, description, effects, &all);
+    let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+    let names = free.iter().map(|k| model.stack.specs()[*k].name.clone()).collect();
+    let mut scores = vec![Vec::new(); free.len()];
+    for seed in 100..100 + robots {
+        let (data, truth) = recording_where(description, effects, rows, seed, |k| free.contains(&k));
+        let (model, fitted) = identify(&data, description, effects, &all);
+        for (score, k) in scores.iter_mut().zip(&free) {
+            let Fate::Free(sigma) = fitted.fates[*k] else { panic!("{}: the rank changed", model.stack.specs()[*k].name) };
+            // The base is estimated about its own start: its pose is compared, not its corrections.
+            if !model.stack.specs()[*k].name.starts_with("base_frame") {
+                score.push((model.x[*k] - truth.x[*k]) / sigma);
+            }
+        }
+        assert_eq!(fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count(), free.len());
+    }
+    (names, scores)
+}
+
+#[test]
+fn two_hundred_robots_of_each_kinematics_scatter_as_their_sigmas_say() {
+    const ROBOTS: usize = 200;
+    let effects = [&GEOMETRY[..], &["reduction_ratio", "coupling_ratio", "joint_compliance"]].concat();
+    for description in fixture::all() {
+        let (names, scores) = scores(&description, &effects, ROBOTS, 100);
+        let (mut inside, mut count) = (0, 0);
+        for (name, scores) in names.iter().zip(&scores).filter(|(_, scores)| !scores.is_empty()) {
+            let scatter = (scores.iter().map(|z| z * z).sum::<f64>() / scores.len() as f64).sqrt();
+            assert!((0.85..1.18).contains(&scatter), "{} {name}: scatter over reported sigma {scatter:.3}", description.name);
+            inside += scores.iter().filter(|z| z.abs() < 1.96).count();
+            count += scores.len();
+        }
+        let cover = inside as f64 / count as f64;
+        assert!((0.92..0.98).contains(&cover), "{}: 95 % intervals cover {cover:.3}", description.name);
+    }
 }
