@@ -14,7 +14,8 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
     Ok(rows)
 }
 
-/// Two tables: points that no model has seen, and those that the models were fitted to.
+/// Two tables: points that no model has seen, and those that the models were fitted to. `expected` is the rms of a complete
+/// model under the instrument's noise.
 pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     let mut text = String::new();
@@ -68,13 +69,21 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
     };
     let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
     let mut text = format!(
-        "{title}, error in mm\n  {:step$}  {:set$}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}\n",
-        "step", "set", "points", "mean", "std", "p95", "max"
+        "{title}, error in mm\n  {:step$}  {:set$}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}\n",
+        "step", "set", "points", "mean", "std", "p95", "max", "rms", "expected"
     );
     for row in rows {
         text.push_str(&format!(
-            "  {:step$}  {:set$}  {:>6}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}\n",
-            row.step, row.set, row.points, row.mean_mm, row.std_mm, row.p95_mm, row.max_mm
+            "  {:step$}  {:set$}  {:>6}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8}\n",
+            row.step,
+            row.set,
+            row.points,
+            row.mean_mm,
+            row.std_mm,
+            row.p95_mm,
+            row.max_mm,
+            row.rms_mm,
+            row.expected_rms_mm.map_or_else(String::new, |expected| format!("{expected:.4}"))
         ));
     }
     text + "\n"
@@ -85,7 +94,7 @@ pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
             "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
-            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm,
+            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
             "reference": row.reference, "reference_mean_mm": row.reference_mean_mm,
             "reference_std_mm": row.reference_std_mm, "reference_max_mm": row.reference_max_mm,
         })

@@ -40,6 +40,8 @@ pub struct Fitted {
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
     pub singular_all: Vec<f64>,
+    /// Of the free parameters; `None` where the factor is singular.
+    pub covariance: Option<Covariance>,
     /// (name, value, meaning).
     pub indices: Vec<(&'static str, f64, &'static str)>,
 }
@@ -102,11 +104,10 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let errors = problem.errors(&all.residuals);
     let chosen: Vec<usize> = options.candidates.iter().enumerate().filter(|(_, k)| free.contains(k)).map(|(j, _)| j).collect();
     let factor = all.factor.select(&chosen);
-    if let Some(inverse) = factor.inverse() {
-        let scale = reduced(&errors, free.len()).sqrt();
+    let covariance = Covariance::of(&factor, &free, reduced(&errors, free.len()).sqrt());
+    if let Some(covariance) = &covariance {
         for (row, parameter) in free.iter().enumerate() {
-            let variance: f64 = (0..free.len()).map(|column| inverse[(row, column)].powi(2)).sum();
-            fates[*parameter] = Fate::Free(variance.sqrt() * scale);
+            fates[*parameter] = Fate::Free(covariance.sigma(row));
         }
     }
     let singular = factor.singular_values(&prior(&free));
@@ -116,6 +117,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         course,
         stop,
         unmodelled: problem.unmodelled,
+        covariance,
         downweighted: errors.iter().filter(|error| **error > HUBER).count(),
         indices: indices(&singular, options.rows.len()),
         singular,

@@ -1,6 +1,7 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
 mod align;
+mod covariance;
 mod factor;
 mod fit;
 mod levenberg;
@@ -12,6 +13,7 @@ pub mod swarm;
 pub mod threads;
 
 pub use align::align;
+pub use covariance::Covariance;
 pub use fit::{Fate, FitOptions, Fitted, fit};
 pub use levenberg::{Iteration, Stop};
 pub use model::Model;

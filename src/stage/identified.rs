@@ -62,12 +62,14 @@ impl Identified {
         for row in fitting.rows {
             held_out[*row] = false;
         }
+        // Of a fit on top of another only the last parameters' uncertainty is known, which would flatter.
+        let covariance = fitted.covariance.as_ref().filter(|_| fitting.earlier.is_none());
         note(context, model, fitted, fitting);
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, fitting.geometry),
-            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out),
+            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance),
         }
     }
 }

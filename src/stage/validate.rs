@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::stage::{Context, Labelled, Stage, reads, writes};
-use crate::table::{Prediction, PredictionRow, Statistics, StatisticsRow};
+use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,6 +39,7 @@ pub struct Reference {
 reads! {
     pub struct ValidateReads {
         prediction: Vec<Labelled<Prediction>>,
+        observability: Vec<Labelled<Observability>>,
     }
 }
 writes! {
@@ -63,8 +64,12 @@ impl Stage for Validate {
         }
         let mut statistics = Statistics::default();
         for (order, step) in (0..).zip(&reads.prediction) {
+            let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
+            let unmodelled =
+                fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == "unmodelled_mm")).map(|row| row.value);
             for ((name, set, held_out), rows) in groups(step)? {
-                statistics.0.push(describe(order, name, set, held_out, &rows));
+                let row = describe(order, name, set, held_out, &rows);
+                statistics.0.push(StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row });
             }
         }
         for reference in &self.reference {
@@ -129,11 +134,27 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         rms_y_mm: rms(|row| row.dy_mm),
         rms_z_mm: rms(|row| row.dz_mm),
         noise_rms_mm: rms(|row| row.noise_mm),
+        expected_rms_mm: None,
         reference: None,
         reference_mean_mm: None,
         reference_std_mm: None,
         reference_max_mm: None,
     }
+}
+
+/// The rms of a complete model: prediction adds its variance to new points and has taken it from those that it was fitted to.
+///
+/// On average over rows this is noise x sqrt(1 +- p / n), here with the leverage of the very rows. `unmodelled` is what the fit
+/// found beyond the noise (mm per axis), by which the stated uncertainty is larger than a complete model's.
+fn expected(held_out: bool, rows: &[&PredictionRow], unmodelled: Option<f64>) -> Option<f64> {
+    let beyond = 3.0 * unmodelled?.powi(2);
+    let mut sum = 0.0;
+    for row in rows {
+        let noise = row.noise_mm.powi(2);
+        let leverage = row.sigma_mm?.powi(2) / (noise + beyond);
+        sum += noise * if held_out { 1.0 + leverage } else { (1.0 - leverage).max(0.0) };
+    }
+    Some((sum / rows.len() as f64).sqrt())
 }
 
 /// Linear between order statistics (Hyndman and Fan's type 7, the default of numpy, R and polars' `linear`).

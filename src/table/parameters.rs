@@ -34,6 +34,9 @@ use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
 
+/// Pairs more correlated than this are worth a word: neither is known well alone.
+const CORRELATED: f64 = 0.9;
+
 impl Parameters {
     /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
     pub fn of(step: &str, model: &Model, fitted: &Fitted, held: &[usize], earlier: Option<&Parameters>) -> Self {
@@ -61,7 +64,12 @@ impl Parameters {
                     if list.is_empty() { "several others".to_string() } else { list.join(", ") }
                 };
                 let (status, sigma, remark) = match &fitted.fates[k] {
-                    Fate::Free(sigma) => ("free", Some(spec.unit.from_si(*sigma)), None),
+                    Fate::Free(sigma) => {
+                        let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
+                        let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
+                        let remark = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
+                        ("free", Some(spec.unit.from_si(*sigma)), remark)
+                    }
                     Fate::Kept if held.contains(&k) => ("held", None, Some("held at nominal by the pipeline".to_string())),
                     Fate::Kept => ("held", None, None),
                     Fate::Redundant(with) => (

@@ -20,16 +20,27 @@ crate::table::rows! { "prediction",
         error_mm: f64,
         /// One-sigma length of the measurement noise that the row is weighted by (root of the summed variances).
         noise_mm: f64,
+        /// One-sigma length of the predicted position's uncertainty from the parameters'; null where this step does not know it.
+        sigma_mm: Option<f64>,
     }
 }
 
-use crate::estimate::Model;
+use crate::estimate::{Covariance, Model};
 use crate::robot::Measurements;
 use crate::table::{Recording, Split};
 
 impl Prediction {
-    /// The residuals of every row under a model. `held_out[row]` as in the column.
-    pub fn of(step: &str, model: &Model, data: &Measurements, recording: &Recording, split: &Split, held_out: &[bool]) -> Self {
+    /// The residuals of every row under a model. `held_out[row]` as in the column; `covariance` where the step estimated the whole model.
+    pub fn of(
+        step: &str,
+        model: &Model,
+        data: &Measurements,
+        recording: &Recording,
+        split: &Split,
+        held_out: &[bool],
+        covariance: Option<&Covariance>,
+    ) -> Self {
+        let sigma = covariance.map(|covariance| covariance.of_predictions(model, data));
         let predicted = model.predict(data);
         let rows = predicted.iter().enumerate().map(|(row, point)| {
             let point = point * 1e3;
@@ -48,6 +59,7 @@ impl Prediction {
                 dz_mm: residual.z,
                 error_mm: residual.norm(),
                 noise_mm: data.noise(row) * 1e3,
+                sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
             }
         });
         Self(rows.collect())

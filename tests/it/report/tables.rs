@@ -21,6 +21,7 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         dz_mm,
         error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
         noise_mm: 0.03 + 0.01 * (sequence % 2) as f64,
+        sigma_mm: None,
     }
 }
 

@@ -1,0 +1,70 @@
+//! The uncertainty of a fit: of parameters, of pairs of them, and of the positions that they predict.
+
+use super::factor::Factor;
+use super::model::Model;
+use crate::robot::Measurements;
+use faer::Mat;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Covariance of the free parameters as `root * root^T`.
+#[derive(Debug, Clone)]
+pub struct Covariance {
+    /// Positions of the free parameters in the stack.
+    free: Vec<usize>,
+    /// Upper triangular, p x p.
+    root: Mat<f64>,
+}
+
+impl Covariance {
+    /// From the whitened factor; `scale` is the root of the reduced chi-square. `None` if singular.
+    pub(crate) fn of(factor: &Factor, free: &[usize], scale: f64) -> Option<Self> {
+        let inverse = factor.inverse()?;
+        let p = free.len();
+        Some(Self { free: free.to_vec(), root: Mat::from_fn(p, p, |i, j| inverse[(i, j)] * scale) })
+    }
+
+    /// Standard deviation of the `row`-th free parameter, SI.
+    pub(crate) fn sigma(&self, row: usize) -> f64 {
+        self.product(row, row).sqrt()
+    }
+
+    fn product(&self, a: usize, b: usize) -> f64 {
+        (0..self.free.len()).map(|column| self.root[(a, column)] * self.root[(b, column)]).sum()
+    }
+
+    /// The other free parameter that a parameter of the stack is most correlated with, and the correlation.
+    pub fn closest(&self, parameter: usize) -> Option<(usize, f64)> {
+        let row = self.free.iter().position(|k| *k == parameter)?;
+        let own = self.sigma(row);
+        (0..self.free.len())
+            .filter(|other| *other != row)
+            .map(|other| (self.free[other], self.product(row, other) / (own * self.sigma(other))))
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// Standard deviation (m, length: root of the summed variances) of every row's predicted position from the parameters' alone.
+    pub fn of_predictions(&self, model: &Model, data: &Measurements) -> Vec<f64> {
+        let p = self.free.len();
+        let mut column = vec![usize::MAX; model.stack.specs().len()];
+        for (j, parameter) in self.free.iter().enumerate() {
+            column[*parameter] = j;
+        }
+        (0..data.rows())
+            .into_par_iter()
+            .map_init(
+                || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
+                |(scratch, jacobian), row| {
+                    jacobian.fill(Vector3::zeros());
+                    model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
+                        if let Some(sum) = jacobian.get_mut(column[parameter]) {
+                            *sum += derivative;
+                        }
+                    });
+                    let direction = |k: usize| (0..=k).map(|i| jacobian[i] * self.root[(i, k)]).sum::<Vector3<f64>>();
+                    (0..p).map(|k| direction(k).norm_squared()).sum::<f64>().sqrt()
+                },
+            )
+            .collect()
+    }
+}
