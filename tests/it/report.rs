@@ -70,7 +70,10 @@ fn a_set_of_which_part_was_fitted_makes_two_rows_and_two_tables_of_one_stage_two
 
 #[test]
 fn nothing_to_validate_is_an_error_of_the_pipeline() {
-    let error = Validate::default().run(ValidateReads { prediction: Vec::new(), observability: Vec::new() }, &context()).err().expect("refused");
+    let error = Validate::default()
+        .run(ValidateReads { prediction: Vec::new(), observability: Vec::new() }, &context())
+        .err()
+        .expect("refused");
     assert_eq!(error.exit_code(), 2);
 }
 
