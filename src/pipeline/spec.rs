@@ -144,7 +144,7 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
         troubles.push(Trouble::new(message).at(mark).below(key));
     };
     match tree.get("calib").map(|node| &node.value) {
-        Some(Value::Integer(format)) if *format == FORMAT.into() => {}
+        Some(Value::Integer(format)) if *format == i128::from(FORMAT) => {}
         Some(Value::Integer(format)) => {
             fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}"))
         }
