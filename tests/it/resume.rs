@@ -58,7 +58,12 @@ fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
         // Twice in a row: what a killed run left, and what a killed resumption left.
         for _ in 0..2 {
             let mut child = calib(&store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-            std::thread::sleep(whole.mul_f64(random.random_range(0.0..1.1)));
+            // After some stage's record and a moment more: a clock alone would miss the stages on a busy machine.
+            let enough = random.random_range(0..executed(&undisturbed));
+            while actions(&store).len() < enough && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            std::thread::sleep(whole.mul_f64(random.random_range(0.0..0.2)));
             child.kill().unwrap();
             child.wait().unwrap();
         }
