@@ -11,7 +11,7 @@
 //! | [`error`], [`units`] | errors by reader, units of stored columns | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
-//! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial |
+//! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |

@@ -8,6 +8,7 @@ mod typed;
 
 pub use node::{Mark, Node, Value};
 pub use trouble::Trouble;
+pub(crate) use trouble::join;
 pub use typed::typed;
 
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -46,11 +47,11 @@ fn read(text: &str, duplicate_keys: DuplicateKeyPolicy) -> Result<Node, Trouble>
 /// One line, in our words where it matters; the place is printed once, in front of it.
 fn in_words(message: &str) -> String {
     let first = message.lines().next().unwrap_or_default();
+    let first = first.split(" at line ").next().unwrap_or(first).trim_start_matches("error: ");
     let twice = first.split_once("duplicate mapping key: ").and_then(|(_, rest)| rest.strip_suffix(" not allowed here"));
     if let Some(key) = twice {
         return format!("key `{key}` is given twice in this block");
     }
-    let first = first.split(" at line ").next().unwrap_or(first).trim_start_matches("error: ");
     match first.strip_prefix("line ").and_then(|rest| rest.split_once(": ")) {
         Some((_, message)) => message.into(),
         None => first.into(),

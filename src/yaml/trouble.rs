@@ -30,6 +30,15 @@ impl Trouble {
     pub fn new(message: impl Into<String>) -> Self {
         Self { path: String::new(), mark: None, message: message.into(), missing: None, clue: None }
     }
+    /// A key that is not among those allowed.
+    pub fn unknown_key(found: &str, allowed: &[&str]) -> Self {
+        let message = if allowed.is_empty() {
+            "unknown key; this block has no settings".into()
+        } else {
+            format!("unknown key{}", instead(found, allowed))
+        };
+        Self { clue: Some(Clue::Key(found.into())), ..Self::new(message) }
+    }
     /// Sets the place unless an inner one is known.
     pub fn at(mut self, mark: Mark) -> Self {
         self.mark.get_or_insert(mark);
@@ -52,7 +61,7 @@ impl Trouble {
 }
 
 /// `stages[2]` + `with.every` -> `stages[2].with.every`.
-pub(super) fn join(path: &str, rest: &str) -> String {
+pub(crate) fn join(path: &str, rest: &str) -> String {
     match (path.is_empty(), rest.is_empty() || rest.starts_with('[')) {
         (true, _) => rest.into(),
         (false, true) => format!("{path}{rest}"),
@@ -87,12 +96,7 @@ impl de::Error for Trouble {
         Self { clue: Some(Clue::Word(found.into())), ..Self::new(message) }
     }
     fn unknown_field(found: &str, allowed: &'static [&'static str]) -> Self {
-        let message = if allowed.is_empty() {
-            "unknown key; this block has no settings".into()
-        } else {
-            format!("unknown key{}", instead(found, allowed))
-        };
-        Self { clue: Some(Clue::Key(found.into())), ..Self::new(message) }
+        Self::unknown_key(found, allowed)
     }
     fn missing_field(field: &'static str) -> Self {
         Self { missing: Some(field), ..Self::new(format!("missing key `{field}`")) }

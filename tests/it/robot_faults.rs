@@ -46,13 +46,13 @@ fn the_good_file_is_good() {
 fn an_unknown_key_names_the_nearest() {
     assert_eq!(
         changed("tool: {point", "tool: {pont"),
-        "robot.yaml: tool: unknown key `pont`; did you mean `point`? (allowed: point, orientation)\n\
-         robot.yaml: tool.point: missing; expected a list of 3 numbers"
+        "robot.yaml:7:8: tool.pont: unknown key; did you mean `point`? Allowed: point, orientation\n\
+         robot.yaml:7:7: tool.point: missing; expected a list of 3 numbers"
     );
     assert_eq!(
         added("payloda: {mass: 3}"),
-        "robot.yaml: unknown key `payloda`; did you mean `payload`? (allowed: calib_robot, name, units, kinematics, tool, joints, \
-         couplings, links, payload, gravity)"
+        "robot.yaml:8:1: payloda: unknown key; did you mean `payload`? Allowed: calib_robot, name, units, kinematics, tool, joints, \
+         couplings, links, payload, gravity"
     );
 }
 
@@ -68,15 +68,15 @@ gravity: [0, 0, -9810]
 ";
     assert_eq!(
         calib(text),
-        "robot.yaml: calib_robot: format 2 is not known to this calib; expected 1\n\
-         robot.yaml: units.angle: unknown value `grad` (allowed: rad, deg, mrad, arcsec)\n\
-         robot.yaml: kinematics.screws[0].point[1]: expected a finite number, found the text `x`\n\
-         robot.yaml: tool.point: expected a list of 3 numbers, found a list of 2\n\
-         robot.yaml: joints[0].limits: expected [lower, upper] with lower < upper, found [10, -10]\n\
-         robot.yaml: joints[0].reduction_ratio: expected a number other than 0\n\
-         robot.yaml: links[0].frame: screws know no link frames; expected `base`\n\
-         robot.yaml: links[0].mass: expected a mass in kg, not less than 0, found -3\n\
-         robot.yaml: gravity: is 9810 m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"
+        "robot.yaml:1:14: calib_robot: format 2 is not known to this calib; expected 1\n\
+         robot.yaml:2:28: units.angle: unknown value `grad` (allowed: rad, deg, mrad, arcsec)\n\
+         robot.yaml:3:52: kinematics.screws[0].point[1]: expected a finite number, found the text `x`\n\
+         robot.yaml:4:15: tool.point: expected a list of 3 numbers, found a list of 2\n\
+         robot.yaml:5:19: joints[0].limits: expected [lower, upper] with lower < upper, found [10, -10]\n\
+         robot.yaml:5:47: joints[0].reduction_ratio: expected a number other than 0\n\
+         robot.yaml:6:46: links[0].frame: screws know no link frames; expected `base`\n\
+         robot.yaml:6:16: links[0].mass: expected a mass in kg, not less than 0, found -3\n\
+         robot.yaml:7:10: gravity: is 9810 m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"
     );
 }
 
@@ -84,15 +84,15 @@ gravity: [0, 0, -9810]
 fn an_axis_has_a_direction() {
     assert_eq!(
         changed("axis: [0, 1, 0]", "axis: [0, 0, 0]"),
-        "robot.yaml: kinematics.screws[1].axis: has no direction: its length is zero"
+        "robot.yaml:6:14: kinematics.screws[1].axis: has no direction: its length is zero"
     );
     assert_eq!(
         changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 0, 0, 0, 0, 0]"),
-        "robot.yaml: kinematics.screws[1].twist: is no screw: all six numbers are zero"
+        "robot.yaml:6:15: kinematics.screws[1].twist: is no screw: all six numbers are zero"
     );
     assert_eq!(
         changed("axis: [0, 1, 0], point: [300, 0, 0]", "twist: [0, 5, 0, 0, 1, 0]"),
-        "robot.yaml: kinematics.screws[1].twist: moves 5 along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"
+        "robot.yaml:6:15: kinematics.screws[1].twist: moves 5 along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"
     );
 }
 
@@ -100,39 +100,39 @@ fn an_axis_has_a_direction() {
 fn numbers_are_finite() {
     assert_eq!(
         changed("point: [900, 0, 0]", "point: [900, .nan, .inf]"),
-        "robot.yaml: tool.point[1]: expected a finite number, found `NaN`\n\
-         robot.yaml: tool.point[2]: expected a finite number, found `inf`"
+        "robot.yaml:7:21: tool.point[1]: expected a finite number, found `.nan`\n\
+         robot.yaml:7:27: tool.point[2]: expected a finite number, found `.inf`"
     );
     assert_eq!(
         changed("point: [900, 0, 0]", "point: [900, '12,5', 0]"),
-        "robot.yaml: tool.point[1]: expected a finite number, found the text `12,5`"
+        "robot.yaml:7:21: tool.point[1]: expected a finite number, found the text `12,5`"
     );
 }
 
 #[test]
 fn units_are_stated_and_known() {
-    assert_eq!(changed("length: mm", "length: cm"), "robot.yaml: units.length: unknown value `cm` (allowed: mm, um, m, in)");
+    assert_eq!(changed("length: mm", "length: cm"), "robot.yaml:2:17: units.length: unknown value `cm` (allowed: mm, um, m, in)");
     assert_eq!(
         changed("units: {length: mm, angle: deg}\n", ""),
-        "robot.yaml: units: missing; expected a map with the keys length, angle"
+        "robot.yaml:1:1: units: missing; expected a map with the keys length, angle"
     );
     assert_eq!(
         calib(&format!("{}joints: [{{limits: [-185, 185]}}, ]\n", GOOD.replace("deg", "rad"))),
-        "robot.yaml: joints: 1 entries for 2 joints; expected one per joint\n\
-         robot.yaml: joints[0].limits: [-185, 185] rad is more than ten turns; is it in another unit?"
+        "robot.yaml:8:9: joints: 1 entries for 2 joints; expected one per joint\n\
+         robot.yaml:8:19: joints[0].limits: [-185, 185] rad is more than ten turns; is it in another unit?"
     );
 }
 
 #[test]
 fn lists_have_one_entry_per_joint() {
     let message = added("links: [{mass: 1, centre: [0, 0, 0]}, null, null]");
-    assert_eq!(message, "robot.yaml: links: 3 entries for 2 joints; expected one per joint");
+    assert_eq!(message, "robot.yaml:8:8: links: 3 entries for 2 joints; expected one per joint");
     let message = added("couplings: [{moved: 3, by: 1}, {moved: 1, by: 1}, {moved: 2, by: 0.5}]");
     assert_eq!(
         message,
-        "robot.yaml: couplings[0].moved: there is no joint 3; expected a number from 1 to 2\n\
-         robot.yaml: couplings[1]: a joint cannot move itself; expected two different joints\n\
-         robot.yaml: couplings[2].by: there is no joint 0.5; expected a number from 1 to 2"
+        "robot.yaml:8:21: couplings[0].moved: there is no joint 3; expected a number from 1 to 2\n\
+         robot.yaml:8:32: couplings[1]: a joint cannot move itself; expected two different joints\n\
+         robot.yaml:8:66: couplings[2].by: there is no joint 0.5; expected a number from 1 to 2"
     );
 }
 
@@ -140,26 +140,26 @@ fn lists_have_one_entry_per_joint() {
 fn a_file_describes_one_arm_once() {
     assert_eq!(
         changed("kinematics:\n", "kinematics:\n  dh: [{d: 1, a: 0, alpha: 0}]\n"),
-        "robot.yaml: kinematics: more than one description of the arm; expected one of screws, dh, mdh, urdf"
+        "robot.yaml:4:3: kinematics: more than one description of the arm; expected one of screws, dh, mdh, urdf"
     );
     assert_eq!(
         calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {}\n"),
-        "robot.yaml: kinematics: no description of the arm; expected one of screws, dh, mdh, urdf"
+        "robot.yaml:3:13: kinematics: no description of the arm; expected one of screws, dh, mdh, urdf"
     );
     assert_eq!(
         calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {dh: []}\n"),
-        "robot.yaml: kinematics: no joints; expected at least one"
+        "robot.yaml:3:13: kinematics: no joints; expected at least one"
     );
     let urdf = calib("calib_robot: 1\nunits: {length: mm, angle: deg}\nkinematics: {urdf: {base: a, tip: b}}\n");
-    assert!(urdf.starts_with("robot.yaml: kinematics.urdf: the URDF itself is missing; name it in the pipeline"), "{urdf}");
+    assert!(urdf.starts_with("robot.yaml:3:20: kinematics.urdf: the URDF itself is missing; name it in the pipeline"), "{urdf}");
 }
 
 #[test]
 fn a_key_twice_and_broken_yaml_show_the_line() {
     let twice = added("tool: {point: [0, 0, 0]}");
-    assert!(twice.starts_with("robot.yaml: ") && twice.contains("duplicate") && twice.contains("line 8"), "{twice}");
+    assert!(twice.starts_with("robot.yaml:8:1: key `tool` is given twice"), "{twice}");
     let broken = changed("tool: {point: [900, 0, 0]}", "tool: {point: [900, 0, 0]");
-    assert!(broken.starts_with("robot.yaml: ") && broken.contains("line"), "{broken}");
+    assert!(broken.starts_with("robot.yaml:7:7: unclosed bracket"), "{broken}");
     for text in ["", "just text", "[1, 2]", "# nothing\n"] {
         assert!(calib(text).contains("expected a map with the keys calib_robot, name"), "{}", calib(text));
     }
@@ -204,7 +204,7 @@ fn a_urdf_fault_names_its_line() {
     );
     assert_eq!(
         urdf(&ARM.replace("revolute", "fixed"), "base_link", "tool0"),
-        "robot.yaml: kinematics: no joints; expected at least one"
+        "robot.yaml:3:13: kinematics: no joints; expected at least one"
     );
     assert_eq!(urdf("<sdf/>", "a", "b"), "arm.urdf:1: expected a URDF, whose root is <robot>, found <sdf>");
     assert!(urdf("<robot", "a", "b").starts_with("arm.urdf: not readable as XML: "));
@@ -221,14 +221,21 @@ fn a_practice_robot_is_checked_too() {
     let case = |text: &str| read_case(Text { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
     assert_eq!(
         case(r#"{"axes": [[0, 0, 1], [0, 0, 0]], "points": [[0, 0, 0]], "mass": [1, -2], "coupling": [[2, 0]]}"#),
-        "robot.json: points: 1 entries for 2 joints; expected one per joint\n\
-         robot.json: axes[1]: has no direction: its length is zero\n\
-         robot.json: mass[1]: expected a mass in kg, not less than 0, found -2\n\
-         robot.json: tool: missing; expected a list of 3 numbers\n\
-         robot.json: coupling[0]: expected two different joints (moved, by) counted from 0, below 2"
+        "robot.json:1:44: points: 1 entries for 2 joints; expected one per joint\n\
+         robot.json:1:22: axes[1]: has no direction: its length is zero\n\
+         robot.json:1:69: mass[1]: expected a mass in kg, not less than 0, found -2\n\
+         robot.json:1:1: tool: missing; expected a list of 3 numbers\n\
+         robot.json:1:87: coupling[0]: expected two different joints (moved, by) counted from 0, below 2"
     );
-    assert_eq!(case("{\"axes\": [[0, 0, NaN]]}"), "robot.json: expected value at line 1 column 18");
-    assert_eq!(case("{\"tool\": 1, \"tool\": 2}"), "robot.json: the key `tool` is there twice at line 1 column 18");
-    assert!(case("[]").starts_with("robot.json: expected a map with the keys name, axes"));
-    assert!(case("").starts_with("robot.json: EOF while parsing"));
+    let not_a_number = case("{\"axes\": [[0, 0, NaN]]}");
+    assert!(
+        not_a_number.contains("robot.json:1:18: axes[0][2]: expected a finite number, found the text `NaN`"),
+        "{not_a_number}"
+    );
+    let twice = case("{\"tool\": 1, \"tool\": 2}");
+    assert!(twice.starts_with("robot.json:1:13: key `tool` is given twice in this block\n"), "{twice}");
+    assert_eq!(case("{\"axes\": 1"), "robot.json:1:1: unclosed bracket '{'");
+    for text in ["[]", ""] {
+        assert!(case(text).starts_with("robot.json:1:1: expected a map with the keys name, axes"), "{}", case(text));
+    }
 }

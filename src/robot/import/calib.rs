@@ -1,7 +1,7 @@
 //! calib's own robot file: YAML with units, one kinematic format, and what is known of joints, links, payload and gravity.
 
 use super::dh::{self, Convention};
-use super::tree::{Faults, Node, Value};
+use super::place::{Faults, Place};
 use super::{Chain, Imported, Text, screws, urdf};
 use crate::error::Result;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
@@ -24,9 +24,8 @@ struct Units {
 }
 
 pub(super) fn read(file: Text, urdf: Option<Text>) -> Result<Imported> {
-    let node = Node::from_yaml(file.text, file.label)?;
-    let faults = Faults::new(file.label);
-    let root = Value::root(&node, &faults).map(&[
+    let (node, faults) = Faults::parse(file)?;
+    let root = Place::root(&node, &faults).map(&[
         "calib_robot",
         "name",
         "units",
@@ -53,7 +52,7 @@ pub(super) fn read(file: Text, urdf: Option<Text>) -> Result<Imported> {
     }
 }
 
-fn units(value: Value) -> Units {
+fn units(value: Place) -> Units {
     let unit = |key: &str, quantity: Quantity, fallback: Unit| {
         let allowed: Vec<_> = (Unit::symbols(quantity).into_iter()).filter_map(|s| Some((s, Unit::parse(s)?))).collect();
         value.get(key).choice(&allowed).unwrap_or(fallback)
@@ -62,7 +61,7 @@ fn units(value: Value) -> Units {
 }
 
 /// The one kinematic format of the file, or none after a fault.
-fn chain(value: Value, units: Units, urdf: Option<Text>, faults: &Faults) -> Result<Option<Chain>> {
+fn chain(value: Place, units: Units, urdf: Option<Text>, faults: &Faults) -> Result<Option<Chain>> {
     let mut given = FORMATS.into_iter().filter(|format| value.get(format).given().is_some());
     let chain = match (given.next(), given.next()) {
         (Some(_), Some(_)) => {
@@ -100,7 +99,7 @@ fn chain(value: Value, units: Units, urdf: Option<Text>, faults: &Faults) -> Res
     Ok(Some(chain))
 }
 
-fn describe(root: &Value, chain: Chain, units: Units) -> RobotDescription {
+fn describe(root: &Place, chain: Chain, units: Units) -> RobotDescription {
     let tool = tool(root.get("tool"), &chain, units);
     let name = root.get("name").given().map_or_else(|| "robot".into(), |name| name.text());
     let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
@@ -146,7 +145,7 @@ fn describe(root: &Value, chain: Chain, units: Units) -> RobotDescription {
 }
 
 /// The tool frame at the zero pose in the base frame: the measured point, and the orientation of the tool's axes.
-fn tool(value: Value, chain: &Chain, units: Units) -> Isometry3<f64> {
+fn tool(value: Place, chain: &Chain, units: Units) -> Isometry3<f64> {
     let on_link = chain.joints.iter().any(|joint| joint.frame.is_some());
     if value.given().is_none() && on_link {
         return chain.tip;
@@ -157,7 +156,7 @@ fn tool(value: Value, chain: &Chain, units: Units) -> Isometry3<f64> {
     chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
 }
 
-fn orientation(value: &Value, angle: Unit) -> UnitQuaternion<f64> {
+fn orientation(value: &Place, angle: Unit) -> UnitQuaternion<f64> {
     let value = value.clone().map(&["rpy", "quaternion"]);
     match (value.get("rpy").given(), value.get("quaternion").given()) {
         (Some(rpy), None) => {
@@ -183,7 +182,7 @@ fn orientation(value: &Value, angle: Unit) -> UnitQuaternion<f64> {
 }
 
 /// What the file says of a joint beyond its screw.
-fn drive(joint: &mut JointDescription, value: Value, units: Units) {
+fn drive(joint: &mut JointDescription, value: Place, units: Units) {
     if value.given().is_none() {
         return;
     }
@@ -216,7 +215,7 @@ fn drive(joint: &mut JointDescription, value: Value, units: Units) {
     joint.motor_constant = nonzero("motor_constant");
 }
 
-fn link(value: Value, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
+fn link(value: Place, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
     let value = value.map(&["mass", "centre", "frame"]);
     let centre = Point3::from(value.get("centre").vector::<3>()).map(|x| units.length.to_si(x));
     let of_link = value.get("frame");
@@ -232,11 +231,11 @@ fn link(value: Value, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Poin
     (value.get("mass").not_negative(), centre)
 }
 
-fn couplings(list: &Value, joints: usize) -> Vec<Coupling> {
+fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
     let mut couplings: Vec<Coupling> = Vec::new();
     for value in list.items() {
         let value = value.map(&["moved", "by", "ratio"]);
-        let ratio = value.get("ratio").given().map_or(0.0, Value::number);
+        let ratio = value.get("ratio").given().map_or(0.0, Place::number);
         if let (Some(moved), Some(by)) = (value.get("moved").joint(joints), value.get("by").joint(joints)) {
             if moved == by {
                 value.fault("a joint cannot move itself; expected two different joints");
@@ -252,7 +251,7 @@ fn couplings(list: &Value, joints: usize) -> Vec<Coupling> {
 }
 
 /// Rated mass, kg, and its centre, m, zero pose, base frame.
-fn payload(value: Value, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f64>) {
+fn payload(value: Place, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f64>) {
     let point = Point3::from(tool.translation.vector);
     if value.given().is_none() {
         return (0.0, point);
@@ -264,7 +263,7 @@ fn payload(value: Value, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f6
     (value.get("mass").not_negative(), point + if in_tool { tool.rotation * offset } else { offset })
 }
 
-fn gravity(value: Value) -> [f64; 3] {
+fn gravity(value: Place) -> [f64; 3] {
     let Some(value) = value.given() else { return GRAVITY };
     let gravity = value.vector();
     let size = Vector3::from(gravity).norm();

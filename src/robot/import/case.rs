@@ -1,7 +1,7 @@
 //! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg and Nm/A.
 
+use super::place::{Faults, Place};
 use super::screws::direction;
-use super::tree::{Faults, Node, Value};
 use super::{Imported, Text};
 use crate::error::Result;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
@@ -11,9 +11,8 @@ use nalgebra::{Point3, Vector3};
 const KEYS: [&str; 11] = ["name", "axes", "points", "tool", "mass", "com", "ratio", "kt", "payload", "payload_com", "coupling"];
 
 pub(super) fn read(file: Text) -> Result<Imported> {
-    let node = Node::from_json(file.text, file.label)?;
-    let faults = Faults::new(file.label);
-    let root = Value::root(&node, &faults).open_map(&KEYS);
+    let (node, faults) = Faults::parse(file)?;
+    let root = Place::root(&node, &faults).open_map(&KEYS);
     let axes = root.get("axes").items();
     if root.get("axes").given().is_some() && axes.is_empty() {
         root.get("axes").fault("no joints; expected at least one axis");
@@ -22,7 +21,7 @@ pub(super) fn read(file: Text) -> Result<Imported> {
     let points = root.get("points").per_joint(n);
     let per_joint = |key: &str| root.get(key).given().map(|list| list.per_joint(n)).unwrap_or_default();
     let (masses, centres, ratios, constants) = (per_joint("mass"), per_joint("com"), per_joint("ratio"), per_joint("kt"));
-    let number = |list: &[Value], i: usize| list.get(i).and_then(Value::given).map(Value::number);
+    let number = |list: &[Place], i: usize| list.get(i).and_then(Place::given).map(Place::number);
     let joints = (axes.iter().enumerate())
         .map(|(i, axis)| JointDescription {
             name: format!("J{}", i + 1),
@@ -32,19 +31,19 @@ pub(super) fn read(file: Text) -> Result<Imported> {
             limits: None,
             reduction_ratio: number(&ratios, i),
             motor_constant: number(&constants, i),
-            mass: masses.get(i).and_then(Value::given).map(Value::not_negative),
-            centre: centres.get(i).and_then(Value::given).map(|centre| metres(centre).into()),
+            mass: masses.get(i).and_then(Place::given).map(Place::not_negative),
+            centre: centres.get(i).and_then(Place::given).map(|centre| metres(centre).into()),
         })
         .collect();
     let tool = metres(&root.get("tool"));
     let offset = root.get("payload_com").given().map_or_else(Vector3::zeros, |offset| metres(offset).coords);
     let robot = RobotDescription {
-        name: root.get("name").given().map_or_else(|| "robot".into(), Value::text),
+        name: root.get("name").given().map_or_else(|| "robot".into(), Place::text),
         joints,
         tool: tool.into(),
         tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         couplings: root.get("coupling").given().map_or_else(Vec::new, |list| couplings(list, n)),
-        payload_mass: root.get("payload").given().map_or(0.0, Value::not_negative),
+        payload_mass: root.get("payload").given().map_or(0.0, Place::not_negative),
         payload_centre: (tool + offset).into(),
         gravity: [0.0, 0.0, -9.81],
     };
@@ -54,12 +53,12 @@ pub(super) fn read(file: Text) -> Result<Imported> {
     Ok(Imported { robot, notes })
 }
 
-fn metres(value: &Value) -> Point3<f64> {
+fn metres(value: &Place) -> Point3<f64> {
     Point3::from(value.vector()).map(|x| Unit::Millimetre.to_si(x))
 }
 
 /// Pairs (moved, by) of joints from 0. The layout states no ratio: the controller is taken to add none.
-fn couplings(list: &Value, joints: usize) -> Vec<Coupling> {
+fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
     let index = |value: f64| (0..joints).find(|j| *j as f64 == value);
     let mut couplings: Vec<_> = (list.items().iter())
         .filter_map(|pair| {

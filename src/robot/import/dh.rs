@@ -3,7 +3,7 @@
 //! holds alpha(i-1) and a(i-1). `theta` of a revolute and `d` of a prismatic joint are the values at joint position zero. A row of
 //! the kind `fixed` moves the frame and is no joint: a base, a track or a tool that the convention alone cannot place.
 
-use super::tree::Value;
+use super::place::Place;
 use super::{Chain, ChainJoint};
 use crate::robot::description::JointKind;
 use crate::units::Unit;
@@ -19,7 +19,7 @@ pub(super) enum Convention {
     Modified,
 }
 
-pub(super) fn read(rows: &Value, convention: Convention, length: Unit, angle: Unit) -> Chain {
+pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Unit) -> Chain {
     let mut frame = Isometry3::identity();
     let mut joints = Vec::new();
     for row in rows.items() {

@@ -1,7 +1,7 @@
 //! Robot files -> [`RobotDescription`]: calib's own YAML (screws, DH, modified DH, or a URDF beside it) and the practice layout.
 //!
 //! Every format ends in one chain at the zero pose in the base frame. All faults of a file are reported at once, each with
-//! its path (`robot.yaml: joints[2].limits`, counted from 0 as in the YAML) or its line (`arm.urdf:17`).
+//! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
 use crate::error::Result;
 use crate::robot::description::{JointKind, RobotDescription};
@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 mod calib;
 mod case;
 mod dh;
+mod place;
 mod screws;
-mod tree;
 mod urdf;
 
 /// A file's content and the name by which messages call it.

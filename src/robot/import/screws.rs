@@ -1,6 +1,6 @@
 //! Joint screws: an axis and a point on it, or a twist (v; w) with v = -w x point (Lynch & Park, Modern Robotics, 4.1).
 
-use super::tree::Value;
+use super::place::Place;
 use super::{Chain, ChainJoint};
 use crate::robot::description::JointKind;
 use crate::units::Unit;
@@ -11,12 +11,12 @@ const SMALL: f64 = 1e-9;
 
 const KINDS: &[(&str, JointKind)] = &[("revolute", JointKind::Revolute), ("prismatic", JointKind::Prismatic)];
 
-pub(super) fn read(screws: &Value, length: Unit) -> Chain {
+pub(super) fn read(screws: &Place, length: Unit) -> Chain {
     let joints = screws.items().into_iter().map(|screw| joint(screw, length)).collect();
     Chain { joints, tip: Isometry3::identity() }
 }
 
-fn joint(screw: Value, length: Unit) -> ChainJoint {
+fn joint(screw: Place, length: Unit) -> ChainJoint {
     let screw = screw.map(&["kind", "axis", "point", "twist"]);
     let kind = screw.get("kind").given().and_then(|kind| kind.choice(KINDS));
     let (kind, axis, point) = match screw.get("twist").given() {
@@ -43,7 +43,7 @@ fn joint(screw: Value, length: Unit) -> ChainJoint {
 }
 
 /// A direction of any length but zero, as a unit vector.
-pub(super) fn direction(value: &Value) -> Vector3<f64> {
+pub(super) fn direction(value: &Place) -> Vector3<f64> {
     let vector = Vector3::from(value.vector::<3>());
     if vector.norm() < SMALL {
         value.fault("has no direction: its length is zero");
@@ -53,7 +53,7 @@ pub(super) fn direction(value: &Value) -> Vector3<f64> {
 }
 
 /// Kind, unit axis and the point of the axis nearest to the origin, in the file's length unit.
-fn from_twist(value: &Value) -> (JointKind, Vector3<f64>, Point3<f64>) {
+fn from_twist(value: &Place) -> (JointKind, Vector3<f64>, Point3<f64>) {
     let twist = value.vector::<6>();
     let (v, w) = (Vector3::new(twist[0], twist[1], twist[2]), Vector3::new(twist[3], twist[4], twist[5]));
     if w.norm() < SMALL {

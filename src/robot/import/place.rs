@@ -1,0 +1,219 @@
+//! A place in a robot file: a cursor that reads typed values from the tree and collects every fault with its line and path.
+//!
+//! A value that could not be read becomes NaN (or empty) after its fault was noted; so one pass finds all faults, and
+//! nothing unread can leave, because [`Faults::finish`] fails when there is any.
+
+use super::Text;
+use crate::error::{Error, Fault, Result};
+use crate::yaml::{self, Mark, Node, Trouble, Value, join};
+use std::cell::RefCell;
+
+/// The faults found so far in one file.
+pub(super) struct Faults<'f> {
+    file: &'f str,
+    list: RefCell<Vec<Fault>>,
+}
+
+impl<'f> Faults<'f> {
+    /// Parses YAML or JSON, which is YAML too; fails where nothing of the file can be read.
+    pub fn parse(file: Text<'f>) -> Result<(Node, Self)> {
+        let (node, troubles) = yaml::parse(file.text);
+        let list: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(file.label)).collect();
+        match node {
+            Some(node) => Ok((node, Self { file: file.label, list: RefCell::new(list) })),
+            None => Err(Error::Spec(list)),
+        }
+    }
+    fn push(&self, trouble: Trouble) {
+        self.list.borrow_mut().push(trouble.fault(self.file));
+    }
+    /// Takes over faults that already carry their place; passes on what is no fault of a file.
+    pub fn absorb<T>(&self, result: Result<T>) -> Result<Option<T>> {
+        match result {
+            Ok(value) => Ok(Some(value)),
+            Err(Error::Spec(faults)) => {
+                self.list.borrow_mut().extend(faults);
+                Ok(None)
+            }
+            Err(other) => Err(other),
+        }
+    }
+    pub fn finish(self) -> Result<()> {
+        let list = self.list.into_inner();
+        if list.is_empty() { Ok(()) } else { Err(Error::Spec(list)) }
+    }
+}
+
+/// What is at a place; children of something unreadable are unreadable too, and silent: one fault, one message.
+#[derive(Clone, Copy)]
+enum Content<'a> {
+    There(&'a Node),
+    Missing,
+    Unreadable,
+}
+
+#[derive(Clone)]
+pub(super) struct Place<'a> {
+    content: Content<'a>,
+    path: String,
+    /// Of the nearest value that is there.
+    mark: Mark,
+    faults: &'a Faults<'a>,
+}
+
+impl<'a> Place<'a> {
+    pub fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
+        Self { content: Content::There(node), path: String::new(), mark: node.mark, faults }
+    }
+    fn child(&self, node: Option<&'a Node>, path: String) -> Self {
+        let given = node.filter(|node| !matches!(node.value, Value::Null));
+        let mark = node.map_or(self.mark, |node| node.mark);
+        Self { content: given.map_or(Content::Missing, Content::There), path, mark, faults: self.faults }
+    }
+    pub fn fault(&self, message: impl Into<String>) {
+        self.faults.push(Trouble::new(message).at(self.mark).below(&self.path));
+    }
+    fn expected(&self, what: &str) {
+        match self.content {
+            Content::There(node) => self.fault(format!("expected {what}, found {}", describe(node))),
+            Content::Missing => self.fault(format!("missing; expected {what}")),
+            Content::Unreadable => {}
+        }
+    }
+    fn node(&self) -> Option<&'a Node> {
+        if let Content::There(node) = self.content { Some(node) } else { None }
+    }
+    fn value(&self) -> Option<&'a Value> {
+        self.node().map(|node| &node.value)
+    }
+    /// The place if there is something other than null.
+    pub fn given(&self) -> Option<&Self> {
+        self.node().map(|_| self)
+    }
+    /// The keys of a map; none for anything else.
+    pub fn keys(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.node().map(Node::entries).unwrap_or_default().iter().map(|(key, _, _)| key.as_str())
+    }
+    /// The same place, checked to be a map with no other keys than `allowed`.
+    pub fn map(self, allowed: &[&str]) -> Self {
+        let place = self.open_map(allowed);
+        for (key, mark, _) in place.node().map(Node::entries).unwrap_or_default() {
+            if !allowed.contains(&key.as_str()) {
+                place.faults.push(Trouble::unknown_key(key, allowed).at(*mark).below(&join(&place.path, key)));
+            }
+        }
+        place
+    }
+    /// The same place, checked to be a map; it may have other keys than the `known` ones.
+    pub fn open_map(self, known: &[&str]) -> Self {
+        if let Some(Value::Map(_)) = self.value() {
+            return self;
+        }
+        self.expected(&format!("a map with the keys {}", known.join(", ")));
+        Self { content: Content::Unreadable, ..self }
+    }
+    pub fn get(&self, key: &str) -> Self {
+        let path = join(&self.path, key);
+        match self.content {
+            Content::There(node) if matches!(node.value, Value::Map(_)) => self.child(node.get(key), path),
+            Content::There(_) | Content::Unreadable => Self { content: Content::Unreadable, path, ..self.clone() },
+            Content::Missing => self.child(None, path),
+        }
+    }
+    pub fn items(&self) -> Vec<Self> {
+        match self.value() {
+            Some(Value::List(items)) => {
+                items.iter().enumerate().map(|(i, node)| self.child(Some(node), format!("{}[{i}]", self.path))).collect()
+            }
+            _ => {
+                self.expected("a list");
+                Vec::new()
+            }
+        }
+    }
+    /// A list with one entry per joint; one fault when the count differs.
+    pub fn per_joint(&self, joints: usize) -> Vec<Self> {
+        let items = self.items();
+        if matches!(self.value(), Some(Value::List(_))) && items.len() != joints {
+            self.fault(format!("{} entries for {joints} joints; expected one per joint", items.len()));
+        }
+        items
+    }
+    pub fn number(&self) -> f64 {
+        match self.value() {
+            Some(Value::Integer(value)) => *value as f64,
+            Some(Value::Float(value)) if value.is_finite() => *value,
+            _ => {
+                self.expected("a finite number");
+                f64::NAN
+            }
+        }
+    }
+    /// A mass, kg.
+    pub fn not_negative(&self) -> f64 {
+        let number = self.number();
+        if number < 0.0 {
+            self.fault(format!("expected a mass in kg, not less than 0, found {number}"));
+        }
+        number
+    }
+    pub fn vector<const N: usize>(&self) -> [f64; N] {
+        if let Some(Value::List(items)) = self.value()
+            && items.len() == N
+        {
+            let mut vector = [f64::NAN; N];
+            for (slot, item) in vector.iter_mut().zip(self.items()) {
+                *slot = item.number();
+            }
+            return vector;
+        }
+        self.expected(&format!("a list of {N} numbers"));
+        [f64::NAN; N]
+    }
+    pub fn text(&self) -> String {
+        match self.value() {
+            // Names like 7 are texts that YAML takes for numbers.
+            Some(Value::Text(_) | Value::Integer(_) | Value::Float(_)) => self.node().and_then(Node::text).unwrap_or_default(),
+            _ => {
+                self.expected("a text");
+                String::new()
+            }
+        }
+    }
+    /// The one of `allowed` that is named here.
+    pub fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
+        let list = allowed.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let Some(Value::Text(text)) = self.value() else {
+            self.expected(&format!("one of {list}"));
+            return None;
+        };
+        let found = allowed.iter().find(|(name, _)| name == text).map(|(_, value)| *value);
+        if found.is_none() {
+            // No nearest name: for units it would mislead (`cm` is not `m`).
+            self.fault(format!("unknown value `{text}` (allowed: {list})"));
+        }
+        found
+    }
+    /// A joint counted from 1, as its index.
+    pub fn joint(&self, joints: usize) -> Option<usize> {
+        let value = self.number();
+        if value.is_nan() {
+            return None;
+        }
+        let found = (1..=joints).find(|j| *j as f64 == value);
+        if found.is_none() {
+            self.fault(format!("there is no joint {value}; expected a number from 1 to {joints}"));
+        }
+        found.map(|j| j - 1)
+    }
+}
+
+fn describe(node: &Node) -> String {
+    match &node.value {
+        Value::Null => "nothing".into(),
+        Value::Text(text) => format!("the text `{text}`"),
+        Value::List(items) => format!("a list of {}", items.len()),
+        Value::Map(_) => "a map".into(),
+        Value::Bool(_) | Value::Integer(_) | Value::Float(_) => format!("`{}`", node.text().unwrap_or_default()),
+    }
+}
