@@ -1,6 +1,7 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
 mod check;
+mod poses;
 mod run;
 mod schema;
 mod surroundings;
@@ -24,6 +25,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Check(check::CheckArguments),
+    Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
 }
 
@@ -44,6 +46,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
     let result = match parsed.verb {
         Verb::Run(verb) => run::main(&verb, &arguments),
         Verb::Check(verb) => check::main(&verb),
+        Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
     };
     match result {

@@ -2,6 +2,7 @@
 
 mod align;
 mod covariance;
+pub mod choose;
 mod factor;
 mod fit;
 mod levenberg;

@@ -12,6 +12,7 @@ mod layers;
 mod learn;
 mod network;
 mod pipelines;
+mod poses;
 mod readme;
 mod report;
 mod resume;

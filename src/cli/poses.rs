@@ -1,0 +1,246 @@
+//! `calib poses`: which poses to measure, before anything is measured.
+
+mod input;
+mod output;
+mod show;
+
+use super::{emit, emit_json};
+use crate::effect::{EFFECTS, EffectStack, Load, Setting, entry};
+use crate::error::{Error, Fault, Result, nearest};
+use crate::estimate::Model;
+use crate::estimate::choose::{Aim, Proposal, Score, Site, Wish, propose};
+use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Pose;
+use crate::units::Unit;
+use clap::Args;
+use input::Ranges;
+use nalgebra::Vector3;
+use std::path::PathBuf;
+
+/// Propose poses to measure: the best for all parameters together, or for telling two effects apart.
+///
+/// Random poses inside the limits, the box and above the floor are improved by exchange until no other tells more; parameters
+/// that position data cannot tell do not count. Beside the result stand 200 random sets of as many poses, and a recorded one.
+///
+/// SELF-COLLISION IS NOT CHECKED, nor collision with the cell: drive the poses slowly first. The way between them is short but
+/// not planned. A direction +1 means: the joint's last move goes upwards.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct PosesArguments {
+    /// The robot file: calib's YAML, or a practice robot.json
+    #[arg(value_name = "ROBOT")]
+    robot: PathBuf,
+    /// The URDF that the robot file refers to
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+    /// Poses to propose
+    #[arg(long, short = 'n', value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=2000))]
+    count: u32,
+    /// Effects to tell, by canonical name [default: all that `identify` estimates]
+    #[arg(long, value_name = "EFFECT,..", value_delimiter = ',')]
+    effects: Vec<String>,
+    /// Chooses for telling these two effects apart instead
+    #[arg(long, num_args = 2, value_names = ["EFFECT", "RIVAL"])]
+    separate: Vec<String>,
+    /// Joint ranges instead of the robot file's, deg (mm for a prismatic joint)
+    #[arg(long, value_name = "MIN:MAX,..", allow_hyphen_values = true, value_parser = input::ranges)]
+    limits: Option<Ranges>,
+    /// Part of each joint's travel left free at either end for the move of approach, percent
+    #[arg(long, value_name = "PERCENT", default_value_t = 2.0)]
+    margin: f64,
+    /// Where the measured point may be in the base frame, mm; a side left empty is free, e.g. 500:2500,-1000:1000,300:
+    #[arg(long = "box", value_name = "XMIN:XMAX,YMIN:YMAX,ZMIN:ZMAX", allow_hyphen_values = true, value_parser = input::ranges)]
+    bounds: Option<Ranges>,
+    /// Height in the base frame below which neither the measured point nor a link's centre of mass may be, mm
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    floor: Option<f64>,
+    /// Payloads at hand, kg; poses are grouped by them
+    #[arg(long, value_name = "KG,..", value_delimiter = ',', default_value = "0")]
+    payload: Vec<f64>,
+    /// Standard deviation per axis of a measured point, instrument and repeatability, mm
+    #[arg(long, value_name = "MM", default_value_t = 0.02)]
+    sigma: f64,
+    /// Random poses to choose from
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    candidates: u32,
+    /// The same seed gives the same poses
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Compares with a recording: a `recording` table of calib (Parquet)
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
+    /// Writes the poses to this file, .csv or .parquet
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Prints one JSON document on stdout, with the poses
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "Examples:
+  calib poses robot.yaml --count 50 --payload 0,210 --floor 200 --out poses.csv
+  calib poses robot.yaml --box 500:2500,-1200:1200,300:2400 --against .calib/tables/cell7/ingest.recording.parquet
+  calib poses robot.yaml --separate reduction_ratio joint_compliance --payload 0,105,210 --count 30 --out more.csv
+  calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
+
+/// What was proposed and what for; made once, shown as text, JSON or file.
+struct Work<'a> {
+    arguments: &'a PosesArguments,
+    robot: RobotDescription,
+    ranges: Vec<[f64; 2]>,
+    effects: Vec<&'static str>,
+    /// Effects left out, with the reason.
+    left_out: Vec<(&'static str, String)>,
+    /// Names and units of the stack's parameters.
+    parameters: Vec<(String, Unit)>,
+    proposal: Proposal,
+    recorded: Option<Score>,
+}
+
+pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
+    check(arguments)?;
+    let imported = input::robot(&arguments.robot, arguments.urdf.as_deref())?;
+    let place = arguments.robot.display().to_string();
+    let site = site(arguments, &imported, &place)?;
+    let robot = RobotModel::new(imported.clone());
+    let (effects, left_out) = effects(arguments, &robot, &site);
+    let model = || model(&robot, &effects);
+    let aim = match &arguments.separate[..] {
+        [a, b] => Aim::Separation([a.clone(), b.clone()]),
+        _ => Aim::Information,
+    };
+    for name in &arguments.separate {
+        if let Some((_, reason)) = left_out.iter().find(|(left, _)| left == name) {
+            return Err(Error::spec("--separate", format!("`{name}` cannot be told: {reason}")));
+        }
+    }
+    let sigma = arguments.sigma * 1e-3;
+    let wish =
+        Wish { aim, count: arguments.count as usize, candidates: arguments.candidates as usize, sigma, seed: arguments.seed };
+    let recording = arguments.against.as_ref().map(|path| input::recording(path, &imported, sigma)).transpose()?;
+    let proposal = propose(model(), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
+    let recorded = recording.map(|data| proposal.sight.score(&model(), &data, &proposal.workspace));
+    let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
+    let result = Work { arguments, robot: imported, ranges: site.ranges, effects, left_out, parameters, proposal, recorded };
+    if let Some(path) = &arguments.out {
+        output::write(path, &result)?;
+    }
+    if arguments.json { emit_json(&show::document(&result)) } else { emit(&show::text(&result)) }
+}
+
+/// Everything that can be said without a file, all at once.
+fn check(arguments: &PosesArguments) -> Result<()> {
+    let mut faults = Vec::new();
+    for (option, names) in [("--effects", &arguments.effects), ("--separate", &arguments.separate)] {
+        for name in names.iter().filter(|name| entry(name).is_none()) {
+            let known: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+            let hint = nearest(name, known.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+            faults.push(Fault::new(option, format!("unknown effect `{name}`; {hint}allowed: {}", known.join(", "))));
+        }
+    }
+    if let [a, b] = &arguments.separate[..] {
+        if a == b {
+            faults.push(Fault::new("--separate", format!("expected two different effects, found `{a}` twice")));
+        }
+        let chosen = |name: &String| arguments.effects.is_empty() || arguments.effects.contains(name);
+        for name in [a, b].into_iter().filter(|name| !chosen(name)) {
+            faults.push(Fault::new("--effects", format!("`{name}` is to be separated but is not among them")));
+        }
+    }
+    for mass in arguments.payload.iter().filter(|mass| !(mass.is_finite() && **mass >= 0.0)) {
+        faults.push(Fault::new("--payload", format!("expected masses of 0 or more, kg, found {mass}")));
+    }
+    if !(arguments.sigma.is_finite() && arguments.sigma > 0.0) {
+        faults.push(Fault::new("--sigma", format!("expected a length above 0, mm, found {}", arguments.sigma)));
+    }
+    if !(0.0..=45.0).contains(&arguments.margin) {
+        faults.push(Fault::new("--margin", format!("expected 0 to 45 percent, found {}", arguments.margin)));
+    }
+    if let Some(bounds) = arguments.bounds.as_ref().filter(|bounds| bounds.0.len() != 3) {
+        faults.push(Fault::new("--box", format!("expected three ranges, x, y, z, found {}", bounds.0.len())));
+    }
+    if let Some(path) = &arguments.out {
+        faults.extend(output::fault(path).map(|fault| Fault::new("--out", fault)));
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+}
+
+fn site(arguments: &PosesArguments, robot: &RobotDescription, place: &str) -> Result<Site> {
+    let unit = |kind| if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
+    let mut ranges = Vec::new();
+    let mut faults = Vec::new();
+    let given = arguments.limits.as_ref().map(|limits| &limits.0);
+    if let Some(given) = given.filter(|given| given.len() != robot.joints.len()) {
+        return Err(Error::spec("--limits", format!("has {} ranges, the robot {} joints", given.len(), robot.joints.len())));
+    }
+    for (index, joint) in robot.joints.iter().enumerate() {
+        let limits = match given.and_then(|given| given.get(index)) {
+            Some(range) => Some(range.map(|value| unit(joint.kind).to_si(value))),
+            None => joint.limits,
+        };
+        match limits {
+            Some([lower, upper]) if lower.is_finite() && upper.is_finite() => {
+                let free = 1e-2 * arguments.margin * (upper - lower);
+                ranges.push([lower + free, upper - free]);
+            }
+            _ => faults.push(Fault::new(
+                place,
+                format!(
+                    "joint {} has no limits; put them into the robot file, or give --limits with a range for every joint",
+                    index + 1
+                ),
+            )),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(Error::Spec(faults));
+    }
+    let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 3];
+    if let Some(given) = &arguments.bounds {
+        for (bound, range) in bounds.iter_mut().zip(&given.0) {
+            *bound = range.map(|value| Unit::Millimetre.to_si(value));
+        }
+    }
+    let mut payloads = arguments.payload.clone();
+    payloads.sort_by(f64::total_cmp);
+    payloads.dedup();
+    let floor = arguments.floor.map_or(f64::NEG_INFINITY, |height| Unit::Millimetre.to_si(height));
+    Ok(Site { ranges, bounds, floor, payloads })
+}
+
+type Named = (Vec<&'static str>, Vec<(&'static str, String)>);
+
+/// The chosen effects that poses can tell of this robot, and those left out.
+fn effects(arguments: &PosesArguments, robot: &RobotModel, site: &Site) -> Named {
+    let heaviest = site.payloads.iter().copied().fold(0.0, f64::max);
+    let data = Measurements {
+        joints: robot.joints(),
+        q: vec![0.0; robot.joints()],
+        position: vec![Vector3::zeros()],
+        sigma: vec![Vector3::zeros()],
+        payload: vec![heaviest],
+        current: None,
+    };
+    let setting = setting();
+    let (mut kept, mut left) = (Vec::new(), Vec::new());
+    for entry in EFFECTS {
+        if arguments.effects.is_empty() || arguments.effects.iter().any(|name| name == entry.name) {
+            match (entry.make)(&setting).missing(robot, &data) {
+                Some(reason) => left.push((entry.name, reason)),
+                None => kept.push(entry.name),
+            }
+        }
+    }
+    (kept, left)
+}
+
+fn setting() -> Setting {
+    Setting { base: Pose::identity(), load: Load::GravityTorque }
+}
+
+fn model(robot: &RobotModel, effects: &[&str]) -> Model {
+    let setting = setting();
+    let made = effects.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting)).collect();
+    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
+}

@@ -1,0 +1,221 @@
+//! Which poses to measure: D-optimal for the parameters that poses can tell, or T-optimal for telling two effects apart.
+//!
+//! Random allowed poses, the best of them by Fedorov's exchange, then exchanges with neighbours of what was chosen. Both aims
+//! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
+//! fitted, ln |M| - ln |M without the effect|. Only seen parameters count, so redundant ones change nothing.
+
+mod drive;
+mod exchange;
+mod sight;
+mod site;
+
+pub use sight::{Score, Sight};
+pub use site::Site;
+
+use super::model::Model;
+use crate::robot::Measurements;
+use exchange::{Criterion, Term};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+
+/// What the poses are for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Aim {
+    /// All seen parameters, as well as possible together.
+    Information,
+    /// Telling these two effects apart, whatever the others do.
+    Separation([String; 2]),
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Wish {
+    pub aim: Aim,
+    /// Poses to propose.
+    pub count: usize,
+    /// Random poses to start from; each is a candidate once a payload.
+    pub candidates: usize,
+    /// Standard deviation per axis of a measured point, m.
+    pub sigma: f64,
+    pub seed: u64,
+}
+
+/// Poses in the order of driving, and how good they are.
+pub struct Proposal {
+    /// Positions are the nominal robot's, in its base frame.
+    pub poses: Measurements,
+    /// Side from which each joint comes to rest, +1 or -1, row-major.
+    pub direction: Vec<f64>,
+    /// Least share, over the joints, of an error by direction of approach that no seen parameter imitates.
+    pub approach_seen: f64,
+    /// Parameters that poses can tell, last the effects to separate.
+    pub sight: Sight,
+    pub score: Score,
+    /// The same for random sets of as many poses.
+    pub random: Vec<Score>,
+    /// For each effect to separate: its non-centrality in units of the random sets' median, geometric mean over what is told apart.
+    pub separation: Vec<Separation>,
+    /// Poses spread over the workspace, for scores of other sets.
+    pub workspace: Measurements,
+}
+
+/// How well an effect is told from its rival.
+pub struct Separation {
+    pub effect: String,
+    pub rival: String,
+    /// Parameters that are told apart, with their standard deviation (SI) beside the rival: proposed, and median of random sets.
+    pub sigma: Vec<(usize, f64, f64)>,
+    /// Parameters that the rival and the others imitate at every allowed pose.
+    pub imitated: Vec<usize>,
+    /// Non-centrality over that of the median random set.
+    pub gain: f64,
+}
+
+/// Random sets to compare with.
+const RANDOM_SETS: usize = 200;
+/// Poses at which the prediction's uncertainty is stated.
+const WORKSPACE: usize = 500;
+/// Rounds of exchange with neighbours, each with smaller steps.
+const STEPS: [f64; 3] = [0.5, 0.2, 0.06];
+
+/// Proposes poses for a model; fails with a sentence when no such poses are possible.
+pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, String> {
+    let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
+    let workspace = site.draw(&model.robot, WORKSPACE.div_ceil(site.payloads.len()), wish.sigma, wish.seed ^ WORKSPACE as u64)?;
+    if drawn.rows() < 2 * wish.count {
+        return Err(format!("{} candidates are few for {} poses: take at least {}", drawn.rows(), wish.count, 20 * wish.count));
+    }
+    drawn.position = model.predict(&drawn);
+    let all: Vec<usize> = (0..model.stack.specs().len()).collect();
+    let orders: Vec<(f64, Vec<usize>)> = match &wish.aim {
+        Aim::Information => vec![(1.0, all)],
+        Aim::Separation([a, b]) => {
+            let (a, b) = (parameters(&model, a)?, parameters(&model, b)?);
+            let rest: Vec<usize> = all.into_iter().filter(|k| !a.contains(k) && !b.contains(k)).collect();
+            vec![(2.0, [&rest[..], &b, &a].concat()), (-1.0, [&rest[..], &b].concat()), (-1.0, [&rest[..], &a].concat())]
+        }
+    };
+    let sights: Vec<(f64, Sight)> = orders.iter().map(|(weight, order)| (*weight, Sight::of(&model, &drawn, order))).collect();
+    let Some((_, whole)) = sights.first() else { return Err("nothing to choose for".into()) };
+    check(wish, &sights, whole)?;
+    let terms = sights.iter().map(|(weight, sight)| Term::new(*weight, sight.clone(), &model, &drawn));
+    let criterion = Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidates do not tell the parameters apart")? };
+
+    let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
+    let mut poses = subset(&drawn, &chosen);
+    let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
+    for step in STEPS {
+        let pool = site.around(&model.robot, &poses, step, &mut draw);
+        let start: Vec<usize> = (0..wish.count).collect();
+        poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
+    }
+    let mut poses = subset(&poses, &drive::order(&poses, &site.ranges));
+    poses.position = model.predict(&poses);
+    let whole = whole.clone();
+    let (direction, approach_seen) = drive::approach(&model, &whole, &poses, wish.seed);
+
+    let sets: Vec<Measurements> = random_sets(&drawn, wish.count, wish.seed).iter().map(|rows| subset(&drawn, rows)).collect();
+    let random: Vec<Score> = sets.par_iter().map(|set| whole.score(&model, set, &workspace)).collect();
+    let score = whole.score(&model, &poses, &workspace);
+    let separation = match &wish.aim {
+        Aim::Information => Vec::new(),
+        Aim::Separation(names) => separations(&model, names, &drawn, &poses, &sets)?,
+    };
+    Ok(Proposal { poses, direction, approach_seen, sight: whole, score, random, separation, workspace })
+}
+
+/// Positions in the stack of an effect's parameters.
+fn parameters(model: &Model, name: &str) -> Result<Vec<usize>, String> {
+    let found = model.stack.effects().find(|(effect, _)| effect.name() == name);
+    found.map(|(_, range)| range.collect()).ok_or_else(|| format!("`{name}` is not among the effects of this model"))
+}
+
+fn check(wish: &Wish, sights: &[(f64, Sight)], whole: &Sight) -> Result<(), String> {
+    let parameters = whole.free().len();
+    if parameters == 0 {
+        return Err("no parameter of these effects shows at the allowed poses".into());
+    }
+    let least = parameters.div_ceil(3);
+    if wish.count < least {
+        return Err(format!(
+            "{} poses cannot tell {parameters} parameters: take at least {least}, better {parameters}",
+            wish.count
+        ));
+    }
+    if let Aim::Separation([a, b]) = &wish.aim {
+        for ((_, without), (effect, rival)) in sights.iter().skip(1).zip([(a, b), (b, a)]) {
+            if without.free().len() == parameters {
+                return Err(format!(
+                    "no allowed pose tells `{effect}` from `{rival}` and the other effects: more payloads, wider limits or fewer effects may"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn separations(
+    model: &Model,
+    [a, b]: &[String; 2],
+    drawn: &Measurements,
+    poses: &Measurements,
+    sets: &[Measurements],
+) -> Result<Vec<Separation>, String> {
+    let mut out = Vec::new();
+    for (effect, rival) in [(a, b), (b, a)] {
+        let (own, other) = (parameters(model, effect)?, parameters(model, rival)?);
+        let rest: Vec<usize> = (0..model.stack.specs().len()).filter(|k| !own.contains(k) && !other.contains(k)).collect();
+        let sight = Sight::of(model, drawn, &[&rest[..], &other, &own].concat());
+        let told: Vec<usize> = sight.free().iter().copied().filter(|k| own.contains(k)).collect();
+        let (log, sigma) = sight.remainder(model, poses, told.len());
+        let random: Vec<(f64, Vec<f64>)> = sets.par_iter().map(|set| sight.remainder(model, set, told.len())).collect();
+        let usual = median(random.iter().map(|(log, _)| *log).collect());
+        let sigma = told
+            .iter()
+            .zip(&sigma)
+            .enumerate()
+            .map(|(i, (parameter, sigma))| (*parameter, *sigma, median(random.iter().map(|(_, all)| all[i]).collect())));
+        out.push(Separation {
+            effect: effect.clone(),
+            rival: rival.clone(),
+            sigma: sigma.collect(),
+            imitated: own.iter().copied().filter(|k| !told.contains(k)).collect(),
+            gain: ((log - usual) / told.len().max(1) as f64).exp(),
+        });
+    }
+    Ok(out)
+}
+
+/// Rows of a recording as one of their own.
+pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
+    Measurements {
+        joints: data.joints,
+        q: rows.iter().flat_map(|row| data.q(*row).iter().copied()).collect(),
+        position: rows.iter().map(|row| data.position[*row]).collect(),
+        sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
+        payload: rows.iter().map(|row| data.payload[*row]).collect(),
+        current: None,
+    }
+}
+
+/// Sets of `count` different candidates, drawn evenly.
+fn random_sets(drawn: &Measurements, count: usize, seed: u64) -> Vec<Vec<usize>> {
+    let mut draw = ChaCha8Rng::seed_from_u64(seed.wrapping_add(2));
+    let set = |_| {
+        let mut rows: Vec<usize> = (0..drawn.rows()).collect();
+        for i in 0..count {
+            let other = draw.random_range(i..rows.len());
+            rows.swap(i, other);
+        }
+        rows.truncate(count);
+        rows
+    };
+    (0..RANDOM_SETS).map(set).collect()
+}
+
+/// The middle value, NaN of none.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
