@@ -9,6 +9,7 @@ use crate::robot::Measurements;
 use nalgebra::Vector3;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
+#[derive(Clone, Copy)]
 pub struct FitOptions<'a> {
     /// Rows of the recording to fit.
     pub rows: &'a [usize],

@@ -10,6 +10,7 @@ mod model;
 pub mod network;
 mod observe;
 mod problem;
+mod screen;
 pub mod swarm;
 pub mod threads;
 
@@ -19,3 +20,4 @@ pub use fit::{Fate, FitOptions, Fitted, fit};
 pub use levenberg::{Iteration, Stop};
 pub use model::Model;
 pub use observe::Visibility;
+pub use screen::{Kind, Screening, Suspect, fit_screened};

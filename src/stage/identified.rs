@@ -1,10 +1,10 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::estimate::{Fitted, Model};
+use crate::estimate::{Fitted, Model, Screening, Suspect};
 use crate::robot::{Measurements, RobotModel};
-use crate::stage::Context;
-use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split};
+use crate::stage::{Context, screened};
+use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,7 @@ crate::stage::writes! {
         fit: Fit,
         observability: Observability,
         prediction: Prediction,
+        suspects: Suspects,
     }
 }
 
@@ -43,8 +44,11 @@ pub struct Fitting<'a> {
     pub data: &'a Measurements,
     pub recording: &'a Recording,
     pub split: &'a Split,
+    /// Rows to fit, before any was set aside.
+    pub asked: &'a [usize],
     /// Rows that were fitted.
     pub rows: &'a [usize],
+    pub screening: &'a Screening,
     /// Parameters that the user holds.
     pub held: &'a [usize],
     pub earlier: Option<&'a Parameters>,
@@ -59,17 +63,22 @@ impl Identified {
     pub fn of(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) -> Self {
         let step = context.id;
         let mut held_out: Vec<bool> = fitting.seen_before.iter().map(|seen| !seen).collect();
-        for row in fitting.rows {
+        for row in fitting.asked {
             held_out[*row] = false;
         }
         // Of a fit on top of another only the last parameters' uncertainty is known, which would flatter.
         let covariance = fitted.covariance.as_ref().filter(|_| fitting.earlier.is_none());
         note(context, model, fitted, fitting);
+        screened::note(context, fitting.screening, fitting.recording);
+        let Screening { suspects, .. } = fitting.screening;
+        let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, fitting.geometry),
-            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance),
+            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
+                .with_suspects(aside),
+            suspects: Suspects::of(step, fitting.screening, fitting.recording, fitting.split),
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::error::{Fault, Result, nearest};
 use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
 use schemars::JsonSchema;
@@ -28,11 +29,17 @@ pub struct Identify {
     /// What winds the joints up: gravity torque of the robot's masses, or motor currents.
     #[serde(default)]
     pub load: LoadSetting,
+    /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
+    #[serde(default = "yes")]
+    pub screen: bool,
     /// The tracker's noise.
     #[serde(default)]
     pub tracker: Instrument,
 }
 
+fn yes() -> bool {
+    true
+}
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
@@ -100,12 +107,15 @@ impl Stage for Identify {
                 context.services.warn(format!("hold: `{pattern}` matches no parameter of this model"));
             }
         }
-        let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+        let options = FitOptions { rows: &rows, candidates: &candidates };
+        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
             split: &reads.split,
-            rows: &rows,
+            asked: &rows,
+            rows: &screening.kept,
+            screening: &screening,
             held: &held,
             earlier: None,
             seen_before: &vec![false; data.rows()],

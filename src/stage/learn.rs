@@ -248,10 +248,11 @@ fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> V
     let mut errors: Vec<f64> = rows.iter().map(|row| prediction.0[*row].error_mm).collect();
     errors.sort_by(f64::total_cmp);
     let limit = FAR * errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY);
-    let near: Vec<usize> = rows.iter().copied().filter(|row| prediction.0[*row].error_mm <= limit).collect();
+    let near: Vec<usize> =
+        rows.iter().copied().filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect).collect();
     if near.len() < rows.len() {
         context.services.note(format!(
-            "{} of {} rows are not learnt from: their error is over {limit:.3} mm, {FAR} times the median",
+            "{} of {} rows are not learnt from: their error is over {limit:.3} mm, {FAR} times the median, or they are suspects",
             rows.len() - near.len(),
             rows.len()
         ));

@@ -7,6 +7,7 @@ pub mod learn;
 mod registry;
 mod report;
 mod robot;
+mod screened;
 mod simulate;
 pub mod split;
 mod stiffness;

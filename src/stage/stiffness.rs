@@ -1,9 +1,10 @@
 //! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
 use crate::error::{Error, Fault, Result};
-use crate::estimate::{FitOptions, fit};
+use crate::estimate::FitOptions;
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
 use crate::table::{Parameters, Prediction, Recording, Robot, Split};
 use schemars::JsonSchema;
@@ -21,9 +22,16 @@ pub struct Stiffness {
     /// Joints to estimate, from 1; all that the data see if empty.
     #[serde(default)]
     pub joints: Vec<usize>,
+    /// Whether rows that no smooth model can follow are set aside and listed, as in `identify`.
+    #[serde(default = "yes")]
+    pub screen: bool,
     /// The tracker's noise.
     #[serde(default)]
     pub tracker: Instrument,
+}
+
+fn yes() -> bool {
+    true
 }
 
 crate::stage::reads! {
@@ -75,14 +83,17 @@ impl Stage for Stiffness {
         }
         let (candidates, others): (Vec<usize>, Vec<usize>) = (0..specs.len())
             .partition(|k| specs[*k].name.starts_with(EFFECT) && (wanted.is_empty() || wanted.contains(&specs[*k].name)));
-        let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+        let options = FitOptions { rows: &rows, candidates: &candidates };
+        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
         let held: Vec<usize> = others.into_iter().filter(|k| model.stack.specs()[*k].name.starts_with(EFFECT)).collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
             split: &reads.split,
-            rows: &rows,
+            asked: &rows,
+            rows: &screening.kept,
+            screening: &screening,
             held: &held,
             earlier: Some(&reads.parameters),
             seen_before: &seen_before,

@@ -27,6 +27,7 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/robot.json"),
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
+    include_str!("../../schemas/suspects.json"),
     include_str!("../../schemas/training.json"),
     include_str!("../../schemas/truth.json"),
 ];

@@ -54,6 +54,7 @@ mod rejected;
 mod robot;
 mod split;
 mod statistics;
+mod suspects;
 mod training;
 mod truth;
 
@@ -69,6 +70,8 @@ pub use rejected::{Rejected, RejectedRow};
 pub use robot::{Robot, RobotRow};
 pub use split::{Split, SplitRow};
 pub use statistics::{Statistics, StatisticsRow};
+pub(crate) use suspects::slip;
+pub use suspects::{Suspects, SuspectsRow};
 pub use training::{Training, TrainingRow};
 pub use truth::{Truth, TruthRow};
 
@@ -86,6 +89,7 @@ pub const TABLES: &[&str] = &[
     Robot::KIND,
     Split::KIND,
     Statistics::KIND,
+    Suspects::KIND,
     Training::KIND,
     Truth::KIND,
 ];

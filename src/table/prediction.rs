@@ -8,8 +8,10 @@ crate::table::rows! { "prediction",
         set: String,
         /// The step whose model this is, e.g. `nominal`, `geometry`.
         step: String,
-        /// True where neither this step nor an earlier one was fitted to this row.
+        /// True where neither this step nor an earlier one was fitted to this row, nor looked at it to set it aside.
         held_out: bool,
+        /// True where the screen of this step took the row for a mistake of the recording.
+        suspect: bool,
         x_mm: f64,
         y_mm: f64,
         z_mm: f64,
@@ -30,7 +32,8 @@ use crate::robot::Measurements;
 use crate::table::{Recording, Split};
 
 impl Prediction {
-    /// The residuals of every row under a model. `held_out[row]` as in the column; `covariance` where the step estimated the whole model.
+    /// The residuals of every row under a model; no row is a suspect yet. `held_out[row]` as in the column; `covariance` where the
+    /// step estimated the whole model.
     pub fn of(
         step: &str,
         model: &Model,
@@ -51,6 +54,7 @@ impl Prediction {
                 set: split.0[row].set.clone(),
                 step: step.into(),
                 held_out: held_out[row],
+                suspect: false,
                 x_mm: point.x,
                 y_mm: point.y,
                 z_mm: point.z,
@@ -63,5 +67,13 @@ impl Prediction {
             }
         });
         Self(rows.collect())
+    }
+
+    /// The same with the rows marked that a screen set aside.
+    pub fn with_suspects(mut self, suspects: impl Iterator<Item = usize>) -> Self {
+        for row in suspects {
+            self.0[row].suspect = true;
+        }
+        self
     }
 }

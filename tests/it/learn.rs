@@ -85,6 +85,7 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
             set: set.into(),
             step: "geometry".into(),
             held_out: row % 5 != 0,
+            suspect: false,
             x_mm: 1000.0 - dx_mm,
             y_mm: 1000.0 - dy_mm,
             z_mm: 1000.0 - dz_mm,

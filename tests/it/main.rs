@@ -19,6 +19,7 @@ mod resume;
 mod robot;
 mod robot_faults;
 mod schema;
+mod screen;
 mod split;
 mod sr210d;
 mod store;

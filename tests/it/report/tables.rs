@@ -13,6 +13,7 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         set: set.into(),
         step: step.into(),
         held_out,
+        suspect: false,
         x_mm: 1000.0 + 10.0 * sequence as f64,
         y_mm: -500.0,
         z_mm: 800.0,

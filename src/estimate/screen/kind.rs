@@ -1,0 +1,194 @@
+//! What a row that stands out is: exchanged, mislabelled, shifted, in another unit, a zero, part of an event, or none of these.
+
+use super::distance::Standing;
+use crate::robot::Measurements;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Why a row stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// The partner's joints fit this row's point and the other way round.
+    Exchanged,
+    /// The point belongs to the partner's joints, and no simple exchange explains it.
+    Mislabelled,
+    /// Three or more consecutive rows whose points belong to the joints this many rows further on.
+    ShiftedBlock(i64),
+    /// The point is this many times too far from the tracker.
+    UnitSlip(f64),
+    /// The point is the tracker's origin: what a lost beam leaves.
+    Zero,
+    /// None of the others.
+    Outlier,
+    /// One of several consecutive rows that stand out alike: something happened, and the model does not know it.
+    Event,
+}
+
+/// m, cm, inch and foot for mm, and the other way round.
+const SLIPS: [f64; 10] = [1000.0, 1e-3, 25.4, 1.0 / 25.4, 100.0, 0.01, 10.0, 0.1, 304.8, 1.0 / 304.8];
+/// A slipped point agrees to this share of its distance: far closer than chance, far wider than rounding in the wrong unit.
+const SLIP_TOLERANCE: f64 = 1e-3;
+/// Closer to the origin than this share of the predicted distance is zero.
+const ZERO: f64 = 1e-4;
+/// A point belongs to other joints only if those fit it this many times better than its own.
+const BETTER: f64 = 4.0;
+/// Of all rows whose joints fit a point, so many nearest in the recording are looked at: enough for any number of repeats.
+const CANDIDATES: usize = 64;
+/// Rows in a row that make a shifted block or an event.
+const RUN: usize = 3;
+/// A run of this length is no coincidence of outliers even where every tenth row is one.
+const LONG_RUN: usize = 6;
+/// A shorter run is an event only if its rows stand out alike: largest over smallest residual.
+const ALIKE: f64 = 5.0;
+
+/// Names every row in `flagged` (ascending), with its partner. Points are matched within `limit` standard deviations.
+pub(super) fn name(
+    data: &Measurements,
+    standings: &[Standing],
+    flagged: &[usize],
+    limit: f64,
+) -> Vec<(usize, Kind, Option<usize>)> {
+    let mut kinds: BTreeMap<usize, (Kind, Option<usize>)> = BTreeMap::new();
+    for &row in flagged {
+        if let Some(kind) = misread(&data.position[row], &standings[row].predicted, SLIP_TOLERANCE) {
+            kinds.insert(row, (kind, None));
+        }
+    }
+    let index = Index::new(standings);
+    let moved: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
+    let fits: BTreeMap<usize, Vec<(usize, f64)>> =
+        moved.iter().map(|row| (*row, index.fits(data, standings, *row, limit))).collect();
+    exchange(&fits, &mut kinds);
+    shift(&fits, &mut kinds);
+    for (row, candidates) in &fits {
+        let nearest = candidates.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        if let (false, Some((partner, _))) = (kinds.contains_key(row), nearest) {
+            kinds.insert(*row, (Kind::Mislabelled, Some(*partner)));
+        }
+    }
+    let unexplained: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
+    for run in runs(&unexplained) {
+        let kind = if is_event(run, standings) { Kind::Event } else { Kind::Outlier };
+        kinds.extend(run.iter().map(|row| (*row, (kind, None))));
+    }
+    kinds.into_iter().map(|(row, (kind, partner))| (row, kind, partner)).collect()
+}
+
+/// A zero, or a point that a change of unit brings to where it was predicted, to a share `tolerance` of its distance.
+pub(super) fn misread(measured: &Vector3<f64>, predicted: &Vector3<f64>, tolerance: f64) -> Option<Kind> {
+    let distance = predicted.norm();
+    let slip = SLIPS.iter().find(|factor| (measured / **factor - predicted).norm() < tolerance * distance);
+    match slip {
+        Some(factor) => Some(Kind::UnitSlip(*factor)),
+        None => (measured.norm() < ZERO * distance).then_some(Kind::Zero),
+    }
+}
+
+/// Predicted points in order of x, so that near ones are found without looking at all.
+struct Index {
+    by_x: Vec<(f64, usize)>,
+}
+
+impl Index {
+    fn new(standings: &[Standing]) -> Self {
+        let mut by_x: Vec<(f64, usize)> =
+            standings.iter().enumerate().map(|(row, standing)| (standing.predicted.x, row)).collect();
+        by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Self { by_x }
+    }
+
+    /// Rows whose joints fit the point of `row` far better than its own, with their distance (m).
+    fn fits(&self, data: &Measurements, standings: &[Standing], row: usize, limit: f64) -> Vec<(usize, f64)> {
+        let point = data.position[row];
+        let own = &standings[row];
+        let typical = median_sigma(standings, row);
+        let reach = (limit * typical * 3f64.sqrt()).min(own.residual.norm() / BETTER);
+        let start = self.by_x.partition_point(|(x, _)| *x < point.x - reach);
+        let slab = self.by_x[start..].iter().take_while(|(x, _)| *x <= point.x + reach);
+        let mut found: Vec<(usize, f64)> = slab
+            .map(|(_, other)| (*other, (point - standings[*other].predicted).norm()))
+            .filter(|(other, distance)| *other != row && *distance <= reach)
+            .collect();
+        found.sort_by_key(|(other, _)| (other.abs_diff(row), *other));
+        found.truncate(CANDIDATES);
+        found
+    }
+}
+
+/// The row's own standard deviation (m); its neighbour's where a wrong point makes it absurd.
+fn median_sigma(standings: &[Standing], row: usize) -> f64 {
+    let around = row.saturating_sub(2)..(row + 3).min(standings.len());
+    let mut sigmas: Vec<f64> = standings[around].iter().map(|standing| standing.sigma).collect();
+    sigmas.sort_by(f64::total_cmp);
+    sigmas[sigmas.len() / 2]
+}
+
+type Kinds = BTreeMap<usize, (Kind, Option<usize>)>;
+
+/// Pairs that fit each other's joints; the closest pairs first where repeats leave a choice.
+fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    for (&a, candidates) in fits {
+        for &(b, there) in candidates.iter().filter(|(b, _)| *b > a) {
+            if let Some((_, back)) = fits.get(&b).and_then(|other| other.iter().find(|(row, _)| *row == a)) {
+                pairs.push((there.hypot(*back), a, b));
+            }
+        }
+    }
+    pairs.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
+    for (_, a, b) in pairs {
+        if !kinds.contains_key(&a) && !kinds.contains_key(&b) {
+            kinds.insert(a, (Kind::Exchanged, Some(b)));
+            kinds.insert(b, (Kind::Exchanged, Some(a)));
+        }
+    }
+}
+
+/// Runs of rows whose points all belong to the joints the same number of rows away; a row at the end of a run that belongs to
+/// a row of it closes the circle.
+fn shift(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
+    let offsets = |row: usize| -> BTreeSet<i64> {
+        fits.get(&row).into_iter().flatten().map(|(other, _)| *other as i64 - row as i64).collect()
+    };
+    let rows: Vec<usize> = fits.keys().copied().filter(|row| !kinds.contains_key(row)).collect();
+    let mut at = 0;
+    while at < rows.len() {
+        let mut common = offsets(rows[at]);
+        let mut end = at + 1;
+        while end < rows.len() && rows[end] == rows[end - 1] + 1 {
+            let still: BTreeSet<i64> = common.intersection(&offsets(rows[end])).copied().collect();
+            if still.is_empty() {
+                break;
+            }
+            common = still;
+            end += 1;
+        }
+        let (first, last) = (rows[at], rows[end - 1]);
+        if end - at >= RUN
+            && let Some(offset) = common.into_iter().min_by_key(|offset| (offset.abs(), *offset))
+        {
+            let to = |row: usize| usize::try_from(row as i64 + offset).ok();
+            for &row in &rows[at..end] {
+                kinds.insert(row, (Kind::ShiftedBlock(offset), to(row)));
+            }
+            for row in [first.wrapping_sub(1), last + 1] {
+                let inside = fits.get(&row).and_then(|found| found.iter().find(|(other, _)| (first..=last).contains(other)));
+                if let (false, Some((partner, _))) = (kinds.contains_key(&row), inside) {
+                    kinds.insert(row, (Kind::ShiftedBlock(offset), Some(*partner)));
+                }
+            }
+        }
+        at = end;
+    }
+}
+
+/// Consecutive rows, together.
+fn runs(rows: &[usize]) -> impl Iterator<Item = &[usize]> {
+    rows.chunk_by(|a, b| a + 1 == *b)
+}
+
+fn is_event(run: &[usize], standings: &[Standing]) -> bool {
+    let sizes = run.iter().map(|row| standings[*row].residual.norm());
+    let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| (least.min(size), most.max(size)));
+    run.len() >= LONG_RUN || run.len() >= RUN && most <= ALIKE * least
+}

@@ -1,0 +1,175 @@
+//! Rows that no smooth model can follow: found by leaving each out, named by what explains them, set aside, and listed.
+//!
+//! Only rows far outside the bulk count, whatever the bulk is made of: noise with heavy tails or physics that the model lacks.
+//! Where too many rows stand out, or several in a row do, it is the model that is wrong, and the rows are kept.
+
+mod distance;
+mod kind;
+
+pub use kind::Kind;
+
+use super::fit::{Fate, FitOptions, Fitted, fit};
+use super::model::Model;
+use super::problem::Problem;
+use crate::robot::Measurements;
+use distance::{Standing, leave_one_out};
+use std::collections::BTreeSet;
+
+/// A row that does not belong to the rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suspect {
+    /// Row of the recording, from 0.
+    pub row: usize,
+    pub kind: Kind,
+    /// The row whose joints put the tool where this row was measured.
+    pub partner: Option<usize>,
+    /// Distance of the measured from the predicted point, m.
+    pub size: f64,
+    /// The same, leave-one-out, in standard deviations of the row's own set.
+    pub statistic: f64,
+}
+
+impl Suspect {
+    /// Whether the row still takes part in the fit: an event is the model's fault, not the row's.
+    pub fn used(&self) -> bool {
+        self.kind == Kind::Event
+    }
+}
+
+/// What a screen found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Screening {
+    /// Rows that were fitted.
+    pub kept: Vec<usize>,
+    /// In order of rows.
+    pub suspects: Vec<Suspect>,
+    /// Rows that stand far out, but too many of them to be mistakes: kept, and not listed.
+    pub crowd: usize,
+}
+
+/// Median of the squared length of three unit normals.
+const MEDIAN_CHI2_3: f64 = 2.366;
+/// Beyond this many standard deviations a row is out whatever the tails: Student's t with 3 degrees of freedom gets there
+/// four times in 10,000 rows.
+const GROSS: f64 = 20.0;
+/// The bulk ends at this quantile of the rows that are not gross ...
+const BULK: f64 = 0.98;
+/// ... and far outside begins this many times farther out: with normal noise at 9.4 standard deviations.
+const FAR: f64 = 3.0;
+/// With more than this share of unexplained rows, beyond what chance adds, the model is wrong and not the rows.
+const CROWD: f64 = 0.125;
+/// Among a crowd, only rows this many times the limit away are mistakes all the same.
+const BEYOND_CROWD: f64 = 10.0;
+/// A nominal robot puts its points right to this share of their distance from the tracker; units differ by far more.
+const NOMINAL_TOLERANCE: f64 = 0.05;
+/// Rounds in which a row may come back, since the first fit suffers from what it shall find. Later rows only go: that ends.
+const READMITTING: usize = 3;
+
+/// Fits as [`fit`] does, sets aside what no smooth model can follow among the rows to fit, and fits again until nothing changes.
+///
+/// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
+/// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes.
+pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions, set: &[usize]) -> (Fitted, Screening) {
+    let start = model.x.clone();
+    // Whole blocks may be in metres or zero: more than a robust loss can bear, and plain to see even from the nominal robot.
+    let predicted = model.predict(data);
+    let plain = |row: &usize| kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_none();
+    let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
+    if 2 * kept.len() < options.rows.len() {
+        kept = options.rows.to_vec();
+    }
+    let mut fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
+    let mut aside = BTreeSet::new();
+    for round in 0.. {
+        let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
+        let (suspects, crowd) = screen(model, data, &kept, &fitted, set, &held);
+        aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
+        let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
+        if next == kept {
+            return (fitted, Screening { kept, suspects, crowd });
+        }
+        if 2 * next.len() < options.rows.len() {
+            break;
+        }
+        kept = next;
+        // From the very start: which of two redundant parameters is kept must not depend on rows that are gone.
+        model.x.clone_from(&start);
+        fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
+    }
+    if kept.len() < options.rows.len() {
+        model.x.clone_from(&start);
+        fitted = fit(model, data, options);
+    }
+    (fitted, Screening { kept: options.rows.to_vec(), suspects: Vec::new(), crowd: aside.len() })
+}
+
+/// Suspects of a model that was fitted to the rows `kept`, and how many rows make up a crowd. Rows in `held` stay suspects.
+fn screen(
+    model: &Model,
+    data: &Measurements,
+    kept: &[usize],
+    fitted: &Fitted,
+    set: &[usize],
+    held: &BTreeSet<usize>,
+) -> (Vec<Suspect>, usize) {
+    let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+    let problem = Problem { data, rows: kept, unmodelled: fitted.unmodelled };
+    let mut standings = leave_one_out(&problem, model, &free);
+    measure_by_set(&mut standings, set);
+    let limit = limit(&standings);
+    let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();
+    let named = kind::name(data, &standings, &flagged, limit);
+    let crowded = crowded(&named, set);
+    let mut crowd = 0;
+    let mut suspects = Vec::new();
+    for (row, kind, partner) in named {
+        let Standing { residual, distance, .. } = &standings[row];
+        let kind = if kind == Kind::Event && held.contains(&row) { Kind::Outlier } else { kind };
+        if kind == Kind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row) {
+            crowd += 1;
+        } else {
+            suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
+        }
+    }
+    (suspects, crowd)
+}
+
+/// Divides distances by the spread of their set, where that is more than the fit's own.
+fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
+    let sets: BTreeSet<usize> = set.iter().copied().collect();
+    for number in sets {
+        let mut distances: Vec<f64> =
+            standings.iter().zip(set).filter(|(_, of)| **of == number).map(|(standing, _)| standing.distance).collect();
+        let spread = (quantile(&mut distances, 0.5) / MEDIAN_CHI2_3.sqrt()).max(1.0);
+        for (standing, _) in standings.iter_mut().zip(set).filter(|(_, of)| **of == number) {
+            standing.distance /= spread;
+            standing.sigma *= spread;
+        }
+    }
+}
+
+/// Where far outside the bulk begins.
+fn limit(standings: &[Standing]) -> f64 {
+    let mut bulk: Vec<f64> = standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect();
+    (FAR * quantile(&mut bulk, BULK)).min(GROSS)
+}
+
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let place = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
+/// Sets with more unexplained rows than mistakes would make.
+fn crowded(named: &[(usize, Kind, Option<usize>)], set: &[usize]) -> BTreeSet<usize> {
+    let sets: BTreeSet<usize> = set.iter().copied().collect();
+    sets.into_iter()
+        .filter(|number| {
+            let all = set.iter().filter(|of| *of == number).count() as f64;
+            let unexplained = named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == Kind::Outlier).count() as f64;
+            unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
+        })
+        .collect()
+}

@@ -1,0 +1,94 @@
+//! What identifications do about rows that no smooth model can follow, and what they tell the person about them.
+
+use crate::estimate::{FitOptions, Fitted, Kind, Model, Screening, Suspect, fit, fit_screened};
+use crate::robot::Measurements;
+use crate::stage::Context;
+use crate::table::{Recording, Split, slip};
+use std::collections::BTreeMap;
+
+/// Fits, and with `screen` sets aside what does not belong.
+pub fn fit_rows(
+    model: &mut Model,
+    data: &Measurements,
+    options: &FitOptions,
+    split: &Split,
+    screen: bool,
+) -> (Fitted, Screening) {
+    if !screen {
+        let kept = options.rows.to_vec();
+        return (fit(model, data, options), Screening { kept, ..Screening::default() });
+    }
+    let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+    let set: Vec<usize> = split
+        .0
+        .iter()
+        .map(|row| {
+            let next = numbers.len();
+            *numbers.entry(&row.set).or_insert(next)
+        })
+        .collect();
+    fit_screened(model, data, options, &set)
+}
+
+/// So many cases of one kind are named; the table has all.
+const NAMED: usize = 4;
+
+/// Notes for the person: who was set aside and why, and what looks like mistakes and was kept.
+pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
+    let id = |row: usize| recording.point_id[row].as_str();
+    let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = screening.suspects.iter().partition(|suspect| suspect.used());
+    if !aside.is_empty() {
+        let mut by_kind: BTreeMap<u8, Vec<String>> = BTreeMap::new();
+        for case in cases(&aside) {
+            let (first, last) = (case[0], case[case.len() - 1]);
+            let who = if case.len() == 1 {
+                id(first.row).to_string()
+            } else {
+                format!("{} to {} ({} rows)", id(first.row), id(last.row), case.len())
+            };
+            let partner = first.partner.map_or("another row", id);
+            let many = case.len() > 1;
+            let (order, text) = match first.kind {
+                Kind::Exchanged if first.partner > Some(first.row) => (0, format!("{who} and {partner} look exchanged")),
+                Kind::Exchanged => continue,
+                Kind::ShiftedBlock(offset) => (1, format!("{who}: points and joints are {offset:+} rows apart")),
+                Kind::Mislabelled => (2, format!("{who} lies where the joints of {partner} put it")),
+                Kind::UnitSlip(factor) => (3, format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor))),
+                Kind::Zero => (4, format!("{who} {} zero", if many { "are" } else { "is" })),
+                Kind::Outlier | Kind::Event => (5, format!("{who} is {:.3} mm off", first.size * 1e3)),
+            };
+            by_kind.entry(order).or_default().push(text);
+        }
+        let texts = by_kind.into_values().flat_map(|mut texts| {
+            let more = texts.len().saturating_sub(NAMED);
+            texts.truncate(NAMED);
+            texts.extend((more > 0).then(|| format!("{more} more like these (table suspects)")));
+            texts
+        });
+        let texts: Vec<String> = texts.collect();
+        let rows = if aside.len() == 1 { "row" } else { "rows" };
+        context.services.warn(format!("{} {rows} set aside: {}", aside.len(), texts.join("; ")));
+    }
+    for run in events.chunk_by(|a, b| a.row + 1 == b.row) {
+        context.services.warn(format!(
+            "{} to {} ({} rows) stand out together: something happened there that the model does not know; they are kept",
+            id(run[0].row),
+            id(run[run.len() - 1].row),
+            run.len()
+        ));
+    }
+    if screening.crowd > 0 {
+        context.services.note(format!(
+            "{} rows stand far out: too many for mistakes of the recording, so this model lacks something there; they are kept",
+            screening.crowd
+        ));
+    }
+}
+
+/// Suspects that are one thing to a person: consecutive rows with the same slip, zero or shift; all others one by one.
+fn cases<'a>(suspects: &'a [&'a Suspect]) -> impl Iterator<Item = &'a [&'a Suspect]> {
+    suspects.chunk_by(|a, b| {
+        let together = matches!(a.kind, Kind::ShiftedBlock(_) | Kind::UnitSlip(_) | Kind::Zero);
+        together && a.kind == b.kind && a.row + 1 == b.row
+    })
+}

@@ -1,0 +1,83 @@
+//! Rows that no smooth model can follow, by name and kind: set aside, and never silently dropped.
+
+crate::table::rows! { "suspects",
+    /// Suspects, one a row; key `sequence`.
+    pub struct Suspects of SuspectsRow {
+        sequence: i64,
+        point_id: String,
+        set: String,
+        /// The step whose model the row was held against.
+        step: String,
+        /// `exchanged`, `mislabelled`, `shifted_block`, `unit_slip`, `zero`, `outlier`, or `event`.
+        kind: String,
+        /// The row whose joints this row's point belongs to.
+        partner_sequence: Option<i64>,
+        /// Distance of the measured from the predicted point.
+        size_mm: f64,
+        /// The same with the row left out of the fit, in standard deviations of the rows of its set.
+        statistic: f64,
+        /// True where the row takes part in the fit all the same.
+        used: bool,
+        /// The sentence for a person.
+        remark: String,
+    }
+}
+
+use crate::estimate::{Kind, Screening, Suspect};
+use crate::table::{Recording, Split};
+
+impl Suspects {
+    /// What a screen found in this recording.
+    pub fn of(step: &str, screening: &Screening, recording: &Recording, split: &Split) -> Self {
+        let id = |row: usize| recording.point_id[row].as_str();
+        let row = |suspect: &Suspect| SuspectsRow {
+            sequence: recording.sequence[suspect.row],
+            point_id: id(suspect.row).into(),
+            set: split.0[suspect.row].set.clone(),
+            step: step.into(),
+            kind: name(suspect.kind).into(),
+            partner_sequence: suspect.partner.map(|row| recording.sequence[row]),
+            size_mm: suspect.size * 1e3,
+            statistic: suspect.statistic,
+            used: suspect.used(),
+            remark: remark(suspect, suspect.partner.map(id)),
+        };
+        Self(screening.suspects.iter().map(row).collect())
+    }
+}
+
+fn name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Exchanged => "exchanged",
+        Kind::Mislabelled => "mislabelled",
+        Kind::ShiftedBlock(_) => "shifted_block",
+        Kind::UnitSlip(_) => "unit_slip",
+        Kind::Zero => "zero",
+        Kind::Outlier => "outlier",
+        Kind::Event => "event",
+    }
+}
+
+fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
+    let partner = partner.unwrap_or("another row");
+    let far = format!("{:.3} mm from where its joints put it", suspect.size * 1e3);
+    match suspect.kind {
+        Kind::Exchanged => format!("{far}; with the points of {partner} and this row swapped, both fit"),
+        Kind::Mislabelled => format!("{far}, and where the joints of {partner} put it"),
+        Kind::ShiftedBlock(offset) => {
+            format!(
+                "{far}, and where the joints of {partner} put it, like its neighbours: points and joints are {offset:+} rows apart"
+            )
+        }
+        Kind::UnitSlip(factor) => format!("the point is {}: another unit?", slip(factor)),
+        Kind::Zero => "the point is the tracker's origin: a lost beam?".into(),
+        Kind::Outlier => format!("{far}, and nowhere else that this recording explains"),
+        Kind::Event => format!("{far}, like its neighbours: something happened that the model does not know, so the row is kept"),
+    }
+}
+
+/// E.g. `25.4 times too far`.
+pub(crate) fn slip(factor: f64) -> String {
+    let digits = |factor: f64| format!("{factor:.1}").trim_end_matches(".0").to_string();
+    if factor > 1.0 { format!("{} times too far", digits(factor)) } else { format!("{} times too near", digits(1.0 / factor)) }
+}

@@ -1,0 +1,289 @@
+//! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
+
+use crate::fixture;
+use calib::effect::{EffectStack, Load, Setting, entry};
+use calib::estimate::{FitOptions, Kind, Model, Screening, align, fit, fit_screened};
+use calib::robot::description::RobotDescription;
+use calib::robot::{Measurements, RobotModel};
+use calib::spatial::{Pose, Twist};
+use nalgebra::Vector3;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use std::collections::BTreeMap;
+
+const SIGMA: f64 = 1e-5;
+const EFFECTS: [&str; 5] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+
+fn normal(dice: &mut ChaCha8Rng) -> f64 {
+    let (radius, angle): (f64, f64) = (dice.random(), dice.random());
+    (-2.0 * (1.0 - radius).ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
+}
+
+fn student_3(dice: &mut ChaCha8Rng) -> f64 {
+    let chi2: f64 = (0..3).map(|_| normal(dice).powi(2)).sum();
+    normal(dice) / (chi2 / 3.0).sqrt()
+}
+
+fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| normal(dice)).normalize()
+}
+
+fn model(robot: &RobotModel, base: Pose) -> Model {
+    let setting = Setting { base, load: Load::GravityTorque };
+    let made = EFFECTS.iter().map(|name| (entry(name).expect("registered").make)(&setting)).collect();
+    Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
+}
+
+/// A robot with errors everywhere, measured with noise; every fourth row is held out.
+struct Trial {
+    description: RobotDescription,
+    data: Measurements,
+    truth: Model,
+    dice: ChaCha8Rng,
+}
+
+impl Trial {
+    fn new(description: RobotDescription, rows: usize, seed: u64, noise: fn(&mut ChaCha8Rng) -> f64) -> Self {
+        let mut dice = ChaCha8Rng::seed_from_u64(seed);
+        let robot = RobotModel::new(description.clone());
+        let mut truth = model(&robot, Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2)));
+        for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
+            let size = if spec.name.starts_with("base_frame") { 0.0 } else { 4e-4 };
+            truth.x[k] = size * normal(&mut dice);
+        }
+        let mut data = Measurements {
+            joints: robot.joints(),
+            q: fixture::poses(&description, rows),
+            position: vec![Vector3::zeros(); rows],
+            sigma: vec![Vector3::repeat(SIGMA); rows],
+            payload: vec![0.0; rows],
+            current: None,
+        };
+        data.position = truth.predict(&data);
+        for point in &mut data.position {
+            *point += Vector3::from_fn(|_, _| SIGMA * noise(&mut dice));
+        }
+        Self { description, data, truth, dice }
+    }
+
+    fn rows(&self) -> usize {
+        self.data.rows()
+    }
+
+    fn fit_rows(&self) -> Vec<usize> {
+        (0..self.rows()).filter(|row| row % 4 != 3).collect()
+    }
+
+    fn start(&self) -> Model {
+        let robot = RobotModel::new(self.description.clone());
+        let base = align(&robot, &self.data, &self.fit_rows());
+        model(&robot, base)
+    }
+
+    fn screen(&self) -> (Model, Screening) {
+        let mut model = self.start();
+        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let set: Vec<usize> = (0..self.rows()).map(|row| usize::from(row % 4 == 3)).collect();
+        let rows = self.fit_rows();
+        let (_, screening) = fit_screened(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
+        (model, screening)
+    }
+
+    /// Root mean square distance (m) of the model's points from the true ones.
+    fn off(&self, model: &Model) -> f64 {
+        let (a, b) = (model.predict(&self.data), self.truth.predict(&self.data));
+        (a.iter().zip(&b).map(|(a, b)| (a - b).norm_squared()).sum::<f64>() / self.rows() as f64).sqrt()
+    }
+
+    fn plain(&self) -> Model {
+        let mut model = self.start();
+        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let rows = self.fit_rows();
+        fit(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
+        model
+    }
+
+    /// `count` different rows.
+    fn draw(&mut self, count: usize) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..self.rows()).collect();
+        for k in 0..count {
+            let other = self.dice.random_range(k..rows.len());
+            rows.swap(k, other);
+        }
+        rows.truncate(count);
+        rows
+    }
+}
+
+/// Rows that were spoilt, with the name of what was done.
+type Spoilt = BTreeMap<usize, &'static str>;
+
+fn outliers(trial: &mut Trial, share: f64) -> Spoilt {
+    let rows = trial.draw((share * trial.rows() as f64).round() as usize);
+    for &row in &rows {
+        let size = 0.3e-3 * (500.0f64 / 0.3).powf(trial.dice.random::<f64>());
+        trial.data.position[row] += size * direction(&mut trial.dice);
+    }
+    rows.into_iter().map(|row| (row, "outlier")).collect()
+}
+
+fn exchanges(trial: &mut Trial, pairs: usize) -> Spoilt {
+    let rows = trial.draw(2 * pairs);
+    for pair in rows.chunks(2) {
+        trial.data.position.swap(pair[0], pair[1]);
+    }
+    rows.into_iter().map(|row| (row, "exchanged")).collect()
+}
+
+fn zeros(trial: &mut Trial) -> Spoilt {
+    let rows = trial.draw(5);
+    for &row in &rows {
+        trial.data.position[row] = Vector3::zeros();
+    }
+    rows.into_iter().map(|row| (row, "zero")).collect()
+}
+
+fn slips(trial: &mut Trial) -> Spoilt {
+    let rows = trial.draw(4);
+    for (&row, factor) in rows.iter().zip([1000.0, 1e-3, 25.4, 1.0 / 25.4]) {
+        trial.data.position[row] *= factor;
+    }
+    rows.into_iter().map(|row| (row, "unit_slip")).collect()
+}
+
+/// Thirty consecutive rows in metres.
+fn slipped_block(trial: &mut Trial) -> Spoilt {
+    let first = trial.dice.random_range(0..trial.rows() - 30);
+    for row in first..first + 30 {
+        trial.data.position[row] *= 1e-3;
+    }
+    (first..first + 30).map(|row| (row, "unit_slip")).collect()
+}
+
+/// Points of twenty rows moved up by one; the last takes the first's.
+fn shifted_block(trial: &mut Trial) -> Spoilt {
+    let first = trial.dice.random_range(0..trial.rows() - 20);
+    trial.data.position[first..first + 20].rotate_left(1);
+    (first..first + 20).map(|row| (row, "shifted_block")).collect()
+}
+
+/// Three points that changed names in a circle.
+fn circle(trial: &mut Trial) -> Spoilt {
+    let rows = trial.draw(3);
+    trial.data.position.swap(rows[0], rows[1]);
+    trial.data.position.swap(rows[1], rows[2]);
+    rows.into_iter().map(|row| (row, "mislabelled")).collect()
+}
+
+fn name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Exchanged => "exchanged",
+        Kind::Mislabelled => "mislabelled",
+        Kind::ShiftedBlock(_) => "shifted_block",
+        Kind::UnitSlip(_) => "unit_slip",
+        Kind::Zero => "zero",
+        Kind::Outlier => "outlier",
+        Kind::Event => "event",
+    }
+}
+
+#[derive(Default)]
+struct Score {
+    spoilt: f64,
+    flagged: f64,
+    named: f64,
+    with_faults: f64,
+    clean: f64,
+}
+
+impl Score {
+    fn add(&mut self, description: RobotDescription, rows: usize, seed: u64, spoil: &dyn Fn(&mut Trial) -> Spoilt) {
+        let mut trial = Trial::new(description, rows, seed, normal);
+        self.clean += trial.off(&trial.plain()).powi(2);
+        let spoilt = spoil(&mut trial);
+        let (model, screening) = trial.screen();
+        self.with_faults += trial.off(&model).powi(2);
+        self.spoilt += spoilt.len() as f64;
+        self.flagged += screening.suspects.len() as f64;
+        for suspect in &screening.suspects {
+            let right = spoilt.get(&suspect.row) == Some(&name(suspect.kind));
+            self.named += f64::from(right);
+            if !right {
+                println!("seed {seed}: {suspect:?}, in truth {:?}", spoilt.get(&suspect.row));
+            }
+        }
+        for (row, kind) in &spoilt {
+            if !screening.suspects.iter().any(|suspect| suspect.row == *row) {
+                println!("seed {seed}: {kind} in row {row} was missed");
+            }
+        }
+    }
+
+    fn precision(&self) -> f64 {
+        self.named / self.flagged.max(1.0)
+    }
+    fn recall(&self) -> f64 {
+        self.named / self.spoilt
+    }
+    /// Error of the model against the truth, with the faults over without.
+    fn harm(&self) -> f64 {
+        (self.with_faults / self.clean).sqrt()
+    }
+}
+
+#[test]
+fn mistakes_are_found_and_named_and_the_fit_is_as_good_as_without_them() {
+    type Spoil = Box<dyn Fn(&mut Trial) -> Spoilt>;
+    let mut suite: Vec<(String, Spoil)> = Vec::new();
+    for share in [0.01, 0.05, 0.1] {
+        suite.push((format!("{} % outliers", 100.0 * share), Box::new(move |trial| outliers(trial, share))));
+    }
+    for pairs in 1..=5 {
+        suite.push((format!("{pairs} exchanged pairs"), Box::new(move |trial| exchanges(trial, pairs))));
+    }
+    suite.push(("zeros".into(), Box::new(zeros)));
+    suite.push(("unit slips".into(), Box::new(slips)));
+    suite.push(("a block in metres".into(), Box::new(slipped_block)));
+    suite.push(("a shifted block".into(), Box::new(shifted_block)));
+    suite.push(("a circle of labels".into(), Box::new(circle)));
+    let mut all = Score::default();
+    let mut worst: f64 = 0.0;
+    for (k, (what, spoil)) in suite.iter().enumerate() {
+        let mut score = Score::default();
+        for (robot, description) in fixture::all().into_iter().enumerate() {
+            score.add(description, 160 + 20 * robot, 100 * k as u64 + robot as u64, spoil);
+        }
+        println!(
+            "{what}: {} rows, precision {:.3}, recall {:.3}, error {:.2} of the clean fit's",
+            score.spoilt,
+            score.precision(),
+            score.recall(),
+            score.harm()
+        );
+        worst = worst.max(score.harm());
+        all.spoilt += score.spoilt;
+        all.flagged += score.flagged;
+        all.named += score.named;
+    }
+    println!("in all: {} rows, precision {:.4}, recall {:.4}", all.spoilt, all.precision(), all.recall());
+    assert!(worst < 1.2, "error {worst:.2} of the clean fit's");
+    assert!(all.precision() >= 0.98, "precision {:.4}", all.precision());
+    assert!(all.recall() >= 0.98, "recall {:.4}", all.recall());
+}
+
+#[test]
+fn clean_recordings_keep_their_rows_also_with_heavy_tails() {
+    for (what, noise) in [("normal", normal as fn(&mut ChaCha8Rng) -> f64), ("Student's t, 3", student_3)] {
+        let (mut rows, mut flagged) = (0, 0);
+        for seed in 0..10 {
+            for (robot, description) in fixture::all().into_iter().enumerate() {
+                let trial = Trial::new(description, 200, 5000 + 10 * seed + robot as u64, noise);
+                let (_, screening) = trial.screen();
+                rows += trial.rows();
+                flagged += screening.suspects.len();
+            }
+        }
+        println!("{what}: {flagged} of {rows} clean rows flagged");
+        assert!(1000 * flagged <= rows, "{what}: {flagged} of {rows} clean rows flagged");
+    }
+}
