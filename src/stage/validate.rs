@@ -72,6 +72,14 @@ impl Stage for Validate {
                 statistics.0.push(StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row });
             }
         }
+        for row in statistics.0.iter().filter(|row| row.held_out) {
+            if let Some(without) = row.mean_without_mm {
+                context.services.note(format!(
+                    "{} on {}: the held-out mean of {:.3} mm includes {} suspects; without them {without:.3} mm",
+                    row.step, row.set, row.mean_mm, row.suspects
+                ));
+            }
+        }
         for reference in &self.reference {
             let mut beside =
                 statistics.0.iter_mut().filter(|row| row.step == reference.step && row.set == reference.set).peekable();
@@ -118,6 +126,11 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
     let mean = error.iter().sum::<f64>() / count;
     let spread: f64 = error.iter().map(|e| (e - mean).powi(2)).sum();
     let rms = |value: fn(&PredictionRow) -> f64| (rows.iter().map(|row| value(row).powi(2)).sum::<f64>() / count).sqrt();
+    let mut without: Vec<f64> = rows.iter().filter(|row| !row.suspect).map(|row| row.error_mm).collect();
+    without.sort_by(f64::total_cmp);
+    let suspects = rows.len() - without.len();
+    let some = suspects > 0 && !without.is_empty();
+    let average = |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
     StatisticsRow {
         order,
         step: step.into(),
@@ -135,6 +148,10 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         rms_z_mm: rms(|row| row.dz_mm),
         noise_rms_mm: rms(|row| row.noise_mm),
         expected_rms_mm: None,
+        suspects: suspects as i64,
+        mean_without_mm: some.then(|| average(1)),
+        rms_without_mm: some.then(|| average(2).sqrt()),
+        max_without_mm: without.last().copied().filter(|_| some),
         reference: None,
         reference_mean_mm: None,
         reference_std_mm: None,

@@ -31,6 +31,12 @@ crate::table::rows! { "statistics",
         /// What rms to expect if the model were complete: the noise, with the parameters' own uncertainty added (held-out rows) or
         /// taken off (training rows); null where the step does not know it.
         expected_rms_mm: Option<f64>,
+        /// Rows that the step's screen took for mistakes of the recording; all other figures include them.
+        suspects: i64,
+        /// The same figures without the suspects; null where there are none.
+        mean_without_mm: Option<f64>,
+        rms_without_mm: Option<f64>,
+        max_without_mm: Option<f64>,
         /// A published or agreed figure of the same quantity, named by the pipeline.
         reference: Option<String>,
         reference_mean_mm: Option<f64>,

@@ -23,6 +23,7 @@ mod screen;
 mod split;
 mod sr210d;
 mod store;
+mod suspects;
 mod swarm;
 mod tables;
 mod twin;

@@ -13,7 +13,7 @@ fn folder() -> PathBuf {
 }
 
 /// The settings of a stage of the pipeline, with the variable `remainder` put in.
-fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
+pub fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
     let text = std::fs::read_to_string(folder().join("pipeline.yaml")).expect("the pipeline");
     let whole: Value = serde_saphyr::from_str(&text.replace("${remainder}", remainder)).expect("YAML");
     let stages = whole["stages"].as_array().expect("stages");
@@ -21,14 +21,14 @@ fn settings<T: DeserializeOwned>(id: &str, remainder: &str) -> T {
     serde_json::from_value(stage.expect("the stage")["with"].clone()).expect("settings")
 }
 
-struct Experiment {
-    robot: Robot,
-    recording: Recording,
-    truth: Truth,
-    split: Split,
+pub struct Experiment {
+    pub robot: Robot,
+    pub recording: Recording,
+    pub truth: Truth,
+    pub split: Split,
 }
 
-fn experiment(remainder: &str, seed: u64) -> Experiment {
+pub fn experiment(remainder: &str, seed: u64) -> Experiment {
     let desk = Desk::default();
     let mut robot: ReadRobot = settings("robot", remainder);
     robot.file.0 = folder().join(&robot.file.0);

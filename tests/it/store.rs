@@ -347,7 +347,9 @@ fn a_million_rows_stream_in_bounded_memory() {
         frame.push("point_id", Arc::new(StringArray::from_iter_values(keys.iter().map(|key| format!("P{key}")))) as ArrayRef);
         frame.push("set", text("fit"));
         frame.push("step", text("geometry"));
-        frame.push("held_out", Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])));
+        for name in ["held_out", "suspect"] {
+            frame.push(name, Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])));
+        }
         for name in ["x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm"] {
             frame.push(name, Arc::new(Float64Array::from_iter_values(keys.iter().map(|key| (*key as f64 * 0.7371).fract()))));
         }

@@ -29,7 +29,7 @@ const CHUNK: usize = 64;
 /// The standing of every row of the recording after a fit of `free` to the problem's rows.
 pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) -> Vec<Standing> {
     let data = problem.data;
-    let inverse = problem.linearise(model, free).inverse();
+    let inverse = problem.evaluate(model, free).factor.inverse();
     let mut column = vec![usize::MAX; model.stack.specs().len()];
     for (j, parameter) in free.iter().enumerate() {
         column[*parameter] = j;
