@@ -1,8 +1,8 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
 mod align;
-mod covariance;
 pub mod choose;
+mod covariance;
 mod factor;
 mod fit;
 mod levenberg;

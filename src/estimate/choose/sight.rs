@@ -35,7 +35,7 @@ impl Sight {
     /// Which of the parameters in `order` the data would see; the earlier one stays where two do the same.
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let factor = Problem { data, rows: &rows, unmodelled: 0.0 }.linearise(model, order);
+        let factor = Problem { data, rows: &rows, unmodelled: 0.0 }.evaluate(model, order).factor;
         let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
