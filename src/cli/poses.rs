@@ -220,7 +220,7 @@ fn effects(arguments: &PosesArguments, robot: &RobotModel, site: &Site) -> Named
         position: vec![Vector3::zeros()],
         sigma: vec![Vector3::zeros()],
         payload: vec![heaviest],
-        current: None,
+        ..Measurements::default()
     };
     let setting = setting();
     let (mut kept, mut left) = (Vec::new(), Vec::new());

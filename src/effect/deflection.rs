@@ -9,6 +9,8 @@ pub enum Direction {
     Joint(usize, f64),
     /// At a station: 0 the base, k the body moved by joint k, n also the tool; zero-pose base coordinates, per unit of the parameter.
     Station(usize, Twist),
+    /// On the load of a joint (from 0): Nm per unit of the parameter; it acts through the joint's compliance.
+    Torque(usize, f64),
 }
 
 /// Sums of all motions of a row. Twists at a station are added before the exponential, so the order of effects is irrelevant.
@@ -18,6 +20,8 @@ pub struct Deflection {
     pub joint: Vec<f64>,
     /// Twist at each station 0..=n.
     pub station: Vec<Twist>,
+    /// How far each joint yields to a torque more, rad/Nm.
+    pub yielding: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
     pub partials: Vec<(usize, Direction)>,
     first: usize,
@@ -35,12 +39,13 @@ struct Kept {
 impl Deflection {
     pub fn new(joints: usize) -> Self {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
-        Self { joint, station, partials: Vec::new(), first: 0, kept: Kept::default() }
+        Self { yielding: joint.clone(), joint, station, partials: Vec::new(), first: 0, kept: Kept::default() }
     }
 
     pub(crate) fn clear(&mut self) {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
+        self.yielding.fill(0.0);
         self.partials.clear();
     }
 
@@ -55,6 +60,7 @@ impl Deflection {
     pub(crate) fn restore(&mut self) {
         self.joint.clone_from(&self.kept.joint);
         self.station.clone_from(&self.kept.station);
+        self.yielding.fill(0.0);
         self.partials.truncate(self.kept.partials);
     }
 
@@ -69,9 +75,19 @@ impl Deflection {
         self.partials.push((self.first + parameter, Direction::Joint(joint, rate)));
     }
 
+    /// Says that a joint yields to a torque more by `compliance` (rad/Nm).
+    pub fn yields(&mut self, joint: usize, compliance: f64) {
+        self.yielding[joint] += compliance;
+    }
+
     /// Moves everything beyond a station by the twist `p[parameter] * rate`.
     pub fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
         self.station[station] += rate * p[parameter];
         self.partials.push((self.first + parameter, Direction::Station(station, rate)));
+    }
+
+    /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is the effect's burden.
+    pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
+        self.partials.push((self.first + parameter, Direction::Torque(joint, rate)));
     }
 }

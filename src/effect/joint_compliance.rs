@@ -41,13 +41,16 @@ impl Effect for JointCompliance {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         for (parameter, joint) in (0..robot.joints()).filter(|j| robot.is_revolute(*j)).enumerate() {
             let load = match self.load {
-                Load::GravityTorque => state.torque[joint],
-                Load::MotorCurrent => match state.current.map(|all| all[joint]) {
+                Load::GravityTorque => state.torque()[joint],
+                Load::MotorCurrent => match state.current().map(|all| all[joint]) {
                     Some(current) if current.is_finite() => current,
                     _ => 0.0,
                 },
             };
             out.turn(parameter, p, joint, load);
+            if self.load == Load::GravityTorque {
+                out.yields(joint, p[parameter]);
+            }
         }
     }
 

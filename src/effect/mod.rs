@@ -15,9 +15,9 @@ mod tool_offset;
 
 pub use base_frame::BaseFrame;
 pub use deflection::{Deflection, Direction};
-pub use stack::{EffectStack, Scratch};
+pub use stack::{EffectStack, Scratch, Sight};
 
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Burden, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
 
@@ -37,14 +37,53 @@ pub struct ParameterSpec {
 /// The circumstances of one row that effects may depend on.
 #[derive(Debug, Clone, Copy)]
 pub struct ArmState<'a> {
+    data: &'a Measurements,
+    row: usize,
     /// Commanded joint positions, rad or m.
     pub q: &'a [f64],
-    /// Gravity torque about each joint where the arm really is, Nm; zeros unless an effect of the stack asks for it.
-    pub torque: &'a [f64],
+    /// Where the arm really hangs and what it carries; at rest at the zero pose unless an effect of the stack asks for it.
+    pub posture: &'a Posture,
+}
+
+impl<'a> ArmState<'a> {
+    pub(crate) fn new(data: &'a Measurements, row: usize, posture: &'a Posture) -> Self {
+        Self { data, row, q: data.q(row), posture }
+    }
+
+    /// Load torque about each joint, Nm.
+    pub fn torque(&self) -> &'a [f64] {
+        &self.posture.torque
+    }
+
     /// Motor currents, A, where recorded.
-    pub current: Option<&'a [f64]>,
-    /// Payload, kg.
-    pub payload: f64,
+    pub fn current(&self) -> Option<&'a [f64]> {
+        self.data.current(self.row)
+    }
+
+    /// s; the number of the row where the recording has no clock.
+    pub fn time(&self) -> f64 {
+        self.data.time(self.row)
+    }
+
+    /// C, where recorded.
+    pub fn temperature(&self) -> Option<f64> {
+        self.data.temperature(self.row)
+    }
+
+    /// Declared payload, kg.
+    pub fn payload(&self) -> f64 {
+        self.data.payload[self.row]
+    }
+
+    /// Direction from which a joint came to rest, +1 or -1; 0 if it never moved.
+    pub fn direction(&self, joint: usize) -> f64 {
+        self.data.direction(self.row, joint)
+    }
+
+    /// What a joint moved from the row before, rad or m.
+    pub fn last_move(&self, joint: usize) -> f64 {
+        self.data.last_move(self.row, joint)
+    }
 }
 
 /// A physical cause of pose error.
@@ -55,10 +94,12 @@ pub trait Effect: Send + Sync {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec>;
     /// Adds the motions that parameters `p` (SI) cause in this state, with their partials.
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
-    /// True if the effect reads [`ArmState::torque`].
+    /// True if the effect reads [`ArmState::posture`].
     fn needs_torque(&self) -> bool {
         false
     }
+    /// Adds what parameters `p` change about the load of the arm at joint positions `q`; its partials belong into `deflect`.
+    fn burden(&self, _q: &[f64], _p: &[f64], _out: &mut Burden) {}
     /// What the recording or the robot lacks for this effect, if anything, as a sentence.
     fn missing(&self, _robot: &RobotModel, _data: &Measurements) -> Option<String> {
         None

@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
-use crate::robot::{Measurements, RobotModel, Travel};
+use crate::robot::{Burden, Measurements, Posture, RobotModel, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
@@ -21,14 +21,11 @@ pub struct Scratch {
     deflection: Deflection,
     /// Commanded travel of each joint.
     commanded: Vec<Travel>,
-    torque: Vec<f64>,
+    burden: Burden,
+    posture: Posture,
     stations: Vec<Station>,
     /// Frame in front of E_k.
     before: Vec<Pose>,
-    /// Frame behind E_k, in front of joint k.
-    behind: Vec<Pose>,
-    /// Frame of the body moved by joint k.
-    body: Vec<Pose>,
     /// Velocity of the point by the twist of E_k.
     by_station: Vec<Matrix3x6<f64>>,
     /// Velocity of the point by the travel of joint k.
@@ -82,11 +79,10 @@ impl EffectStack {
         Scratch {
             deflection: Deflection::new(n),
             commanded: vec![Travel::default(); n],
-            torque: vec![0.0; n],
+            burden: Burden::new(n),
+            posture: Posture::new(n),
             stations: vec![Station::of(&Twist::zeros()); n + 1],
             before: vec![Pose::identity(); n + 1],
-            behind: vec![Pose::identity(); n + 1],
-            body: vec![Pose::identity(); n],
             by_station: vec![Matrix3x6::zeros(); n + 1],
             by_joint: vec![Vector3::zeros(); n],
         }
@@ -100,16 +96,17 @@ impl EffectStack {
         for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
             *travel = Travel::new(*q);
         }
-        scratch.torque.fill(0.0);
         scratch.deflection.clear();
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
             scratch.deflection.keep();
+            scratch.burden.clear();
+            for (effect, range) in &self.effects {
+                effect.burden(data.q(row), &x[range.clone()], &mut scratch.burden);
+            }
             for _ in 0..2 {
-                let Scratch { behind, body, torque, .. } = scratch;
-                // Gravity is known in the base frame as corrected, hence behind[0].
-                robot.gravity_torque(&behind[0], behind, body, data.payload[row], torque);
+                scratch.posture.hang(robot, data.payload[row], &scratch.burden);
                 scratch.deflection.restore();
                 self.deflect(Needs::Torque, robot, data, row, x, scratch);
                 point = self.chain(robot, scratch);
@@ -144,7 +141,16 @@ impl EffectStack {
         scratch: &mut Scratch,
         mut emit: impl FnMut(usize, Vector3<f64>),
     ) {
-        let Scratch { deflection, stations, before, behind, by_station, by_joint, .. } = scratch;
+        self.velocities(robot, point, scratch);
+        let Scratch { deflection, by_station, by_joint, .. } = scratch;
+        for (parameter, direction) in &deflection.partials {
+            emit(*parameter, along(direction, by_joint, by_station, &deflection.yielding));
+        }
+    }
+
+    /// How the point moves with every joint and station.
+    fn velocities(&self, robot: &RobotModel, point: &Vector3<f64>, scratch: &mut Scratch) {
+        let Scratch { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = scratch;
         for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
             // Of a twist (v; w) in the frame: R v + R w x arm.
             let mut spatial = Matrix3x6::zeros();
@@ -157,21 +163,28 @@ impl EffectStack {
             *velocity =
                 if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
         }
-        for (parameter, direction) in &deflection.partials {
-            emit(
-                *parameter,
-                match direction {
-                    Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
-                    Direction::Station(station, rate) => by_station[*station] * rate,
-                },
-            );
+    }
+
+    /// What the row shows of any effect, in the stack or not. The arm hangs as the stack makes it hang.
+    pub fn sight(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Sight {
+        let point = self.point(robot, data, row, x, scratch);
+        if !self.needs_torque {
+            scratch.posture.hang(robot, data.payload[row], &scratch.burden);
+        }
+        self.velocities(robot, &point, scratch);
+        Sight {
+            row,
+            point,
+            posture: scratch.posture.clone(),
+            yielding: scratch.deflection.yielding.clone(),
+            by_station: scratch.by_station.clone(),
+            by_joint: scratch.by_joint.clone(),
         }
     }
 
     /// Adds the motions of the effects with the given need.
     fn deflect(&self, needs: Needs, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
-        let payload = data.payload[row];
-        let state = ArmState { q: data.q(row), torque: &scratch.torque, current: data.current(row), payload };
+        let state = ArmState::new(data, row, &scratch.posture);
         for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.needs_torque() == (needs == Needs::Torque)) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
@@ -187,13 +200,55 @@ impl EffectStack {
             }
             scratch.before[k] = frame;
             frame = frame * station.motion;
-            scratch.behind[k] = frame;
+            scratch.posture.behind[k] = frame;
             if k < n {
                 frame = frame * robot.motion(k, &scratch.commanded[k].moved(scratch.deflection.joint[k]));
-                scratch.body[k] = frame;
+                scratch.posture.body[k] = frame;
             }
         }
         frame.point(&robot.home().translation)
+    }
+}
+
+/// How a row's point moves with everything that an effect can do.
+pub struct Sight {
+    row: usize,
+    /// Predicted point, tracker frame, m.
+    pub point: Vector3<f64>,
+    pub posture: Posture,
+    /// rad/Nm.
+    yielding: Vec<f64>,
+    by_station: Vec<Matrix3x6<f64>>,
+    /// m/rad (m/m).
+    pub by_joint: Vec<Vector3<f64>>,
+}
+
+impl Sight {
+    /// Derivative of the point by each parameter of an effect at zero, through `emit(parameter, derivative)`, as
+    /// [`EffectStack::derivatives`].
+    pub fn derivatives(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        effect: &dyn Effect,
+        zeros: &[f64],
+        buffer: &mut Deflection,
+        mut emit: impl FnMut(usize, Vector3<f64>),
+    ) {
+        buffer.clear();
+        buffer.start(0);
+        effect.deflect(robot, &ArmState::new(data, self.row, &self.posture), zeros, buffer);
+        for (parameter, direction) in &buffer.partials {
+            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.yielding));
+        }
+    }
+}
+
+fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], yielding: &[f64]) -> Vector3<f64> {
+    match direction {
+        Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
+        Direction::Station(station, rate) => by_station[*station] * rate,
+        Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
     }
 }
 

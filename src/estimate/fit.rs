@@ -4,7 +4,7 @@ use super::covariance::Covariance;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
-use super::problem::{HUBER, Problem};
+use super::problem::{HUBER, Problem, Weight};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 
@@ -144,8 +144,7 @@ fn unmodelled(problem: &Problem, residuals: &[Vector3<f64>], parameters: usize) 
     let mut errors = vec![0.0; rows];
     let mut median = |extra: f64| {
         for (error, (residual, row)) in errors.iter_mut().zip(residuals.iter().zip(problem.rows)) {
-            let variance = problem.data.sigma[*row].map(|sigma| sigma * sigma + extra * extra);
-            *error = residual.component_mul(residual).component_div(&variance).sum();
+            *error = Weight::of(problem.data, *row, extra).apply(residual).norm_squared();
         }
         let middle = rows / 2;
         *errors.select_nth_unstable_by(middle, f64::total_cmp).1 / freedom

@@ -4,7 +4,7 @@ use super::factor::{Factor, Tall};
 use super::model::Model;
 use crate::robot::Measurements;
 use faer::Mat;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
@@ -35,15 +35,40 @@ pub(crate) struct Evaluation {
     pub factor: Factor,
 }
 
-impl Problem<'_> {
+/// Turns a row's errors into standard deviations.
+#[derive(Clone, Copy)]
+pub(crate) enum Weight {
     /// Inverse standard deviation per axis.
-    fn weight(&self, row: usize) -> Vector3<f64> {
-        self.data.sigma[row].map(|sigma| 1.0 / (sigma * sigma + self.unmodelled * self.unmodelled).sqrt())
+    Axes(Vector3<f64>),
+    /// Inverse of the covariance's Cholesky factor.
+    Full(Matrix3<f64>),
+}
+
+impl Weight {
+    /// Of a row with `unmodelled` (m per axis) beside its own noise.
+    pub fn of(data: &Measurements, row: usize, unmodelled: f64) -> Self {
+        let variance = data.sigma[row].map(|sigma| sigma * sigma + unmodelled * unmodelled);
+        let full = data.spread.as_ref().map(|all| all[row] + Matrix3::from_diagonal(&variance));
+        match full.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse()) {
+            Some(inverse) => Self::Full(inverse),
+            None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
+        }
     }
 
+    /// m (or m per unit) -> standard deviations.
+    pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Axes(weight) => error.component_mul(weight),
+            Self::Full(inverse) => inverse * error,
+        }
+    }
+}
+
+impl Problem<'_> {
     /// The whitened error length of every residual.
     pub fn errors(&self, residuals: &[Vector3<f64>]) -> Vec<f64> {
-        residuals.iter().zip(self.rows).map(|(residual, row)| residual.component_mul(&self.weight(*row)).norm()).collect()
+        let one = |(residual, row): (&Vector3<f64>, &usize)| Weight::of(self.data, *row, self.unmodelled).apply(residual).norm();
+        residuals.iter().zip(self.rows).map(one).collect()
     }
 
     /// The problem at the model's parameters, linearised in the `free` ones.
@@ -77,18 +102,20 @@ impl Problem<'_> {
             for (i, &row) in chunk.iter().enumerate() {
                 let point = model.stack.point(&model.robot, self.data, row, &model.x, &mut scratch);
                 let residual = self.data.position[row] - point;
-                let weight = self.weight(row);
-                let error = residual.component_mul(&weight).norm();
-                let scale = if error > HUBER { weight * (HUBER / error).sqrt() } else { weight };
+                let weight = Weight::of(self.data, row, self.unmodelled);
+                let whitened = weight.apply(&residual);
+                let error = whitened.norm();
+                let share = if error > HUBER { (HUBER / error).sqrt() } else { 1.0 };
                 model.stack.partials(&model.robot, &point, &mut scratch, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
+                        let derivative = weight.apply(&derivative) * share;
                         for axis in 0..3 {
-                            lines[(3 * i + axis, j)] += derivative[axis] * scale[axis];
+                            lines[(3 * i + axis, j)] += derivative[axis];
                         }
                     }
                 });
                 for axis in 0..3 {
-                    lines[(3 * i + axis, p)] = residual[axis] * scale[axis];
+                    lines[(3 * i + axis, p)] = whitened[axis] * share;
                 }
                 residuals.push(residual);
             }

@@ -1,6 +1,6 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
 #[derive(Debug, Clone, Default)]
@@ -16,6 +16,14 @@ pub struct Measurements {
     pub payload: Vec<f64>,
     /// A.
     pub current: Option<Vec<f64>>,
+    /// s; without it the number of the row stands for it.
+    pub time: Option<Vec<f64>>,
+    /// Of the arm, C.
+    pub temperature: Option<Vec<f64>>,
+    /// Direction of the last move of each joint, +1 / -1; without it the order of the rows tells.
+    pub direction: Option<Vec<f64>>,
+    /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
+    pub spread: Option<Vec<Matrix3<f64>>>,
 }
 
 impl Measurements {
@@ -33,9 +41,45 @@ impl Measurements {
 
     /// Length (m) of the one-sigma noise of a row: root of the summed variances.
     pub fn noise(&self, row: usize) -> f64 {
-        self.sigma[row].norm()
+        let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
+        (self.sigma[row].norm_squared() + beyond).sqrt()
+    }
+
+    /// s from some start; the number of the row where the recording has no clock or the row no time.
+    pub fn time(&self, row: usize) -> f64 {
+        self.time.as_ref().map(|all| all[row]).filter(|time| time.is_finite()).unwrap_or(row as f64)
+    }
+
+    /// C; that of the last row that has one where this row has none.
+    pub fn temperature(&self, row: usize) -> Option<f64> {
+        let all = self.temperature.as_ref()?;
+        (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
+    }
+
+    /// What joint `joint` moved (rad or m) from the row before to this one; 0 in the first row.
+    pub fn last_move(&self, row: usize, joint: usize) -> f64 {
+        if row == 0 { 0.0 } else { self.q(row)[joint] - self.q(row - 1)[joint] }
+    }
+
+    /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of the rows; 0 if it never moved.
+    pub fn direction(&self, row: usize, joint: usize) -> f64 {
+        let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
+        if let Some(direction) = recorded.filter(|value| value.is_finite() && *value != 0.0) {
+            return direction.signum();
+        }
+        let moves = (0..=row).rev().map(|k| self.last_move(k, joint));
+        moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
+    }
+
+    /// Whether rows `a` and `b` are the same pose under the same payload.
+    pub fn same_pose(&self, a: usize, b: usize) -> bool {
+        let near = |(x, y): (&f64, &f64)| (x - y).abs() < SAME_JOINT;
+        self.payload[a] == self.payload[b] && self.q(a).iter().zip(self.q(b)).all(near)
     }
 }
+
+/// Joint positions (rad or m) closer than this are one command: below any controller's resolution.
+const SAME_JOINT: f64 = 1e-9;
 
 /// The tracker's point noise: (constant + per_metre * range) / coverage is one sigma per axis.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]

@@ -65,7 +65,18 @@ impl Recording {
             Some(all) => all.iter().map(|mass| if mass.is_finite() { *mass } else { 0.0 }).collect(),
             None => vec![0.0; self.rows()],
         };
-        Measurements { joints: self.joints, q: self.q.clone(), position, sigma, payload, current: self.current.clone() }
+        Measurements {
+            joints: self.joints,
+            q: self.q.clone(),
+            position,
+            sigma,
+            payload,
+            current: self.current.clone(),
+            time: self.time.clone(),
+            temperature: self.temperature.clone(),
+            direction: self.direction.clone(),
+            spread: None,
+        }
     }
 }
 

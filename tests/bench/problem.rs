@@ -51,7 +51,7 @@ impl Case {
             position: vec![Vector3::zeros(); rows],
             sigma: vec![Vector3::repeat(SIGMA); rows],
             payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
-            current: None,
+            ..Measurements::default()
         };
         data.position = truth.predict(&data);
         for point in &mut data.position {
@@ -97,7 +97,7 @@ impl Case {
             sigma: vec![Vector3::repeat(sigma); position.len()],
             payload: vec![0.0; position.len()],
             position,
-            current: None,
+            ..Measurements::default()
         };
         let effects = value["effects"].as_array().expect("effects").iter().filter_map(|name| Some(name.as_str()?.to_string()));
         let rows = 0..value["fit"].as_u64().expect("fit") as usize;

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{EFFECTS, Effect, EffectStack, Load, ParameterSpec, Setting};
-use calib::robot::{Measurements, RobotModel};
+use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -20,6 +20,7 @@ fn data(robot: &RobotModel, rows: usize) -> Measurements {
         sigma: vec![Vector3::repeat(1e-5); rows],
         payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { 10.0 }).collect(),
         current: Some((0..rows * n).map(|k| 5.0 * fixture::spread(k, 3) - 2.0).collect()),
+        ..Measurements::default()
     }
 }
 
@@ -143,9 +144,9 @@ fn every_effect_is_registered_under_its_own_name_and_its_parameters_are_named_af
 #[test]
 fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     let robot = RobotModel::new(fixture::offset_wrist());
-    let mut torque = vec![0.0; 6];
-    let still = [Pose::identity(); 6];
-    robot.gravity_torque(&Pose::identity(), &still, &still, 10.0, &mut torque);
+    let mut posture = Posture::new(6);
+    posture.hang(&robot, 10.0, &Burden::new(6));
+    let torque = &posture.torque;
     // Joint 2 turns about -y through x = 0; bodies 2..6 and the payload hang at their x.
     let bodies = [(12.7, -0.306), (4.3, -0.89815), (2.0, -1.1843), (2.0, -1.1843), (0.4, -1.1843), (10.0, -1.1343)];
     let expected: f64 = bodies.iter().map(|(mass, x)| mass * 9.81 * x).sum();

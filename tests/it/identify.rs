@@ -61,7 +61,7 @@ fn recording_where(
         position: vec![Vector3::zeros(); rows],
         sigma: vec![Vector3::repeat(SIGMA); rows],
         payload: (0..rows).map(|row| if row % 2 == 0 { 0.0 } else { description.payload_mass }).collect(),
-        current: None,
+        ..Measurements::default()
     };
     data.position = truth.predict(&data);
     for (row, point) in data.position.iter_mut().enumerate() {

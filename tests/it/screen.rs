@@ -57,7 +57,7 @@ impl Trial {
             position: vec![Vector3::zeros(); rows],
             sigma: vec![Vector3::repeat(SIGMA); rows],
             payload: vec![0.0; rows],
-            current: None,
+            ..Measurements::default()
         };
         data.position = truth.predict(&data);
         for point in &mut data.position {

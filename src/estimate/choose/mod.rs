@@ -195,7 +195,7 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
         position: rows.iter().map(|row| data.position[*row]).collect(),
         sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
-        current: None,
+        ..Measurements::default()
     }
 }
 

@@ -4,7 +4,7 @@
 //! 1 + H (1 - wH)^-1. Rows that were not fitted have w = 0.
 
 use crate::estimate::model::Model;
-use crate::estimate::problem::{HUBER, Problem};
+use crate::estimate::problem::{HUBER, Problem, Weight};
 use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -52,18 +52,18 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                     }
                 });
                 let residual = data.position[row] - predicted;
-                let sigma = data.sigma[row].map(|sigma| sigma.hypot(problem.unmodelled));
-                let whitened = residual.component_div(&sigma);
+                let scale = Weight::of(data, row, problem.unmodelled);
+                let whitened = scale.apply(&residual);
                 let weight = match whitened.norm() {
                     _ if !fitted[row] => 0.0,
                     length if length > HUBER => HUBER / length,
                     _ => 1.0,
                 };
-                let leverage = inverse.as_ref().map_or_else(Matrix3::zeros, |inverse| leverage(jacobian, inverse, &sigma));
+                let leverage = inverse.as_ref().map_or_else(Matrix3::zeros, |inverse| leverage(jacobian, inverse, &scale));
                 Standing {
                     predicted,
                     residual,
-                    sigma: sigma.norm() / 3f64.sqrt(),
+                    sigma: data.noise(row).hypot(3f64.sqrt() * problem.unmodelled) / 3f64.sqrt(),
                     distance: distance(&whitened, leverage, weight),
                 }
             },
@@ -72,11 +72,11 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
 }
 
 /// H = G G', G = J R^-1 whitened, R^-1 upper triangular.
-fn leverage(jacobian: &[Vector3<f64>], inverse: &Mat<f64>, sigma: &Vector3<f64>) -> Matrix3<f64> {
+fn leverage(jacobian: &[Vector3<f64>], inverse: &Mat<f64>, scale: &Weight) -> Matrix3<f64> {
     let mut leverage = Matrix3::zeros();
     for column in 0..jacobian.len() {
         let g: Vector3<f64> = (0..=column).map(|i| jacobian[i] * inverse[(i, column)]).sum();
-        let g = g.component_div(sigma);
+        let g = scale.apply(&g);
         leverage += g * g.transpose();
     }
     leverage
