@@ -17,11 +17,9 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// From the whitened factor; `scale` is the root of the reduced chi-square. `None` if singular.
-    pub(crate) fn of(factor: &Factor, free: &[usize], scale: f64) -> Option<Self> {
-        let inverse = factor.inverse()?;
-        let p = free.len();
-        Some(Self { free: free.to_vec(), root: Mat::from_fn(p, p, |i, j| inverse[(i, j)] * scale) })
+    /// From the whitened factor. `None` if singular.
+    pub(crate) fn of(factor: &Factor, free: &[usize]) -> Option<Self> {
+        Some(Self { free: free.to_vec(), root: factor.inverse()? })
     }
 
     /// Standard deviation of the `row`-th free parameter, SI.

@@ -79,6 +79,29 @@ impl Factor {
         Self::of(&Mat::from_fn(columns, parameters.len() + 1, |i, j| self.r[(i, parameters.get(j).copied().unwrap_or(p))]))
     }
 
+    /// The problem that is left in the parameters without an entry when the others take the given steps.
+    pub fn given(&self, steps: &[Option<f64>]) -> Self {
+        let p = self.parameters();
+        let open: Vec<usize> = (0..p).filter(|j| steps[*j].is_none()).collect();
+        let mut rows = Mat::from_fn(p + 1, open.len() + 1, |i, j| self.r[(i, open.get(j).copied().unwrap_or(p))]);
+        for (j, step) in steps.iter().enumerate() {
+            for i in 0..=j {
+                rows[(i, open.len())] -= self.r[(i, j)] * step.unwrap_or_default();
+            }
+        }
+        Self::of(&rows)
+    }
+
+    /// The factor of the same rows, all multiplied by `weight`.
+    pub fn weighted(mut self, weight: f64) -> Self {
+        for j in 0..self.r.ncols() {
+            for i in 0..=j {
+                self.r[(i, j)] *= weight;
+            }
+        }
+        self
+    }
+
     pub fn parameters(&self) -> usize {
         self.r.ncols() - 1
     }

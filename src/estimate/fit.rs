@@ -1,12 +1,15 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
 use super::covariance::Covariance;
+use super::factor::Factor;
+use super::known::Opinion;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{HUBER, Problem, Weight};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
 #[derive(Clone, Copy)]
@@ -22,6 +25,8 @@ pub struct FitOptions<'a> {
 pub enum Fate {
     /// Estimated, with its standard deviation (SI).
     Free(f64),
+    /// On a bound that it would have to cross; with the value that the data would have (SI).
+    Bound(f64),
     /// Not a candidate: kept.
     Kept,
     /// As [`Visibility::Redundant`], with positions in the stack.
@@ -38,7 +43,9 @@ pub struct Fitted {
     pub unmodelled: f64,
     /// Rows with Huber weight below one.
     pub downweighted: usize,
-    /// Singular values of the free parameters scaled by prior sigma, largest first.
+    /// Parameters with a prior: what it says against what the data say.
+    pub opinions: BTreeMap<usize, Opinion>,
+    /// Singular values of the free parameters (priors included) scaled by prior sigma, largest first.
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
     pub singular_all: Vec<f64>,
@@ -67,6 +74,9 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let mut fates: Vec<Fate> = vec![Fate::Kept; specs.len()];
     let mut last: Option<(Stop, Vec<usize>)> = None;
 
+    for k in options.candidates {
+        model.x[*k] = model.within(*k, model.x[*k]);
+    }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
     let mut sight = problem.evaluate(model, &candidates);
     problem.unmodelled = unmodelled(&problem, &sight.residuals, 0);
@@ -80,10 +90,10 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
             };
         }
         let free: Vec<usize> = candidates.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
-        // What is dropped goes back to nominal and stays there.
+        // What is dropped goes back to what was known beforehand and stays there.
         for k in &candidates {
             if !free.contains(k) {
-                model.x[*k] = 0.0;
+                model.x[*k] = model.rest(*k);
             }
         }
         let weighted_so = round > 0 || problem.unmodelled == 0.0;
@@ -102,28 +112,54 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         sight = problem.evaluate(model, &candidates);
     }
     let (stop, free) = last.expect("at least one round");
-    let all = problem.evaluate(model, options.candidates);
+    let all = problem.observe(model, options.candidates);
     let errors = problem.errors(&all.residuals);
-    let chosen: Vec<usize> = options.candidates.iter().enumerate().filter(|(_, k)| free.contains(k)).map(|(j, _)| j).collect();
-    let factor = all.factor.select(&chosen);
-    let covariance = Covariance::of(&factor, &free, reduced(&errors, free.len()).sqrt());
+    let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
+    let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
+    let (factor, _) = model.with_priors(&free, data);
+    let pinned = model.pinned(&free, &factor);
+    bounded(model, &free, &pinned, &factor, &mut fates);
+    let free: Vec<usize> = free.into_iter().zip(pinned).filter(|(_, pinned)| !pinned).map(|(k, _)| k).collect();
+    let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
+    // The noise is known up to a factor, what was known beforehand is not.
+    let scale = reduced(&errors, free.len()).sqrt();
+    let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
+    let covariance = Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free);
+    let mut opinions = BTreeMap::new();
     if let Some(covariance) = &covariance {
-        for (row, parameter) in free.iter().enumerate() {
-            fates[*parameter] = Fate::Free(covariance.sigma(row));
+        for (row, k) in free.iter().enumerate() {
+            let sigma = covariance.sigma(row);
+            fates[*k] = Fate::Free(sigma);
+            if let Some(prior) = model.known(*k).prior {
+                opinions.insert(*k, Opinion::of(prior, model.x[*k], sigma * sigma));
+            }
         }
     }
+    let (factor, _) = model.with_priors(&free, data);
+    let (everything, _) = model.with_priors(options.candidates, all.factor);
     let singular = factor.singular_values(&prior(&free));
-    let singular_all = all.factor.singular_values(&prior(options.candidates));
+    let singular_all = everything.singular_values(&prior(options.candidates));
     Fitted {
         fates,
         course,
         stop,
         unmodelled: problem.unmodelled,
         covariance,
+        opinions,
         downweighted: errors.iter().filter(|error| **error > HUBER).count(),
         indices: indices(&singular, options.rows.len()),
         singular,
         singular_all,
+    }
+}
+
+/// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.
+fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, fates: &mut [Fate]) {
+    for (j, k) in free.iter().enumerate().filter(|(j, _)| pinned[*j]) {
+        let fixed: Vec<Option<f64>> = pinned.iter().enumerate().map(|(i, pinned)| (*pinned && i != j).then_some(0.0)).collect();
+        let among = fixed.iter().take(j).filter(|fixed| fixed.is_none()).count();
+        let step = factor.given(&fixed).solve(0.0).and_then(|step| step.get(among).copied());
+        fates[*k] = Fate::Bound(model.x[*k] + step.unwrap_or_default());
     }
 }
 

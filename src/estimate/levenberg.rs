@@ -58,7 +58,7 @@ pub(crate) fn minimise(
     mut now: Evaluation,
     limit: usize,
 ) -> (Vec<Iteration>, Stop, Evaluation) {
-    let mut course = vec![iteration(&now, 0.0, 0.0)];
+    let mut course = vec![iteration(model, free, &now, 0.0, 0.0)];
     if free.is_empty() {
         return (course, Stop::NothingFree, now);
     }
@@ -70,7 +70,7 @@ pub(crate) fn minimise(
             if tries > 20 {
                 return (course, Stop::Stalled, now);
             }
-            let Some(step) = now.factor.solve(damping) else {
+            let Some(step) = model.step_within_bounds(free, &now.factor, damping) else {
                 damping = raise(damping);
                 continue;
             };
@@ -80,7 +80,7 @@ pub(crate) fn minimise(
             }
             let before = model.x.clone();
             for (parameter, change) in free.iter().zip(&step) {
-                model.x[*parameter] += change;
+                model.x[*parameter] = model.within(*parameter, model.x[*parameter] + change);
             }
             // Nearly every step is taken, so that its derivatives are worth computing at once.
             let next = problem.evaluate(model, free);
@@ -96,7 +96,7 @@ pub(crate) fn minimise(
         let step_norm = step_norm(&now.factor, &step);
         let fall = now.cost - next.cost;
         now = next;
-        course.push(iteration(&now, step_norm, damping));
+        course.push(iteration(model, free, &now, step_norm, damping));
         if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * now.cost {
             return (course, Stop::Converged, now);
         }
@@ -105,8 +105,9 @@ pub(crate) fn minimise(
     (course, Stop::IterationLimit, now)
 }
 
-fn iteration(state: &Evaluation, step_norm: f64, damping: f64) -> Iteration {
-    Iteration { cost: state.cost, rms: state.rms, gradient: cosine(&state.factor, state.cost), step_norm, damping }
+fn iteration(model: &Model, free: &[usize], state: &Evaluation, step_norm: f64, damping: f64) -> Iteration {
+    let gradient = cosine(&state.factor, state.cost, &model.pinned(free, &state.factor));
+    Iteration { cost: state.cost, rms: state.rms, gradient, step_norm, damping }
 }
 
 /// Whether the step moves no prediction visibly, or promises to lower the cost by no more than rounding.
@@ -131,13 +132,14 @@ fn step_norm(factor: &Factor, step: &[f64]) -> f64 {
     moved.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
-/// Largest cosine between a column of J and the residual; zero at the minimum.
-fn cosine(factor: &Factor, cost: f64) -> f64 {
+/// Largest cosine between the residual and a column of J that no bound stops; zero at the minimum.
+fn cosine(factor: &Factor, cost: f64, pinned: &[bool]) -> f64 {
     let residual = (2.0 * cost).sqrt();
     let gradient = factor.gradient();
     let largest = gradient
         .iter()
         .enumerate()
+        .filter(|(j, _)| !pinned[*j])
         .map(|(j, g)| {
             let norm = factor.column_norm(j) * residual;
             if norm > 0.0 { g.abs() / norm } else { 0.0 }

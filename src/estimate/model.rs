@@ -1,10 +1,12 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
+use super::known::Known;
 use crate::effect::{BaseFrame, EffectStack};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// The forward model of measured points.
 pub struct Model {
@@ -12,13 +14,15 @@ pub struct Model {
     pub stack: EffectStack,
     /// Parameter values, SI, in the order of the stack's specs.
     pub x: Vec<f64>,
+    /// What is known of some parameters beforehand, by position in the stack.
+    pub known: BTreeMap<usize, Known>,
 }
 
 impl Model {
     /// The model with all parameters zero: the nominal robot.
     pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
         let x = vec![0.0; stack.specs().len()];
-        Self { robot, stack, x }
+        Self { robot, stack, x, known: BTreeMap::new() }
     }
 
     /// Where the base stands in the tracker's frame, corrections included.

@@ -28,7 +28,7 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Evaluation {
     /// Measured - predicted (m), in the order of the problem's rows.
     pub residuals: Vec<Vector3<f64>>,
-    /// Sum of Huber's losses, dimensionless.
+    /// Sum of Huber's losses and of the priors', dimensionless.
     pub cost: f64,
     /// Root mean square of the residual length, m.
     pub rms: f64,
@@ -71,8 +71,15 @@ impl Problem<'_> {
         residuals.iter().zip(self.rows).map(one).collect()
     }
 
-    /// The problem at the model's parameters, linearised in the `free` ones.
+    /// The problem at the model's parameters, linearised in the `free` ones, with what is known of them beforehand.
     pub fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
+        let data = self.observe(model, free);
+        let (factor, cost) = model.with_priors(free, data.factor);
+        Evaluation { factor, cost: data.cost + cost, ..data }
+    }
+
+    /// The same from the data alone.
+    pub fn observe(&self, model: &Model, free: &[usize]) -> Evaluation {
         let mut column = vec![None; model.stack.specs().len()];
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);

@@ -1,7 +1,7 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::estimate::{Fitted, Model, Screening, Suspect};
+use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::{Context, screened};
 use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
@@ -26,6 +26,67 @@ impl From<LoadSetting> for Load {
             LoadSetting::Current => Load::MotorCurrent,
         }
     }
+}
+
+/// Declares the settings of an identification: the stage's own, and those that all share.
+macro_rules! identification {
+    ($(#[$doc:meta])* pub struct $name:ident { $($own:tt)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            $($own)*
+            /// Parameters to estimate, by name, and only these; `*` stands for anything, e.g. `[base_frame.*, reduction_ratio.j2]`.
+            #[serde(default)]
+            pub free: Option<Vec<String>>,
+            /// Parameters to hold, by name; `*` stands for anything, e.g. `reduction_ratio.*`.
+            #[serde(default)]
+            pub hold: Vec<String>,
+            /// What is known of parameters beforehand, by name: `{link_geometry.*: {sigma: 0.1}}`, in the unit of the table
+            /// `parameters`; of several patterns that match the longest counts.
+            #[serde(default)]
+            pub prior: std::collections::BTreeMap<String, crate::stage::parameter_set::PriorSetting>,
+            /// Between which values parameters may change from nominal, by name: `{reduction_ratio.*: [-5e-4, 5e-4]}`, in the unit of
+            /// the table `parameters`.
+            #[serde(default)]
+            pub bounds: std::collections::BTreeMap<String, [f64; 2]>,
+            /// What winds the joints up: gravity torque of the robot's masses, or motor currents.
+            #[serde(default)]
+            pub load: crate::stage::identified::LoadSetting,
+            /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
+            #[serde(default = "crate::stage::identified::yes")]
+            pub screen: bool,
+            /// The tracker's noise.
+            #[serde(default)]
+            pub tracker: crate::robot::Instrument,
+        }
+
+        impl $name {
+            fn parameter_set(&self) -> crate::stage::parameter_set::ParameterSet<'_> {
+                crate::stage::parameter_set::ParameterSet {
+                    free: self.free.as_deref(),
+                    hold: &self.hold,
+                    prior: &self.prior,
+                    bounds: &self.bounds,
+                }
+            }
+
+            /// Faults of the settings that all identifications share; `example` names a set.
+            fn shared_faults(&self, example: &str) -> Vec<crate::error::Fault> {
+                let mut faults = self.parameter_set().faults();
+                if self.on.is_empty() {
+                    faults.push(crate::error::Fault::new("on", format!("expected at least one set, e.g. [{example}]")));
+                }
+                faults.extend(self.tracker.fault().map(|fault| crate::error::Fault::new("tracker", fault)));
+                faults
+            }
+        }
+    };
+}
+pub(crate) use identification;
+
+pub(crate) fn yes() -> bool {
+    true
 }
 
 crate::stage::writes! {
@@ -110,6 +171,29 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             fitted.unmodelled * 1e3,
             noise_axis * 1e3
         ));
+    }
+    for (k, opinion) in &fitted.opinions {
+        let spec = &model.stack.specs()[*k];
+        if let (Some((alone, sigma)), true) = (opinion.without, opinion.conflict > CONFLICT) {
+            let show = |value: f64| format!("{:.4}", spec.unit.from_si(value));
+            services.warn(format!(
+                "{}: the prior says {} +- {} {unit}, the data say {} +- {} {unit}, {:.1} sigma apart: one of them is wrong",
+                spec.name,
+                show(opinion.prior.mean),
+                show(opinion.prior.sigma),
+                show(alone),
+                show(sigma),
+                opinion.conflict,
+                unit = spec.unit.symbol()
+            ));
+        }
+    }
+    let stopped: Vec<&str> = (0..fitted.fates.len())
+        .filter(|k| matches!(fitted.fates[*k], Fate::Bound(_)))
+        .map(|k| model.stack.specs()[k].name.as_str())
+        .collect();
+    if !stopped.is_empty() {
+        services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
     if fitted.downweighted > 0 {
         services.note(format!("{} rows stand far off and count less", fitted.downweighted));

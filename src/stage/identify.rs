@@ -5,41 +5,24 @@
 use crate::effect::{EFFECTS, Effect, EffectStack, Setting, entry};
 use crate::error::{Fault, Result, nearest};
 use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
-use crate::robot::{Instrument, RobotModel};
-use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::robot::RobotModel;
+use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Settings of `identify`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Identify {
-    /// Sets of the split to fit.
-    #[serde(default = "fit_set")]
-    pub on: Vec<String>,
-    /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
-    #[serde(default = "all_effects")]
-    pub effects: Vec<String>,
-    /// Parameters to hold at nominal, by name; `*` stands for anything, e.g. `reduction_ratio.*`.
-    #[serde(default)]
-    pub hold: Vec<String>,
-    /// What winds the joints up: gravity torque of the robot's masses, or motor currents.
-    #[serde(default)]
-    pub load: LoadSetting,
-    /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
-    #[serde(default = "yes")]
-    pub screen: bool,
-    /// The tracker's noise.
-    #[serde(default)]
-    pub tracker: Instrument,
+crate::stage::identified::identification! {
+    /// Settings of `identify`.
+    pub struct Identify {
+        /// Sets of the split to fit.
+        #[serde(default = "fit_set")]
+        pub on: Vec<String>,
+        /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
+        #[serde(default = "all_effects")]
+        pub effects: Vec<String>,
+    }
 }
 
-fn yes() -> bool {
-    true
-}
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
@@ -64,7 +47,7 @@ impl Stage for Identify {
     type Writes = Identified;
 
     fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
+        let mut faults = self.shared_faults("fit");
         for (k, name) in self.effects.iter().enumerate() {
             if entry(name).is_none() {
                 let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
@@ -75,12 +58,6 @@ impl Stage for Identify {
                     format!("unknown effect `{name}`; {hint}allowed: {}", names.join(", ")),
                 ));
             }
-        }
-        if self.on.is_empty() {
-            faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
-        }
-        if let Some(fault) = self.tracker.fault() {
-            faults.push(Fault::new("tracker", fault));
         }
         faults
     }
@@ -99,14 +76,7 @@ impl Stage for Identify {
             }
         }
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
-        let specs = model.stack.specs();
-        let (held, candidates): (Vec<usize>, Vec<usize>) =
-            (0..specs.len()).partition(|k| self.hold.iter().any(|pattern| matches(pattern, &specs[*k].name)));
-        for pattern in &self.hold {
-            if !specs.iter().any(|spec| matches(pattern, &spec.name)) {
-                context.services.warn(format!("hold: `{pattern}` matches no parameter of this model"));
-            }
-        }
+        let (candidates, held) = self.parameter_set().apply(&mut model, |_| true, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
@@ -137,11 +107,13 @@ fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
         .effects()
         .filter(|(effect, _)| GEOMETRY.contains(&effect.name()))
         .flat_map(|(_, range)| range)
-        .filter(|k| matches!(fitted.fates[*k], Fate::Free(_)))
+        .filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_)))
         .count();
     let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>() + 3;
     let held = model.stack.specs().len() != fitted.singular_all.len();
-    (asked && !held).then_some((found, expected))
+    // A prior makes its parameter known whatever the data see.
+    let told = model.known.values().any(|known| known.prior.is_some());
+    (asked && !held && !told).then_some((found, expected))
 }
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
@@ -178,6 +150,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
         model.stack.effects().filter_map(|(effect, _)| entry(effect.name())).map(|entry| (entry.make)(setting)).collect();
     effects.push(compliance);
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
+    rival.known.clone_from(&model.known);
     let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
     let refitted = fit(&mut rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
@@ -203,29 +176,4 @@ fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
     let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row).powi(2) / 3.0).sum::<f64>() / rows;
     let values = 3.0 * rows;
     values * (noise + fitted.unmodelled * fitted.unmodelled).ln() + fitted.singular.len() as f64 * values.ln()
-}
-
-/// Whether a pattern with `*` for anything matches the whole name.
-fn matches(pattern: &str, name: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == name,
-        Some((head, tail)) => name
-            .strip_prefix(head)
-            .is_some_and(|rest| rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::matches;
-
-    #[test]
-    fn a_star_stands_for_anything() {
-        assert!(matches("reduction_ratio.*", "reduction_ratio.j2"));
-        assert!(matches("*.j2", "reduction_ratio.j2"));
-        assert!(matches("*", "x"));
-        assert!(matches("a*c*e", "abcde"));
-        assert!(!matches("a*c", "abcd"));
-        assert!(!matches("reduction_ratio", "reduction_ratio.j2"));
-    }
 }

@@ -4,6 +4,7 @@ mod identified;
 mod identify;
 pub mod ingest;
 pub mod learn;
+mod parameter_set;
 mod registry;
 mod report;
 mod robot;

@@ -2,36 +2,21 @@
 
 use crate::error::{Error, Fault, Result};
 use crate::estimate::FitOptions;
-use crate::robot::{Instrument, RobotModel};
-use crate::stage::identified::{Fitting, Identified, LoadSetting};
+use crate::robot::RobotModel;
+use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
 use crate::table::{Parameters, Prediction, Recording, Robot, Split};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Settings of `stiffness`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Stiffness {
-    /// Sets of the split to fit: loaded poses.
-    pub on: Vec<String>,
-    /// What winds the joints up.
-    #[serde(default)]
-    pub load: LoadSetting,
-    /// Joints to estimate, from 1; all that the data see if empty.
-    #[serde(default)]
-    pub joints: Vec<usize>,
-    /// Whether rows that no smooth model can follow are set aside and listed, as in `identify`.
-    #[serde(default = "yes")]
-    pub screen: bool,
-    /// The tracker's noise.
-    #[serde(default)]
-    pub tracker: Instrument,
-}
-
-fn yes() -> bool {
-    true
+crate::stage::identified::identification! {
+    /// Settings of `stiffness`.
+    pub struct Stiffness {
+        /// Sets of the split to fit: loaded poses.
+        pub on: Vec<String>,
+        /// Joints to estimate, from 1; all that the data see if empty.
+        #[serde(default)]
+        pub joints: Vec<usize>,
+    }
 }
 
 crate::stage::reads! {
@@ -53,14 +38,7 @@ impl Stage for Stiffness {
     type Writes = Identified;
 
     fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        if self.on.is_empty() {
-            faults.push(Fault::new("on", "expected at least one set, e.g. [loaded]"));
-        }
-        if let Some(fault) = self.tracker.fault() {
-            faults.push(Fault::new("tracker", fault));
-        }
-        faults
+        self.shared_faults("loaded")
     }
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
@@ -81,11 +59,14 @@ impl Stage for Stiffness {
                 format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
             ));
         }
-        let (candidates, others): (Vec<usize>, Vec<usize>) = (0..specs.len())
-            .partition(|k| specs[*k].name.starts_with(EFFECT) && (wanted.is_empty() || wanted.contains(&specs[*k].name)));
+        let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|other| other == name);
+        let open = |name: &str| name.starts_with(EFFECT) && chosen(name);
+        let (candidates, _) = self.parameter_set().apply(&mut model, open, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
-        let held: Vec<usize> = others.into_iter().filter(|k| model.stack.specs()[*k].name.starts_with(EFFECT)).collect();
+        let specs = model.stack.specs();
+        let held: Vec<usize> =
+            (0..specs.len()).filter(|k| specs[*k].name.starts_with(EFFECT) && !candidates.contains(k)).collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
         let fitting = Fitting {
             data: &data,

@@ -16,8 +16,8 @@ crate::table::rows! { "parameters",
         change: f64,
         /// One standard deviation; null where it was not estimated.
         sigma: Option<f64>,
-        /// `free` (estimated), `earlier` (estimated by an earlier step), `held` (by the user), `redundant` (other free parameters do
-        /// the same), `unseen` (the data do not see it).
+        /// `free` (estimated), `bound` (estimated, and stopped by its bound), `earlier` (estimated by an earlier step), `held` (by the
+        /// user), `redundant` (other free parameters do the same), `unseen` (the data do not see it).
         status: String,
         /// The step that set the value.
         step: String,
@@ -28,7 +28,7 @@ crate::table::rows! { "parameters",
 
 use crate::effect::{BaseFrame, EFFECTS, EffectStack, Load, Setting, entry};
 use crate::error::{Error, Result};
-use crate::estimate::{Fate, Fitted, Model};
+use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -36,6 +36,9 @@ use nalgebra::Vector3;
 
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
+
+/// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
+const SILENT: f64 = 10.0;
 
 impl Parameters {
     /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
@@ -67,8 +70,15 @@ impl Parameters {
                     Fate::Free(sigma) => {
                         let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
                         let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
-                        let remark = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
-                        ("free", Some(spec.unit.from_si(*sigma)), remark)
+                        let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
+                        let opinion = fitted.opinions.get(&k).and_then(|opinion| told(opinion, spec.unit));
+                        let remarks: Vec<String> = opinion.into_iter().chain(pair).collect();
+                        ("free", Some(spec.unit.from_si(*sigma)), (!remarks.is_empty()).then(|| remarks.join("; ")))
+                    }
+                    Fate::Bound(wanted) => {
+                        let end = if *wanted > model.x[k] { "upper" } else { "lower" };
+                        let wanted = spec.unit.from_si(*wanted);
+                        ("bound", None, Some(format!("stopped by its {end} bound; the data would have it at {wanted:.4e}")))
                     }
                     Fate::Kept if held.contains(&k) => ("held", None, Some("held at nominal by the pipeline".to_string())),
                     Fate::Kept => ("held", None, None),
@@ -145,6 +155,22 @@ impl Parameters {
         let translation = ["x", "y", "z"].map(|axis| value(axis, Unit::Millimetre));
         let rotation = ["rx", "ry", "rz"].map(|axis| value(axis, Unit::Radian));
         Pose::from_rotation_vector(Vector3::from(rotation), Vector3::from(translation))
+    }
+}
+
+/// What a prior did to a parameter, where that is worth a word.
+fn told(opinion: &Opinion, unit: Unit) -> Option<String> {
+    match opinion.without {
+        Some((without, sigma)) if opinion.conflict > CONFLICT => {
+            let [mean, own, without, sigma] =
+                [opinion.prior.mean, opinion.prior.sigma, without, sigma].map(|value| unit.from_si(value));
+            let apart = opinion.conflict;
+            Some(format!(
+                "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
+            ))
+        }
+        Some((_, sigma)) if sigma < SILENT * opinion.prior.sigma => None,
+        _ => Some("known from its prior alone: the data add nothing".into()),
     }
 }
 

@@ -8,8 +8,8 @@ use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 
-const SIGMA: f64 = 1e-5;
-const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
+pub const SIGMA: f64 = 1e-5;
+pub const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
 
 /// A reproducible number that is as good as normal: the sum of twelve uniform ones.
 fn normal(index: usize) -> f64 {
@@ -24,19 +24,19 @@ fn normal(index: usize) -> f64 {
     sum
 }
 
-fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
+pub fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
     let setting = Setting { base, load: Load::GravityTorque };
     let made = effects.iter().map(|name| (entry(name).expect("registered").make)(&setting)).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 
 /// A recording of a robot whose true parameters are drawn, with the names and values of what was drawn.
-fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed: usize) -> (Measurements, Model) {
+pub fn recording(description: &RobotDescription, effects: &[&str], rows: usize, seed: usize) -> (Measurements, Model) {
     recording_where(description, effects, rows, seed, |_| true)
 }
 
 /// The same with only those parameters off nominal that `drawn` accepts.
-fn recording_where(
+pub fn recording_where(
     description: &RobotDescription,
     effects: &[&str],
     rows: usize,

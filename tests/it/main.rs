@@ -11,6 +11,7 @@ mod ingest;
 mod layers;
 mod learn;
 mod network;
+mod parameter_sets;
 mod pipelines;
 mod poses;
 mod readme;

@@ -1,0 +1,146 @@
+//! Parameters chosen by name: which are free, held, bounded or known beforehand, by patterns with `*` for anything.
+//!
+//! Figures are in the unit that the table `parameters` shows for each (mm, rad, rad/Nm, ...). Where several patterns of one
+//! setting match a parameter the longest counts.
+
+use crate::effect::{BaseFrame, EFFECTS};
+use crate::error::{Fault, nearest};
+use crate::estimate::{Bounds, Known, Model, Prior};
+use crate::stage::Context;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What is known of a parameter beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PriorSetting {
+    /// One standard deviation, in the parameter's unit.
+    pub sigma: f64,
+    /// Expected change from nominal, in the parameter's unit.
+    #[serde(default)]
+    pub mean: f64,
+}
+
+/// The settings `free`, `hold`, `prior` and `bounds` of a stage.
+pub struct ParameterSet<'a> {
+    pub free: Option<&'a [String]>,
+    pub hold: &'a [String],
+    pub prior: &'a BTreeMap<String, PriorSetting>,
+    pub bounds: &'a BTreeMap<String, [f64; 2]>,
+}
+
+impl ParameterSet<'_> {
+    /// Every pattern with the setting that it stands in.
+    fn patterns(&self) -> impl Iterator<Item = (&'static str, &str)> {
+        let free = self.free.unwrap_or_default().iter().map(|pattern| ("free", pattern.as_str()));
+        let hold = self.hold.iter().map(|pattern| ("hold", pattern.as_str()));
+        let prior = self.prior.keys().map(|pattern| ("prior", pattern.as_str()));
+        free.chain(hold).chain(prior).chain(self.bounds.keys().map(|pattern| ("bounds", pattern.as_str())))
+    }
+
+    /// What is wrong with the settings whatever the robot.
+    pub fn faults(&self) -> Vec<Fault> {
+        let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+        let mut faults = Vec::new();
+        for (setting, pattern) in self.patterns() {
+            let effect = pattern.split('.').next().unwrap_or_default();
+            let base = matches!(setting, "prior" | "bounds") && effect == BaseFrame::NAME;
+            if base {
+                let message = "where the robot stands in the tracker's frame is found by alignment: only `free` and `hold` apply";
+                faults.push(Fault::new(format!("{setting}.{pattern}"), message));
+            } else if !names.iter().any(|name| matches(effect, name)) {
+                let near = nearest(effect, names.iter().copied()).map(|near| format!("did you mean `{near}`? "));
+                faults.push(Fault::new(
+                    setting,
+                    format!(
+                        "`{pattern}` names no effect; {}allowed are names as in the table parameters, e.g. reduction_ratio.j2, \
+                         link_geometry.l3.x, or with `*` for anything; effects: {}",
+                        near.unwrap_or_default(),
+                        names.join(", ")
+                    ),
+                ));
+            }
+        }
+        if self.free.is_some_and(<[String]>::is_empty) {
+            faults.push(Fault::new("free", "name at least one parameter, or leave it out: then all are free that are not held"));
+        }
+        for (pattern, prior) in self.prior {
+            if !(prior.sigma > 0.0 && prior.sigma.is_finite() && prior.mean.is_finite()) {
+                faults.push(Fault::new(format!("prior.{pattern}"), "expected a sigma above zero, e.g. {sigma: 0.1, mean: 0}"));
+            }
+        }
+        for (pattern, [low, high]) in self.bounds {
+            if !(low < high && low.is_finite() && high.is_finite()) {
+                faults
+                    .push(Fault::new(format!("bounds.{pattern}"), "expected two numbers, the lower one first, e.g. [-0.5, 0.5]"));
+            }
+        }
+        faults
+    }
+
+    /// Sorts those of the model's parameters that `open` lets this stage estimate into (candidates, held), and tells the model
+    /// what is known beforehand. Patterns that match none of them are warned of.
+    pub fn apply(&self, model: &mut Model, open: impl Fn(&str) -> bool, context: &Context) -> (Vec<usize>, Vec<usize>) {
+        let specs = model.stack.specs();
+        let names: Vec<&str> = specs.iter().map(|spec| spec.name.as_str()).filter(|name| open(name)).collect();
+        for (setting, pattern) in self.patterns().filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name))) {
+            let near = nearest(pattern, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+            context
+                .services
+                .warn(format!("{setting}: `{pattern}` matches no parameter of this model{}", near.unwrap_or_default()));
+        }
+        let any = |patterns: &[String], name: &str| patterns.iter().any(|pattern| matches(pattern, name));
+        let wanted = |name: &str| self.free.is_none_or(|free| any(free, name)) && !any(self.hold, name);
+        let asked = (0..specs.len()).filter(|k| open(&specs[*k].name));
+        let (candidates, held): (Vec<usize>, Vec<usize>) = asked.partition(|k| wanted(&specs[*k].name));
+        let mut known = BTreeMap::new();
+        for &k in &candidates {
+            let (name, unit) = (&specs[k].name, specs[k].unit);
+            if name.starts_with(BaseFrame::NAME) {
+                continue;
+            }
+            let about = Known {
+                prior: longest(self.prior, name)
+                    .map(|prior| Prior { mean: unit.to_si(prior.mean), sigma: unit.to_si(prior.sigma) }),
+                bounds: longest(self.bounds, name).map(|[low, high]| Bounds { low: unit.to_si(*low), high: unit.to_si(*high) }),
+            };
+            if about != Known::default() {
+                known.insert(k, about);
+            }
+        }
+        model.known = known;
+        (candidates, held)
+    }
+}
+
+/// The entry of the longest pattern that matches.
+fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T> {
+    let matching = patterns.iter().filter(|(pattern, _)| matches(pattern, name));
+    matching.max_by_key(|(pattern, _)| pattern.len()).map(|(_, value)| value)
+}
+
+/// Whether a pattern with `*` for anything matches the whole name.
+fn matches(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((head, tail)) => name
+            .strip_prefix(head)
+            .is_some_and(|rest| rest.char_indices().map(|(at, _)| &rest[at..]).chain([""]).any(|end| matches(tail, end))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn a_star_stands_for_anything() {
+        assert!(matches("reduction_ratio.*", "reduction_ratio.j2"));
+        assert!(matches("*.j2", "reduction_ratio.j2"));
+        assert!(matches("*", "x"));
+        assert!(matches("a*c*e", "abcde"));
+        assert!(!matches("a*c", "abcd"));
+        assert!(!matches("reduction_ratio", "reduction_ratio.j2"));
+    }
+}
