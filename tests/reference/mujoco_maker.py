@@ -91,13 +91,15 @@ def spoil(rng, P, rows, outliers, exchanged):
     return chosen
 
 
-def alternatives(effects, near, hidden):
+def alternatives(effects, near):
     """Sets of effects that a recording does not tell from the wanted ones."""
     options = []
     for i, e in enumerate(effects):
         own = [[e["want"]]] + [[w] for k, w in near if k == i]
         if "accept" in e:
             own.append([e["accept"]])
+        if e["kind"] == "cable" and e["joint"] == 1:  # a spring over joint 2 is what a balancer is
+            own.append([("counterbalance", "joint 2")])
         if e["kind"] == "hardening":
             own.append([e["want"], ("joint_compliance", e["want"][1])])
         if e["kind"] == "cable" and e.get("over", 1) == 2:
@@ -168,7 +170,7 @@ def make(folder, seed, robot, family, options):
     write(folder / "tracker.csv", seen_at | {f"{c}_mm": [f"{1e3 * x:.5f}" for x in P[:, i]] for i, c in enumerate("xyz")})
     keys = ["name", "axes", "points", "tool", "mass", "com", "ratio", "kt", "payload", "payload_com", "coupling"]
     (folder / "robot.json").write_text(json.dumps({k: robot[k] for k in keys}, indent=1) + "\n")
-    sets = alternatives(effects, near, hidden)
+    sets = alternatives(effects, near)
     extra = ([("outlier", "recording")] if outliers else []) + ([("mislabelled_point", "recording")] if exchanged else [])
     (folder / "want.json").write_text(json.dumps(dict(case=folder.name, effects=named(sets[0] + extra), accept=[named(s + extra) for s in sets[1:]]), indent=1) + "\n")
     truth = dict(label=folder.name, robot=robot["name"], seed=seed, family=family, kinds=kinds, effects=[dict(e, L=round(L, 1)) for e, L in zip(effects, visible)],
@@ -192,7 +194,7 @@ def main():
     p.add_argument("--cases", type=int, default=10)
     p.add_argument("--seed", type=int, default=1)
     p.add_argument("--family", default="single", help="null, single, pairs, open, all (every single in turn), or names joined by +: " + ", ".join([*SINGLE, *OPEN]))
-    p.add_argument("--robot", help="one of " + ", ".join(ROBOTS) + ", or a robot.json of your own with `limits` (deg) and `stand` (m) added; default: each in turn")
+    p.add_argument("--robot", help="one of " + ", ".join(ROBOTS) + ", or a robot.json of your own, to which `limits` (deg, a pair a joint; default 110 both ways) and `stand` (m) may be added; default: any of them")
     p.add_argument("--points", type=int, help="rows, a third of them for validation; default 100 to 260")
     p.add_argument("--hide", nargs="*", default=[], choices=["temp", "dir", "current", "time"], help="columns to leave out; default: some, at random")
     p.add_argument("--jitter", type=float, help="repeatability of each joint, urad; default: none in half of the cases, else 2 to 16")
@@ -201,7 +203,8 @@ def main():
     p.add_argument("--visible", type=float, default=100, help="smallest L of every effect")
     options = p.parse_args()
     if options.robot and options.robot not in ROBOTS:
-        robots = [dict(stand=3.0, **json.loads(pathlib.Path(options.robot).read_text()))]
+        own = json.loads(pathlib.Path(options.robot).read_text())
+        robots = [dict(stand=3.0, limits=[(-110, 110)] * len(own["axes"])) | own]
     else:
         robots = [ROBOTS[options.robot]] if options.robot else list(ROBOTS.values())
     for i in range(options.cases):
