@@ -22,6 +22,11 @@ impl Covariance {
         Some(Self { free: free.to_vec(), root: factor.inverse()? })
     }
 
+    /// From an upper triangular root.
+    pub(crate) fn of_root(root: Mat<f64>, free: &[usize]) -> Self {
+        Self { free: free.to_vec(), root }
+    }
+
     /// Standard deviation of the `row`-th free parameter, SI.
     pub(crate) fn sigma(&self, row: usize) -> f64 {
         self.product(row, row).sqrt()

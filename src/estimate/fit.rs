@@ -1,5 +1,6 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
+use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::Factor;
 use super::known::Opinion;
@@ -7,6 +8,7 @@ use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{HUBER, Problem, Weight};
+use super::repeats::{Poses, Repeated};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -49,6 +51,10 @@ pub struct Fitted {
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
     pub singular_all: Vec<f64>,
+    /// What poses measured more than once say.
+    pub repeated: Option<Repeated>,
+    /// Poses whose rows were taken as one by the covariance; 0 where rows were taken as independent.
+    pub clusters: usize,
     /// Of the free parameters; `None` where the factor is singular.
     pub covariance: Option<Covariance>,
     /// (name, value, meaning).
@@ -61,6 +67,8 @@ const MEDIAN_CHI2_3: f64 = 2.366;
 const ITERATIONS: usize = 60;
 /// Steps of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST_ITERATIONS: usize = 4;
+/// Where at least one row in so many belongs to a repeated pose, rows are clustered.
+const REPEATING: usize = 4;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
 
@@ -124,7 +132,16 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     // The noise is known up to a factor, what was known beforehand is not.
     let scale = reduced(&errors, free.len()).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
-    let covariance = Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free);
+    let poses = Poses::of(problem.data, options.rows);
+    let clusters = clusters(&poses, options.rows.len(), free.len());
+    let covariance = match clusters {
+        Some(poses) => model
+            .with_priors(&free, data.clone())
+            .0
+            .inverse()
+            .map(|inverse| Covariance::of_root(clustered(&problem, model, &free, &inverse, poses), &free)),
+        None => Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free),
+    };
     let mut opinions = BTreeMap::new();
     if let Some(covariance) = &covariance {
         for (row, k) in free.iter().enumerate() {
@@ -146,11 +163,19 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         unmodelled: problem.unmodelled,
         covariance,
         opinions,
+        repeated: poses.against(problem.data, options.rows, &all.residuals, free.len()),
+        clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|error| **error > HUBER).count(),
         indices: indices(&singular, options.rows.len()),
         singular,
         singular_all,
     }
+}
+
+/// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.
+fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize>]> {
+    let repeated: usize = poses.repeated().map(Vec::len).sum();
+    (REPEATING * repeated >= rows && rows > 0 && poses.all().len() > parameters).then_some(poses.all())
 }
 
 /// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.

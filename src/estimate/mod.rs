@@ -2,8 +2,10 @@
 
 mod align;
 pub mod choose;
+mod cluster;
 mod covariance;
 mod factor;
+pub mod fisher;
 mod fit;
 mod known;
 mod levenberg;
@@ -11,6 +13,7 @@ mod model;
 pub mod network;
 mod observe;
 mod problem;
+mod repeats;
 mod screen;
 pub mod swarm;
 pub mod threads;
@@ -22,4 +25,5 @@ pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};
 pub use levenberg::{Iteration, Stop};
 pub use model::Model;
 pub use observe::Visibility;
+pub use repeats::{Poses, Repeated, spread};
 pub use screen::{Kind, Screening, Suspect, fit_screened};

@@ -3,7 +3,7 @@
 use crate::effect::Load;
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect};
 use crate::robot::{Measurements, RobotModel};
-use crate::stage::{Context, screened};
+use crate::stage::{Context, repeated, screened};
 use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,6 +59,10 @@ macro_rules! identification {
             /// The tracker's noise.
             #[serde(default)]
             pub tracker: crate::robot::Instrument,
+            /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
+            /// `{arcsec: 3}`.
+            #[serde(default)]
+            pub repeatability: crate::stage::repeated::Repeatability,
         }
 
         impl $name {
@@ -77,6 +81,7 @@ macro_rules! identification {
                 if self.on.is_empty() {
                     faults.push(crate::error::Fault::new("on", format!("expected at least one set, e.g. [{example}]")));
                 }
+                faults.extend(self.repeatability.fault());
                 faults.extend(self.tracker.fault().map(|fault| crate::error::Fault::new("tracker", fault)));
                 faults
             }
@@ -117,6 +122,8 @@ pub struct Fitting<'a> {
     pub seen_before: &'a [bool],
     /// Geometric rank: found and expected.
     pub geometry: Option<(usize, usize)>,
+    /// One standard deviation of every revolute joint that rows are weighted by, rad.
+    pub repeatability: Option<f64>,
 }
 
 impl Identified {
@@ -130,13 +137,16 @@ impl Identified {
         // Of a fit on top of another only the last parameters' uncertainty is known, which would flatter.
         let covariance = fitted.covariance.as_ref().filter(|_| fitting.earlier.is_none());
         note(context, model, fitted, fitting);
+        if let Some(repeated) = &fitted.repeated {
+            repeated::note(context, repeated);
+        }
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
         let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
             fit: Fit::of(step, fitted),
-            observability: Observability::of(step, fitted, fitting.geometry),
+            observability: Observability::of(step, fitted, fitting.geometry, fitting.repeatability),
             prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
                 .with_suspects(aside),
             suspects: Suspects::of(step, fitting.screening, fitting.recording, fitting.split),

@@ -42,7 +42,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -64,7 +64,7 @@ impl Stage for Identify {
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
         let robot = RobotModel::new(reads.robot.to_description()?);
-        let data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let setting = Setting { base: align(&robot, &data, &rows), load: self.load.into() };
         let mut effects = Vec::new();
@@ -77,6 +77,7 @@ impl Stage for Identify {
         }
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
         let (candidates, held) = self.parameter_set().apply(&mut model, |_| true, context);
+        let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
@@ -90,6 +91,7 @@ impl Stage for Identify {
             earlier: None,
             seen_before: &vec![false; data.rows()],
             geometry: geometric_rank(&model, &fitted),
+            repeatability,
         };
         question_ratios(&model, &fitted, &fitting, &setting, context);
         Ok(Identified::of(context, &model, &fitted, &fitting))

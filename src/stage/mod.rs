@@ -6,6 +6,7 @@ pub mod ingest;
 pub mod learn;
 mod parameter_set;
 mod registry;
+mod repeated;
 mod report;
 mod robot;
 mod screened;

@@ -33,7 +33,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses, everything identified before is kept";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -44,7 +44,7 @@ impl Stage for Stiffness {
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
         const EFFECT: &str = "joint_compliance";
         let robot = RobotModel::new(reads.robot.to_description()?);
-        let data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let mut model = reads.parameters.model(robot, &[EFFECT], self.load.into())?;
         let compliance = model.stack.effects().find(|(effect, _)| effect.name() == EFFECT);
@@ -62,6 +62,7 @@ impl Stage for Stiffness {
         let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|other| other == name);
         let open = |name: &str| name.starts_with(EFFECT) && chosen(name);
         let (candidates, _) = self.parameter_set().apply(&mut model, open, context);
+        let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
         let specs = model.stack.specs();
@@ -79,6 +80,7 @@ impl Stage for Stiffness {
             earlier: Some(&reads.parameters),
             seen_before: &seen_before,
             geometry: None,
+            repeatability,
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }

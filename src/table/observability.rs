@@ -16,8 +16,9 @@ crate::table::rows! { "observability",
 use crate::estimate::Fitted;
 
 impl Observability {
-    /// What a fit could see. `expected` is the rank that theory gives for the geometry, where it was asked for.
-    pub fn of(step: &str, fitted: &Fitted, geometry: Option<(usize, usize)>) -> Self {
+    /// What a fit could see. `expected` is the rank that theory gives for the geometry, where it was asked for;
+    /// `repeatability` the standard deviation of the joints (rad) that rows are weighted by.
+    pub fn of(step: &str, fitted: &Fitted, geometry: Option<(usize, usize)>, repeatability: Option<f64>) -> Self {
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
@@ -48,6 +49,36 @@ impl Observability {
             fitted.unmodelled * 1e3,
             "standard deviation per axis of the fitted rows beyond the instrument's noise",
         );
+        if let Some(sigma) = repeatability {
+            push("joint_repeatability_rad", 0, sigma, "standard deviation of every revolute joint that rows are weighted by");
+        }
+        if let Some(repeated) = &fitted.repeated {
+            push("repeated_poses", 0, repeated.poses as f64, "fitted poses measured more than once");
+            let floor = if repeated.revisited {
+                "standard deviation per axis of rows about their pose's mean: no model can do better"
+            } else {
+                "standard deviation per axis of rows about their pose's mean, the arm at rest: without the joints' repeatability"
+            };
+            push("repeat_noise_mm", 0, repeated.noise * 1e3, floor);
+            push("repeat_freedom", 0, repeated.freedom as f64, "degrees of freedom of repeat_noise_mm");
+            if let Some((ratio, chance)) = repeated.lack_of_fit {
+                push(
+                    "lack_of_fit_F",
+                    0,
+                    ratio,
+                    "mean square of what is left between poses over that within: 1 for a complete model",
+                );
+                push("lack_of_fit_p", 0, chance, "chance of a larger F under a complete model");
+            }
+        }
+        if fitted.clusters > 0 {
+            push(
+                "clusters",
+                0,
+                fitted.clusters as f64,
+                "poses whose rows the covariance takes as one: sigma allows for what they share",
+            );
+        }
         push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
         for (name, value, meaning) in &fitted.indices {
             push(name, 0, *value, meaning);

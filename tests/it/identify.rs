@@ -12,7 +12,7 @@ pub const SIGMA: f64 = 1e-5;
 pub const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
 
 /// A reproducible number that is as good as normal: the sum of twelve uniform ones.
-fn normal(index: usize) -> f64 {
+pub fn normal(index: usize) -> f64 {
     let mut state = (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut sum = -6.0;
     for _ in 0..12 {

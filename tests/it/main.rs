@@ -15,6 +15,7 @@ mod parameter_sets;
 mod pipelines;
 mod poses;
 mod readme;
+mod repeats;
 mod report;
 mod resume;
 mod robot;

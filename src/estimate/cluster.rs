@@ -1,0 +1,90 @@
+//! Covariance that does not believe rows of one pose to be independent: the sandwich, clustered by pose.
+//!
+//! A' A with one row R^-1 R^-T J' (1 - H)^-1/2 e per pose (Bell and McCaffrey, 2002: unbiased where the stated noise is right).
+
+use super::factor::Tall;
+use super::model::Model;
+use super::problem::{HUBER, Problem, Weight};
+use faer::Mat;
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
+use rayon::prelude::*;
+
+/// A direction in which a pose alone decides has nothing left to show its error by: its share is capped here.
+const SOLE: f64 = 0.98;
+/// Poses whose rows are factored at once.
+const CHUNK: usize = 256;
+
+/// A root of the covariance of the `free` parameters (upper triangular, p x p) whose factor's inverse is `inverse`, priors included.
+pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], inverse: &Mat<f64>, poses: &[Vec<usize>]) -> Mat<f64> {
+    let p = free.len();
+    let mut column = vec![usize::MAX; model.stack.specs().len()];
+    for (j, parameter) in free.iter().enumerate() {
+        column[*parameter] = j;
+    }
+    let lines: Vec<Vec<f64>> = poses
+        .par_iter()
+        .map_init(
+            || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
+            |(scratch, jacobian), pose| {
+                let mut errors = DVector::zeros(3 * pose.len());
+                let mut visible = DMatrix::zeros(3 * pose.len(), p);
+                for (i, &row) in pose.iter().enumerate() {
+                    jacobian.fill(Vector3::zeros());
+                    let point =
+                        model.stack.derivatives(&model.robot, problem.data, row, &model.x, scratch, |parameter, derivative| {
+                            if let Some(sum) = jacobian.get_mut(column[parameter]) {
+                                *sum += derivative;
+                            }
+                        });
+                    let weight = Weight::of(problem.data, row, problem.unmodelled);
+                    let error = weight.apply(&(problem.data.position[row] - point));
+                    let share = if error.norm() > HUBER { (HUBER / error.norm()).sqrt() } else { 1.0 };
+                    errors.rows_mut(3 * i, 3).copy_from(&(error * share));
+                    for k in 0..p {
+                        let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse[(j, k)]).sum();
+                        visible.view_mut((3 * i, k), (3, 1)).copy_from(&(weight.apply(&seen) * share));
+                    }
+                }
+                influence(&visible, &errors, inverse)
+            },
+        )
+        .collect();
+    let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
+    let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse[(j, k)] * weight }));
+    triangle(p, lines.into_iter().chain(told))
+}
+
+/// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.
+fn influence(visible: &DMatrix<f64>, errors: &DVector<f64>, inverse: &Mat<f64>) -> Vec<f64> {
+    let eigen = SymmetricEigen::new(visible * visible.transpose());
+    let mut along = eigen.eigenvectors.tr_mul(errors);
+    for (value, share) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
+        *value /= (1.0 - share.clamp(0.0, SOLE)).sqrt();
+    }
+    let score = visible.tr_mul(&(&eigen.eigenvectors * along));
+    upwards(inverse, |k| score[k])
+}
+
+/// R^-1 times a vector.
+fn upwards(inverse: &Mat<f64>, vector: impl Fn(usize) -> f64) -> Vec<f64> {
+    let p = inverse.ncols();
+    (0..p).map(|j| (j..p).map(|k| inverse[(j, k)] * vector(k)).sum()).collect()
+}
+
+/// The upper triangular root of A' A: columns are factored last first, and the factor turned over.
+fn triangle(p: usize, lines: impl Iterator<Item = Vec<f64>>) -> Mat<f64> {
+    let mut tall = Tall::new(p + 1, CHUNK);
+    let lines: Vec<Vec<f64>> = lines.collect();
+    for some in lines.chunks(CHUNK) {
+        let mut chunk = tall.chunk(some.len());
+        for (i, line) in some.iter().enumerate() {
+            for (j, value) in line.iter().rev().enumerate() {
+                chunk[(i, j)] = *value;
+            }
+        }
+        tall.absorb(some.len());
+    }
+    let factor = tall.factor();
+    let columns: Vec<Vec<f64>> = (0..p).map(|j| factor.column(j)).collect();
+    Mat::from_fn(p, p, |a, b| columns[p - 1 - a][p - 1 - b])
+}

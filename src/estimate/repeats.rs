@@ -1,0 +1,200 @@
+//! Poses measured more than once: pure error that no model can explain, how well joints repeat, and what the model lacks.
+//!
+//! Rows of one pose right after each other are one visit: the arm stood still and only the tracker's noise differs. Visits of a
+//! pose differ by the joints' repeatability too: covariance s2 J J' of the point, s by restricted maximum likelihood.
+
+use super::fisher::tail;
+use super::model::Model;
+use super::problem::Weight;
+use crate::effect::{EffectStack, Load, Setting, entry};
+use crate::robot::Measurements;
+use nalgebra::{Matrix3, Vector3};
+
+/// Rows grouped by pose and payload; poses in the order of their first rows, rows in the order of recording.
+pub struct Poses(Vec<Vec<usize>>);
+
+/// What repeats say against a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeated {
+    /// Poses with more than one row.
+    pub poses: usize,
+    /// Standard deviation per axis of rows about their pose's mean, m.
+    pub noise: f64,
+    /// Degrees of freedom of `noise`.
+    pub freedom: usize,
+    /// Whether the arm left some pose and came back; else `noise` lacks the joints' repeatability.
+    pub revisited: bool,
+    /// Mean square of what the model leaves between poses over that within: F, and the chance of more under a complete model.
+    pub lack_of_fit: Option<(f64, f64)>,
+}
+
+impl Poses {
+    pub fn of(data: &Measurements, rows: &[usize]) -> Self {
+        let mut sorted = rows.to_vec();
+        sorted.sort_unstable_by(|a, b| {
+            let joints = data.q(*a).iter().zip(data.q(*b)).map(|(x, y)| x.total_cmp(y));
+            let order = joints.fold(data.payload[*a].total_cmp(&data.payload[*b]), |order, next| order.then(next));
+            order.then(a.cmp(b))
+        });
+        let mut poses: Vec<Vec<usize>> = sorted.chunk_by(|a, b| data.same_pose(*a, *b)).map(<[usize]>::to_vec).collect();
+        poses.sort_unstable_by_key(|rows| rows[0]);
+        Self(poses)
+    }
+
+    pub fn all(&self) -> &[Vec<usize>] {
+        &self.0
+    }
+
+    /// Poses with more than one row.
+    pub fn repeated(&self) -> impl Iterator<Item = &Vec<usize>> {
+        self.0.iter().filter(|rows| rows.len() > 1)
+    }
+
+    /// What the repeats say against `residuals` (m, of `rows`) that a fit of `parameters` left. `None` without repeats.
+    pub fn against(
+        &self,
+        data: &Measurements,
+        rows: &[usize],
+        residuals: &[Vector3<f64>],
+        parameters: usize,
+    ) -> Option<Repeated> {
+        let (mut squares, mut whitened, mut freedom, mut revisited) = (0.0, 0.0, 0, false);
+        for pose in self.repeated() {
+            let mean = mean(data, pose);
+            for row in pose {
+                let off = data.position[*row] - mean;
+                squares += off.norm_squared();
+                whitened += Weight::of(data, *row, 0.0).apply(&off).norm_squared();
+            }
+            freedom += 3 * (pose.len() - 1);
+            revisited |= visits(pose).count() > 1;
+        }
+        if freedom == 0 {
+            return None;
+        }
+        let total: f64 =
+            rows.iter().zip(residuals).map(|(row, residual)| Weight::of(data, *row, 0.0).apply(residual).norm_squared()).sum();
+        let between = (3 * rows.len()).checked_sub(parameters + freedom).filter(|between| *between > 0);
+        let lack_of_fit = between.filter(|_| whitened > 0.0).map(|between| {
+            let ratio = (total - whitened).max(0.0) / between as f64 / (whitened / freedom as f64);
+            (ratio, tail(ratio, between as f64, freedom as f64))
+        });
+        let noise = (squares / freedom as f64).sqrt();
+        Some(Repeated { poses: self.repeated().count(), noise, freedom, revisited, lack_of_fit })
+    }
+
+    /// One standard deviation (rad) by which revolute joints miss a pose that they return to. `None` where no pose was left and
+    /// returned to, or where the tracker's noise explains the scatter.
+    pub fn joint_repeatability(&self, model: &Model, data: &Measurements) -> Option<f64> {
+        let groups: Vec<Group> = self.repeated().filter_map(|pose| Group::of(model, data, pose)).collect();
+        // A pose that scatters far more than the others saw a mistake or an event.
+        let mut scatters: Vec<f64> = groups.iter().map(|group| group.scatter).collect();
+        scatters.sort_unstable_by(f64::total_cmp);
+        let limit = STRANGE * scatters.get(scatters.len() / 2)?;
+        let groups: Vec<Group> = groups.into_iter().filter(|group| group.scatter <= limit).collect();
+        let deviance = |log: f64| groups.iter().map(|group| group.deviance(log.exp())).sum::<f64>();
+        let silent: f64 = groups.iter().map(|group| group.deviance(0.0)).sum();
+        let grid = (0..=60).map(|k| FINEST.ln() + (COARSEST / FINEST).ln() * f64::from(k) / 60.0);
+        let best = grid.min_by(|a, b| deviance(*a).total_cmp(&deviance(*b)))?;
+        let step = (COARSEST / FINEST).ln() / 60.0;
+        let log = minimum(deviance, best - step, best + step);
+        (silent - deviance(log) > CLEAR).then(|| log.exp())
+    }
+}
+
+/// Of the median scatter: five times its standard deviation.
+const STRANGE: f64 = 25.0;
+/// Joint repeatability between these (rad) is looked for: 0.002 to 2000 arcsec.
+const FINEST: f64 = 1e-8;
+const COARSEST: f64 = 1e-2;
+/// Fall of the deviance that chance alone makes once in a hundred recordings: half of chi-square's, since s cannot be negative.
+const CLEAR: f64 = 5.4;
+
+fn mean(data: &Measurements, rows: &[usize]) -> Vector3<f64> {
+    rows.iter().map(|row| data.position[*row]).sum::<Vector3<f64>>() / rows.len() as f64
+}
+
+/// Stretches of neighbouring rows.
+fn visits(pose: &[usize]) -> impl Iterator<Item = &[usize]> {
+    pose.chunk_by(|a, b| a + 1 == *b)
+}
+
+/// A pose that was left and returned to.
+struct Group {
+    /// Mean point of each visit (m) and the covariance of its noise.
+    visits: Vec<(Vector3<f64>, Matrix3<f64>)>,
+    /// J J' of the revolute joints, m2 per rad2.
+    lever: Matrix3<f64>,
+    /// Mean square of the visits about their mean, m2.
+    scatter: f64,
+}
+
+impl Group {
+    fn of(model: &Model, data: &Measurements, pose: &[usize]) -> Option<Self> {
+        let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(pose)
+            .map(|rows| {
+                let variance = rows.iter().map(|row| data.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
+                let count = rows.len() as f64;
+                (mean(data, rows), Matrix3::from_diagonal(&(variance / (count * count))))
+            })
+            .collect();
+        let middle = visits.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / visits.len() as f64;
+        let squares: f64 = visits.iter().map(|(point, _)| (point - middle).norm_squared()).sum();
+        let freedom = visits.len().checked_sub(1).filter(|freedom| *freedom > 0)?;
+        let lever = levers(model, data, pose.first().copied().into_iter()).pop()?;
+        Some(Self { visits, lever, scatter: squares / freedom as f64 })
+    }
+
+    /// -2 log of the restricted likelihood of a joint repeatability (rad), but for a constant.
+    fn deviance(&self, sigma: f64) -> f64 {
+        let (mut sum, mut information, mut weighted) = (0.0, Matrix3::zeros(), Vector3::zeros());
+        let mut inverses = Vec::with_capacity(self.visits.len());
+        for (point, noise) in &self.visits {
+            let covariance = noise + self.lever * (sigma * sigma);
+            let inverse = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
+            sum += covariance.determinant().ln();
+            information += inverse;
+            weighted += inverse * point;
+            inverses.push(inverse);
+        }
+        sum += information.determinant().ln();
+        let middle = information.try_inverse().unwrap_or_else(Matrix3::zeros) * weighted;
+        let squares =
+            self.visits.iter().zip(&inverses).map(|((point, _), inverse)| (point - middle).dot(&(inverse * (point - middle))));
+        sum + squares.sum::<f64>()
+    }
+}
+
+/// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
+fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
+    let setting = Setting { base: model.base(), load: Load::GravityTorque };
+    let zeros = entry("joint_offset").map(|entry| (entry.make)(&setting));
+    let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
+    let mut scratch = joints.stack.scratch(&joints.robot);
+    let mut columns = vec![Vector3::zeros(); joints.robot.joints()];
+    rows.map(|row| {
+        columns.fill(Vector3::zeros());
+        joints.stack.derivatives(&joints.robot, data, row, &joints.x, &mut scratch, |joint, derivative| {
+            if joints.robot.is_revolute(joint) {
+                columns[joint] += derivative;
+            }
+        });
+        columns.iter().map(|column| column * column.transpose()).sum()
+    })
+    .collect()
+}
+
+/// Covariance (m2) that joints make of every row's point which repeat to `sigma` (rad, one standard deviation).
+pub fn spread(model: &Model, data: &Measurements, sigma: f64) -> Vec<Matrix3<f64>> {
+    levers(model, data, 0..data.rows()).into_iter().map(|lever| lever * (sigma * sigma)).collect()
+}
+
+/// Golden section: where a function of one valley between `low` and `high` is least.
+fn minimum(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_8;
+    for _ in 0..30 {
+        let (left, right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        if value(left) < value(right) { high = right } else { low = left }
+    }
+    0.5 * (low + high)
+}

@@ -1,0 +1,180 @@
+//! Poses measured more than once: the joints' repeatability, the floor, lack of fit, and sigmas that allow for shared errors.
+
+use crate::desk::{Desk, table};
+use crate::fixture;
+use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
+use crate::sr210d::experiment;
+use calib::estimate::{Fate, FitOptions, Fitted, Model, Poses, align, fit, spread};
+use calib::robot::{Measurements, RobotModel};
+use calib::stage::{Identify, IdentifyReads, Stage};
+use calib::table::{Observability, Parameters, Split};
+use nalgebra::Vector3;
+use serde_json::json;
+
+const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+
+/// A recording of `poses` poses with so many visits of so many rows; at each visit every joint misses by `joint_sigma`.
+fn visited(poses: usize, visits: usize, rows: usize, joint_sigma: f64, seed: usize) -> (Measurements, Model) {
+    let description = fixture::offset_wrist();
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let (once, truth) = recording(&description, &effects, poses, seed);
+    let count = poses * visits * rows;
+    let mut data = Measurements {
+        joints: once.joints,
+        position: vec![Vector3::zeros(); count],
+        sigma: vec![Vector3::repeat(SIGMA); count],
+        payload: vec![0.0; count],
+        ..Measurements::default()
+    };
+    let mut real = Vec::new();
+    // All poses, then all again.
+    for row in 0..count {
+        let visit = row / rows;
+        data.q.extend(once.q(visit % poses));
+        let missed = (0..once.joints).map(|joint| joint_sigma * normal(seed * 1_000_003 + visit * once.joints + joint));
+        real.extend(once.q(visit % poses).iter().zip(missed).map(|(q, missed)| q + missed));
+    }
+    let commanded = std::mem::replace(&mut data.q, real);
+    data.position = truth.predict(&data);
+    data.q = commanded;
+    for (row, point) in data.position.iter_mut().enumerate() {
+        *point += Vector3::from_fn(|axis, _| SIGMA * normal(77_777_777 + seed * 900_001 + 3 * row + axis));
+    }
+    (data, truth)
+}
+
+fn start(data: &Measurements, effects: &[&str]) -> Model {
+    let robot = RobotModel::new(fixture::offset_wrist());
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let base = align(&robot, data, &rows);
+    model(&robot, base, effects)
+}
+
+fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
+    let mut model = start(data, effects);
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let candidates: Vec<usize> = (0..model.x.len()).collect();
+    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
+    (model, fitted)
+}
+
+#[test]
+fn joint_repeatability_comes_back_from_returns_and_is_not_seen_where_there_is_none() {
+    let all = |data: &Measurements| (0..data.rows()).collect::<Vec<_>>();
+    let (data, _) = visited(60, 4, 2, 5.0 * ARCSEC, 1);
+    let poses = Poses::of(&data, &all(&data));
+    assert_eq!((poses.all().len(), poses.repeated().count()), (60, 60));
+    let found = poses.joint_repeatability(&start(&data, &["base_frame"]), &data).expect("it is there");
+    assert!((found / (5.0 * ARCSEC) - 1.0).abs() < 0.12, "{:.2} arcsec", found / ARCSEC);
+    for seed in 2..6 {
+        let (still, _) = visited(60, 4, 1, 0.0, seed);
+        assert_eq!(Poses::of(&still, &all(&still)).joint_repeatability(&start(&still, &["base_frame"]), &still), None);
+    }
+    // The arm never moves between the rows of a pose: nothing can be said.
+    let (once, _) = visited(60, 1, 4, 5.0 * ARCSEC, 1);
+    assert_eq!(Poses::of(&once, &all(&once)).joint_repeatability(&start(&once, &["base_frame"]), &once), None);
+}
+
+#[test]
+fn two_exchanged_returns_do_not_spoil_the_repeatability() {
+    let (mut data, _) = visited(60, 4, 1, 5.0 * ARCSEC, 3);
+    data.position.swap(60, 61);
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let found = Poses::of(&data, &rows).joint_repeatability(&start(&data, &["base_frame"]), &data).expect("it is there");
+    assert!((found / (5.0 * ARCSEC) - 1.0).abs() < 0.12, "{:.2} arcsec", found / ARCSEC);
+}
+
+#[test]
+fn lack_of_fit_tells_a_complete_model_from_one_without_ratios() {
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let mut chances = Vec::new();
+    for seed in 10..30 {
+        let (data, _) = visited(40, 2, 1, 0.0, seed);
+        let repeated = identify(&data, &effects).1.repeated.expect("repeats");
+        assert_eq!((repeated.poses, repeated.freedom, repeated.revisited), (40, 120, true));
+        assert!((repeated.noise / SIGMA - 1.0).abs() < 0.25, "{:e}", repeated.noise);
+        chances.push(repeated.lack_of_fit.expect("more poses than parameters").1);
+    }
+    // Uniform under a complete model.
+    let below = chances.iter().filter(|chance| **chance < 0.5).count();
+    assert!((4..=16).contains(&below) && chances.iter().all(|chance| *chance > 1e-3), "{chances:?}");
+    let (data, _) = visited(40, 2, 1, 0.0, 10);
+    let (ratio, chance) = identify(&data, &GEOMETRY).1.repeated.and_then(|repeated| repeated.lack_of_fit).expect("repeats");
+    assert!(ratio > 10.0 && chance < 1e-9, "F {ratio}, p {chance:e}");
+}
+
+/// Scatter over reported sigma of the ratios of so many robots, and their mean sigma.
+fn scatter(robots: usize, rows: usize, know: bool) -> (f64, f64) {
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let (mut squares, mut count, mut sigmas) = (0.0, 0.0, 0.0);
+    for seed in 100..100 + robots {
+        let (mut data, truth) = visited(60, 1, rows, 8.0 * ARCSEC, seed);
+        if know {
+            data.spread = Some(spread(&start(&data, &["base_frame"]), &data, 8.0 * ARCSEC));
+        }
+        let (model, fitted) = identify(&data, &effects);
+        assert_eq!(fitted.clusters, if rows > 1 { 60 } else { 0 });
+        for (k, spec) in model.stack.specs().iter().enumerate() {
+            if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.fates[k]) {
+                squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
+                sigmas += sigma;
+                count += 1.0;
+            }
+        }
+    }
+    (f64::sqrt(squares / count), sigmas / count)
+}
+
+#[test]
+fn sigmas_allow_for_what_the_rows_of_a_pose_share() {
+    let (repeated, wide) = scatter(40, 4, false);
+    assert!((0.85..1.18).contains(&repeated), "scatter over reported sigma {repeated:.3}");
+    // Four rows at rest say hardly more than one where joints err more than the tracker.
+    let (_, once) = scatter(40, 1, false);
+    assert!((0.8..1.05).contains(&(wide / once)), "four rows {wide:e}, one row {once:e}");
+}
+
+#[test]
+fn known_repeatability_weighs_rows_better_than_one_figure_for_all() {
+    let (scattered, informed) = scatter(40, 1, true);
+    let (_, plain) = scatter(40, 1, false);
+    assert!((0.85..1.18).contains(&scattered), "scatter over reported sigma {scattered:.3}");
+    assert!(informed < plain, "{informed:e} and {plain:e}");
+}
+
+#[test]
+fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
+    let of = experiment("none", 5);
+    let mut settings =
+        json!({"on": ["unloaded_fit"], "effects": ["base_frame", "tool_offset"], "repeatability": {"arcsec": 4.0}});
+    let run = |settings: &serde_json::Value, recording: &calib::table::Recording, split: &Split| {
+        let desk = Desk::default();
+        let stage: Identify = serde_json::from_value(settings.clone()).expect("settings");
+        assert!(stage.check().is_empty());
+        let reads = IdentifyReads { robot: of.robot.clone(), recording: recording.clone(), split: split.clone() };
+        let tables = desk.run(&stage, reads).expect("identify runs");
+        let notes = desk.notes.lock().expect("one thread").clone();
+        (table::<Observability>(&tables).remove(0), table::<Parameters>(&tables).remove(0), notes)
+    };
+    let value = |table: &Observability, quantity: &str| table.0.iter().find(|row| row.quantity == quantity).map(|row| row.value);
+    let (stated, _, _) = run(&settings, &of.recording, &of.split);
+    assert!(value(&stated, "joint_repeatability_rad").is_some_and(|sigma| (sigma / (4.0 * ARCSEC) - 1.0).abs() < 1e-9));
+    assert_eq!(value(&stated, "repeated_poses"), None);
+    // Every second of the first hundred rows takes the joints of the one before: fifty poses at rest.
+    let mut recording = of.recording.clone();
+    for row in (1..50).step_by(2) {
+        let joints = recording.q(row - 1).to_vec();
+        recording.q[row * recording.joints..(row + 1) * recording.joints].copy_from_slice(&joints);
+        recording.position[row] = recording.position[row - 1].map(|value| value + 3e-6);
+    }
+    settings["repeatability"] = json!("measured");
+    let (measured, _, notes) = run(&settings, &recording, &of.split);
+    assert_eq!(value(&measured, "repeated_poses"), Some(25.0));
+    assert_eq!(value(&measured, "clusters"), Some(25.0));
+    assert!(value(&measured, "repeat_noise_mm").is_some_and(|noise| noise < 0.01));
+    assert!(value(&measured, "lack_of_fit_p").is_some_and(|chance| chance < 1e-6));
+    assert!(notes.iter().any(|line| line.contains("25 poses were measured more than once")), "{notes:#?}");
+    assert!(notes.iter().any(|line| line.contains("this model lacks something")), "{notes:#?}");
+    let wrong: Identify = serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
+    assert!(wrong.check().iter().any(|fault| fault.to_string().starts_with("repeatability: expected `measured`")));
+}
