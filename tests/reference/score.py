@@ -3,9 +3,9 @@
     python3 tests/reference/score.py CASES_DIR --calib BINARY --pipeline pipelines/case/pipeline.yaml [--jobs 1] [--out DIR] [--only PATTERN]
     python3 tests/reference/score.py CASES_DIR --command "python other.py {case}"        # another program that prints the same JSON
 
-A case is a folder with controller.csv, tracker.csv and robot.json. Its answer is want.json in the folder or ../sealed/CASE.json
-(key `want`): a list of {effect, where}, or a map with `effects`; `accept` may list further sets that count as right, where
-the recording cannot tell them apart. Each case is copied without truth.json and want.json, so nothing can leak.
+A case is a folder with controller.csv, tracker.csv and robot.json. Its answer is want.json in the folder (`effects`: a list of
+{effect, where}; `accept`: further sets that count as right, where the recording cannot tell them apart) or ../sealed/CASE.json
+(`want`; `accepted`: single effects that may stand for one of them). Each case is copied without truth.json and want.json, so nothing can leak.
 Grades: exact; rival (each wanted effect is a finding or a rival of one, and nothing else was found); extra; missing; wrong; failed.
 """
 import argparse
@@ -28,18 +28,21 @@ def pairs(effects):
 
 
 def answer(case):
-    own, sealed = case / "want.json", case.parent / "sealed" / f"{case.name}.json"
-    if not sealed.exists():
-        sealed = case.parent.parent / "sealed" / f"{case.name}.json"
-    if own.exists():
-        want = json.loads(own.read_text())
-    elif sealed.exists():
-        want = json.loads(sealed.read_text())["want"]
-    else:
+    """The wanted set first, then the sets that count as right too."""
+    own = case / "want.json"
+    sealed = [p / "sealed" / f"{case.name}.json" for p in (case.parent, case.parent.parent)]
+    found = [f for f in [own, *sealed] if f.exists()]
+    if not found:
         return None
-    if isinstance(want, dict):
-        return [pairs(want["effects"])] + [pairs(e) for e in want.get("accept", [])]
-    return [pairs(want)]
+    told = json.loads(found[0].read_text())
+    if isinstance(told, list):
+        return [pairs(told)]
+    want = pairs(told["effects"] if found[0] == own else told["want"])
+    others = [pairs(e) for e in told.get("accept", [])]
+    # A sealed answer lists single effects that may stand for the one that nothing else tells from them.
+    for other in pairs(told.get("accepted", [])):
+        others += [want - {w} | {other} for w in sorted(want) if w[0] not in {"joint_compliance", *RECORDING}]
+    return [want, *others]
 
 
 def grade(wants, findings):
