@@ -4,6 +4,7 @@ mod check;
 mod poses;
 mod run;
 mod schema;
+mod simulate;
 mod surroundings;
 mod tables;
 
@@ -27,6 +28,7 @@ enum Verb {
     Check(check::CheckArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
+    Simulate(simulate::SimulateArguments),
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
@@ -48,6 +50,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Check(verb) => check::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
+        Verb::Simulate(verb) => simulate::main(&verb),
     };
     match result {
         Ok(()) => 0,

@@ -34,6 +34,8 @@ pub struct Arm {
     pub links: Vec<Link>,
     /// Centre of the payload in the frame of the last link, m.
     pub payload_centre: Vector,
+    /// True mass of the payload per declared mass.
+    pub payload_share: f64,
     /// m/s2, base frame.
     pub gravity: Vector,
 }
@@ -72,6 +74,7 @@ impl Arm {
             foot: robot.joints.first().map_or([0.0; 3], |joint| joint.point),
             links,
             payload_centre: matrix::minus(robot.payload_centre, hand),
+            payload_share: 1.0,
             gravity: robot.gravity,
         }
     }

@@ -5,6 +5,7 @@
 //! Adding an effect: a file in `effect/` and a line in [`effect::Physical`].
 
 pub mod arm;
+pub mod conceal;
 pub mod effect;
 pub mod matrix;
 pub mod noise;

@@ -63,14 +63,30 @@ impl Default for Climate {
     }
 }
 
+impl Climate {
+    /// Temperature of the arm at a time, C.
+    pub fn temperature(&self, time_s: f64) -> f64 {
+        self.start_c + self.rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp())
+    }
+}
+
+/// The side to which each joint moved last: +1, -1, or 0 where it stood still.
+pub fn direction(now: &[f64], before: &[f64]) -> Vec<f64> {
+    now.iter().zip(before).map(|(now, then)| if now == then { 0.0 } else { (now - then).signum() }).collect()
+}
+
 /// A planned point.
 #[derive(Debug, Clone)]
 pub struct Point {
     pub block: usize,
     pub q: Vec<f64>,
+    /// The point from which the arm came.
+    pub before: Vec<f64>,
     pub direction: Vec<f64>,
     pub time_s: f64,
     pub temperature_c: f64,
+    /// Declared mass at the flange, kg.
+    pub payload_kg: f64,
 }
 
 /// Random poses that may be rejected before the plan gives up on a point.
@@ -103,12 +119,10 @@ pub fn plan(
             let Some((_, q, tool)) = best else { continue };
             taken.push(tool);
             time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
-            let direction =
-                q.iter().zip(&before).map(|(now, then): (&f64, &f64)| if now == then { 0.0 } else { (now - then).signum() });
-            let direction = direction.collect();
-            let temperature_c = climate.start_c + climate.rise_k * (1.0 - (-time / (3600.0 * climate.warm_up_h)).exp());
-            before.clone_from(&q);
-            out.push(Point { block: number, q, direction, time_s: time, temperature_c });
+            let from = std::mem::replace(&mut before, q.clone());
+            let (direction, temperature_c) = (direction(&q, &from), climate.temperature(time));
+            let payload_kg = block.payload_kg;
+            out.push(Point { block: number, q, before: from, direction, time_s: time, temperature_c, payload_kg });
         }
     }
     Ok(out)
@@ -130,7 +144,8 @@ fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64; 2]>, Stri
     Ok(poses.range_deg.iter().zip(joints).map(|(range, revolute)| range.map(|x| si(revolute, x))).collect())
 }
 
-fn allowed(arm: &Arm, poses: &Poses, ranges: &[[f64; 2]], draw: &mut Noise) -> Result<(Vec<f64>, Vector), String> {
+/// A random pose within `ranges` (rad or m) and its tool point; fails with what to widen where none is allowed.
+pub fn allowed(arm: &Arm, poses: &Poses, ranges: &[[f64; 2]], draw: &mut Noise) -> Result<(Vec<f64>, Vector), String> {
     let floor = 1e-3 * poses.floor_mm;
     let rest = Motion::none(arm.links.len());
     for _ in 0..TRIES {

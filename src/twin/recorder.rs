@@ -4,7 +4,7 @@ use super::arm::Arm;
 use super::effect::{JointCompliance, Motion, Physical};
 use super::matrix::{self, Vector};
 use super::noise::{Noise, Purpose};
-use super::plan::{self, Block, Climate, Poses};
+use super::plan::{self, Block, Climate, Point, Poses};
 use super::statics::{Row, settle};
 use super::tracker::Tracker;
 use super::truth::{ARCSEC, TrueRobot};
@@ -56,10 +56,19 @@ pub struct Shot {
 
 impl Experiment<'_> {
     /// All points in order; `tick` hears of each. Fails with what is wrong where no pose is allowed.
-    pub fn record(&self, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
+    pub fn record(&self, tick: impl FnMut()) -> Result<Vec<Shot>, String> {
         let arm = Arm::new(self.robot, self.truth);
         let points = plan::plan(self.robot, &arm, self.poses, self.blocks, self.climate, self.seed)?;
+        Ok(self.measure(points, tick))
+    }
+
+    /// The given points in order.
+    pub fn measure(&self, points: Vec<Point>, mut tick: impl FnMut()) -> Vec<Shot> {
+        let mut arm = Arm::new(self.robot, self.truth);
         let effects = self.all_effects(&arm);
+        for effect in &effects {
+            effect.shape(&mut arm);
+        }
         let base = self.tracker.base();
         let mut beam = Noise::new(self.seed, Purpose::Tracker);
         let mut meter = Noise::new(self.seed, Purpose::Current);
@@ -70,24 +79,27 @@ impl Experiment<'_> {
             for ((position, sigma), link) in drive.iter_mut().zip(self.repeatability_arcsec).zip(&arm.links) {
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
-            let payload_kg = self.blocks[point.block].payload_kg;
-            let (time_s, temperature_c) = (point.time_s, point.temperature_c);
+            let Point { block, before, time_s, temperature_c, payload_kg, .. } = point;
             let row = Row { command: point.q, drive, direction: point.direction, time_s, temperature_c, payload_kg };
             let rest = settle(&arm, &row, &effects);
             let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            let mut q = row.command;
+            for effect in &effects {
+                effect.log(&mut q, &before);
+            }
             shots.push(Shot {
-                block: point.block,
+                block,
                 current: self.currents(&arm, &rest.torque, &rest.motion, &mut meter),
                 position: self.tracker.measure(seen, &mut beam),
                 sigma: self.tracker.sigma(seen),
-                q: row.command,
+                q,
                 direction: row.direction,
                 time_s,
                 temperature_c,
             });
             tick();
         }
-        Ok(shots)
+        shots
     }
 
     /// The chosen effects and the true robot's linear wind-up.
@@ -99,7 +111,7 @@ impl Experiment<'_> {
         wind_up.chain(self.effects.iter().cloned()).collect()
     }
 
-    /// Holding currents: the motor carries what gravity does to the joint, plus what friction adds.
+    /// Holding currents: the motor carries what gravity and springs do to the joint, plus what friction adds.
     fn currents(&self, arm: &Arm, torque: &[f64], motion: &Motion, meter: &mut Noise) -> Vec<f64> {
         let joints = arm.links.iter().zip(torque).zip(&motion.motor_torque).enumerate();
         joints

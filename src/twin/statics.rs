@@ -12,14 +12,14 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// The links and the payload (kg) of an arm in `posture`.
+    /// The links and the declared payload (kg) of an arm in `posture`.
     pub fn new(arm: &Arm, posture: &Posture, payload: f64) -> Loads {
         let mut bodies: Vec<(usize, f64, Vector)> = (arm.links.iter().zip(&posture.frames).enumerate())
             .map(|(index, (link, frame))| (index, link.mass, matrix::place(frame, link.centre)))
             .collect();
         if let Some(hand) = posture.frames.last() {
             // Beyond the last link: it bends that link too.
-            bodies.push((arm.links.len(), payload, matrix::place(hand, arm.payload_centre)));
+            bodies.push((arm.links.len(), payload * arm.payload_share, matrix::place(hand, arm.payload_centre)));
         }
         Loads { bodies, gravity: arm.gravity }
     }
@@ -66,11 +66,11 @@ pub struct Row {
 pub struct Equilibrium {
     pub posture: Posture,
     pub motion: Motion,
-    /// Gravity's torque on each joint in the deflected posture, Nm.
+    /// Torque of gravity and of other loads on each joint in the deflected posture, Nm.
     pub torque: Vec<f64>,
 }
 
-/// A change of less than this (rad or m) is rest; a picometre at 3 m.
+/// A change of less than this (rad, m or Nm) is rest; a picometre at 3 m.
 const REST: f64 = 1e-13;
 /// Every round shrinks the change by the wind-up itself, about 1e-3: six are usual, more than this many mean a collapsing arm.
 const ROUNDS: usize = 60;
@@ -99,6 +99,7 @@ fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Moti
     let angle: Vec<f64> = row.drive.iter().zip(&motion.joint).map(|(drive, extra)| drive + extra).collect();
     let posture = arm.posture(&angle, &motion);
     let loads = Loads::new(arm, &posture, row.payload_kg);
-    let torque = loads.torques(arm, &posture);
+    let gravity = loads.torques(arm, &posture);
+    let torque = gravity.iter().zip(&motion.load).map(|(gravity, load)| gravity + load).collect();
     (posture, loads, torque, motion)
 }

@@ -6,6 +6,21 @@ use super::noise::Noise;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Standard deviation of the logarithm of a point's width: one point in six is wider than 1.6 times the median.
+const UNEVENNESS: f64 = 0.5;
+
+/// How the tracker's errors scatter; all have the stated standard deviation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scatter {
+    #[default]
+    Gaussian,
+    /// Student's t with 3 degrees of freedom: now and then far out.
+    Student,
+    /// Gaussian, point by point wider or narrower, log-normally.
+    Uneven,
+}
+
 /// Where the tracker stands and how well it measures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -20,6 +35,7 @@ pub struct Tracker {
     pub noise_um_per_m: f64,
     /// How many standard deviations the two figures stand for.
     pub coverage: f64,
+    pub scatter: Scatter,
 }
 
 impl Default for Tracker {
@@ -30,6 +46,7 @@ impl Default for Tracker {
             noise_um: 10.0,
             noise_um_per_m: 2.5,
             coverage: 2.0,
+            scatter: Scatter::Gaussian,
         }
     }
 }
@@ -60,6 +77,18 @@ impl Tracker {
     /// What the tracker says where `point` (m, tracker frame) is.
     pub fn measure(&self, point: Vector, noise: &mut Noise) -> Vector {
         let sigma = self.sigma(point);
-        point.map(|coordinate| coordinate + sigma * noise.normal())
+        match self.scatter {
+            Scatter::Gaussian => point.map(|coordinate| coordinate + sigma * noise.normal()),
+            Scatter::Student => point.map(|coordinate| {
+                let spread = (0..3).map(|_| noise.normal().powi(2)).sum::<f64>().max(1e-12);
+                // t with 3 degrees of freedom has variance 3: normal / sqrt(chi2 / 3), over sqrt 3.
+                coordinate + sigma * noise.normal() / spread.sqrt()
+            }),
+            Scatter::Uneven => {
+                // exp(w z) has a mean square of exp(2 w^2).
+                let wide = (UNEVENNESS * noise.normal() - UNEVENNESS * UNEVENNESS).exp();
+                point.map(|coordinate| coordinate + sigma * wide * noise.normal())
+            }
+        }
     }
 }

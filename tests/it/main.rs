@@ -2,6 +2,7 @@
 
 mod arms;
 mod cmd;
+mod conceal;
 mod desk;
 mod disk;
 mod effects;

@@ -141,11 +141,13 @@ fn a_foundation_tilts_towards_the_load() {
 
 #[test]
 fn a_joint_trails_by_half_its_gap_and_more_under_load() {
-    let gap = |arcsec_per_nm| [Physical::Backlash(Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm, closing_nm: 0.0 })];
+    let gap = |arcsec_per_nm| {
+        [Physical::Backlash(Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm, closing_nm: 0.0, soft_nm: 0.0 })]
+    };
     let turned = |effects: &[Physical]| rest(&lever(), effects, &[0.0], 100.0).motion.joint[0] / ARCSEC;
     assert!((turned(&gap(0.0)) + 10.0).abs() < 1e-9);
     assert!((turned(&gap(0.01)) + 20.0).abs() < 1e-6);
-    let closed = Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm: 0.0, closing_nm: 500.0 };
+    let closed = Backlash { joint: 1, gap_arcsec: 20.0, arcsec_per_nm: 0.0, closing_nm: 500.0, soft_nm: 0.0 };
     assert!((turned(&[Physical::Backlash(closed)]) + 10.0).abs() < 1e-9);
 }
 

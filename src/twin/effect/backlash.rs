@@ -20,12 +20,17 @@ pub struct Backlash {
     /// The torque that pushes the teeth to one side whatever the direction, Nm; 0: direction alone decides.
     #[serde(default)]
     pub closing_nm: f64,
+    /// Over about this torque the load carries the joint from one side of the gap to the other, Nm; 0: at once, as `closing_nm` says.
+    #[serde(default)]
+    pub soft_nm: f64,
 }
 
 impl Act for Backlash {
     fn act(&self, state: &State, motion: &mut Motion) {
         let torque = state.torque[self.joint - 1];
-        let side = if self.closing_nm > 0.0 && torque.abs() > self.closing_nm {
+        let side = if self.soft_nm > 0.0 {
+            (torque / self.soft_nm).tanh()
+        } else if self.closing_nm > 0.0 && torque.abs() > self.closing_nm {
             torque.signum()
         } else {
             // The link trails the motor by half the gap.
@@ -38,12 +43,17 @@ impl Act for Backlash {
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
+    fn scale(&mut self, by: f64) {
+        self.gap_arcsec *= by;
+        self.arcsec_per_nm *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
         vec![
             true_value("backlash", &tag, place.clone(), "gap", "arcsec", self.gap_arcsec),
             true_value("backlash", &tag, place.clone(), "growth", "arcsec/Nm", self.arcsec_per_nm),
-            true_value("backlash", &tag, place, "closing", "Nm", self.closing_nm),
+            true_value("backlash", &tag, place.clone(), "closing", "Nm", self.closing_nm),
+            true_value("backlash", &tag, place, "soft", "Nm", self.soft_nm),
         ]
     }
 }

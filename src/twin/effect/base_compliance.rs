@@ -27,6 +27,9 @@ impl Act for BaseCompliance {
     fn seat(&self) -> Option<usize> {
         None
     }
+    fn scale(&mut self, by: f64) {
+        self.rad_per_nm = self.rad_per_nm.map(|soft| soft * by);
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let value = |axis: &str, rad_per_nm| true_value("base_compliance", "base", "base".into(), axis, "rad/Nm", rad_per_nm);
         vec![value("x", self.rad_per_nm[0]), value("y", self.rad_per_nm[1])]

@@ -62,6 +62,10 @@ impl Act for GearCyclic {
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
+    fn scale(&mut self, by: f64) {
+        self.amplitude_arcsec *= by;
+        self.arcsec_per_nm *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let mut out = sine_and_cosine("gear_cyclic", self.joint, self.order, self.amplitude_arcsec, self.phase_deg);
         if self.arcsec_per_nm != 0.0 {
@@ -80,6 +84,9 @@ impl Act for GearMotorCyclic {
     }
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
+    }
+    fn scale(&mut self, by: f64) {
+        self.amplitude_arcsec *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
         sine_and_cosine("gear_motor_cyclic", self.joint, self.order, self.amplitude_arcsec, self.phase_deg)

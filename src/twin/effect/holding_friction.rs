@@ -21,6 +21,9 @@ impl Act for HoldingFriction {
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
+    fn scale(&mut self, by: f64) {
+        self.torque_nm *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let tag = format!("j{}", self.joint);
         vec![true_value("holding_friction", &tag, format!("joint {}", self.joint), "torque", "Nm", self.torque_nm)]

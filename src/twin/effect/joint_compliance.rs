@@ -21,6 +21,9 @@ impl Act for JointCompliance {
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
+    fn scale(&mut self, by: f64) {
+        self.rad_per_nm *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let tag = format!("j{}", self.joint);
         vec![true_value("joint_compliance", &tag, format!("joint {}", self.joint), "", "rad/Nm", self.rad_per_nm)]

@@ -13,6 +13,10 @@ pub enum Curve {
     Tanh,
     /// `-(torque / scale)^3`: the spring stiffens with torque; at `scale` it holds back the whole amplitude.
     Cubic,
+    /// `torque / scale` held between -1 and 1: two slopes, soft up to `scale`.
+    TwoSlope,
+    /// `-load abs(load)` with `load = torque / scale`: stiffens, less abruptly than the cube.
+    Square,
 }
 
 /// Wind-up beside the linear one.
@@ -34,11 +38,16 @@ impl Act for JointHardening {
         let shape = match self.curve {
             Curve::Tanh => load.tanh(),
             Curve::Cubic => -load.powi(3),
+            Curve::TwoSlope => load.clamp(-1.0, 1.0),
+            Curve::Square => -load * load.abs(),
         };
         motion.joint[self.joint - 1] += self.amplitude_arcsec * ARCSEC * shape;
     }
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
+    }
+    fn scale(&mut self, by: f64) {
+        self.amplitude_arcsec *= by;
     }
     fn truth(&self) -> Vec<TrueValue> {
         let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));

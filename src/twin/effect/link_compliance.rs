@@ -48,6 +48,10 @@ impl Act for LinkCompliance {
     fn seat(&self) -> Option<usize> {
         Some(self.link)
     }
+    fn scale(&mut self, by: f64) {
+        self.bending_rad_per_nm *= by;
+        self.torsion_rad_per_nm *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
         vec![

@@ -2,26 +2,56 @@
 //!
 //! Joints and links count from 1 here, because people write these settings.
 
+mod axis_wobble;
 mod backlash;
 mod base_compliance;
+mod base_shift;
+mod base_sway;
+mod cable_drag;
+mod counterbalance;
 mod gear_cyclic;
+mod gear_eccentricity;
 mod holding_friction;
+mod joint_bump;
 mod joint_compliance;
 mod joint_hardening;
+mod joint_hinge;
+mod joint_log_lag;
+mod joint_product;
 mod link_compliance;
+mod link_hinge;
+mod link_mass;
+mod payload_error;
 mod thermal_growth;
+mod thermal_warm_up;
+mod tool_shift;
 mod tracker_drift;
 mod zero_shift;
 
+pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_compliance::BaseCompliance;
+pub use base_shift::BaseShift;
+pub use base_sway::BaseSway;
+pub use cable_drag::{CableDrag, Pull};
+pub use counterbalance::{Balancer, Counterbalance};
 pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
+pub use gear_eccentricity::GearEccentricity;
 pub use holding_friction::HoldingFriction;
+pub use joint_bump::JointBump;
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::{Curve, JointHardening};
+pub use joint_hinge::JointHinge;
+pub use joint_log_lag::JointLogLag;
+pub use joint_product::JointProduct;
 pub use link_compliance::LinkCompliance;
+pub use link_hinge::LinkHinge;
+pub use link_mass::LinkMass;
+pub use payload_error::PayloadError;
 pub use thermal_growth::ThermalGrowth;
-pub use tracker_drift::TrackerDrift;
+pub use thermal_warm_up::ThermalWarmUp;
+pub use tool_shift::ToolShift;
+pub use tracker_drift::{Course, TrackerDrift};
 pub use zero_shift::ZeroShift;
 
 use super::arm::{Arm, Posture};
@@ -36,7 +66,7 @@ pub struct State<'a> {
     pub row: &'a Row,
     pub posture: &'a Posture,
     pub loads: &'a Loads,
-    /// Gravity's torque on each joint, Nm.
+    /// Torque of gravity and of other loads on each joint, Nm.
     pub torque: &'a [f64],
 }
 
@@ -53,6 +83,8 @@ pub struct Motion {
     pub link_end: Vec<Matrix>,
     /// Of the measured point, last link's frame, m.
     pub tool: Vector,
+    /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
+    pub load: Vec<f64>,
     /// What each motor carries besides gravity, Nm at the joint.
     pub motor_torque: Vec<f64>,
 }
@@ -65,19 +97,21 @@ impl Motion {
             joint: vec![0.0; joints],
             link_end: vec![IDENTITY; joints],
             tool: [0.0; 3],
+            load: vec![0.0; joints],
             motor_torque: vec![0.0; joints],
         }
     }
 
-    /// The largest difference of any number, rad or m; the motors' torque does not move the arm.
+    /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
     pub fn distance(&self, other: &Motion) -> f64 {
         let apart = |a: &Matrix, b: &Matrix| {
             a.as_flattened().iter().zip(b.as_flattened()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
         };
         let joints = self.joint.iter().zip(&other.joint).map(|(a, b)| (a - b).abs());
         let links = self.link_end.iter().zip(&other.link_end).map(|(a, b)| apart(a, b));
+        let loads = self.load.iter().zip(&other.load).map(|(a, b)| (a - b).abs());
         let frames = [apart(&self.base, &other.base), apart(&self.tracker, &other.tracker)];
-        joints.chain(links).chain(frames).fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
+        joints.chain(links).chain(loads).chain(frames).fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
     }
 }
 
@@ -108,8 +142,14 @@ pub(crate) fn true_value(
 trait Act {
     /// Adds what the effect does in `state` to `motion`.
     fn act(&self, state: &State, motion: &mut Motion);
+    /// Changes what the arm is for the whole recording: masses and centres.
+    fn shape(&self, _arm: &mut Arm) {}
+    /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
+    fn log(&self, _q: &mut [f64], _before: &[f64]) {}
     /// The joint or link that it sits on, from 1, where it has one.
     fn seat(&self) -> Option<usize>;
+    /// Multiplies the size of what it does.
+    fn scale(&mut self, by: f64);
     /// Its true numbers in canonical names.
     fn truth(&self) -> Vec<TrueValue>;
 }
@@ -123,6 +163,9 @@ macro_rules! physical {
         pub enum Physical { $( $(#[$doc])* $name($name), )+ }
         impl Physical {
             fn inner(&self) -> &dyn Act {
+                match self { $( Physical::$name(effect) => effect, )+ }
+            }
+            fn inner_mut(&mut self) -> &mut dyn Act {
                 match self { $( Physical::$name(effect) => effect, )+ }
             }
         }
@@ -152,12 +195,56 @@ physical! {
     TrackerDrift,
     /// A joint's zero steps at some time.
     ZeroShift,
+    /// The axis tilts as the joint turns.
+    AxisWobble,
+    /// The base steps at some time.
+    BaseShift,
+    /// The base swings slowly.
+    BaseSway,
+    /// A hose package pulls on a joint.
+    CableDrag,
+    /// A balancer carries part of a joint's load.
+    Counterbalance,
+    /// Run-out of an eccentric wheel, not a pure sine.
+    GearEccentricity,
+    /// A joint is wrong near one angle.
+    JointBump,
+    /// A joint's error starts at some angle.
+    JointHinge,
+    /// The log of the joints is behind.
+    JointLogLag,
+    /// A joint's error is a product of two angles.
+    JointProduct,
+    /// A link gives way at its middle.
+    LinkHinge,
+    /// A link weighs otherwise than described.
+    LinkMass,
+    /// The payload is otherwise than declared.
+    PayloadError,
+    /// A link grows with its own warm-up.
+    ThermalWarmUp,
+    /// The reflector steps at some time.
+    ToolShift,
 }
 
 impl Physical {
     /// Adds what the effect does in `state` to `motion`.
     pub fn act(&self, state: &State, motion: &mut Motion) {
         self.inner().act(state, motion);
+    }
+    /// Changes what the arm is for the whole recording.
+    pub fn shape(&self, arm: &mut Arm) {
+        self.inner().shape(arm);
+    }
+    /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
+    pub fn log(&self, q: &mut [f64], before: &[f64]) {
+        self.inner().log(q, before);
+    }
+    /// The same effect, `by` times as large.
+    pub fn scaled(&self, by: f64) -> Physical {
+        let mut out = self.clone();
+        out.inner_mut().scale(by);
+        out
     }
     /// Its true numbers in canonical names.
     pub fn truth(&self) -> Vec<TrueValue> {

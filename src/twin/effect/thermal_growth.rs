@@ -27,6 +27,9 @@ impl Act for ThermalGrowth {
     fn seat(&self) -> Option<usize> {
         Some(self.link)
     }
+    fn scale(&mut self, by: f64) {
+        self.um_per_m_k *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let tag = format!("l{}", self.link);
         vec![true_value("thermal_growth", &tag, format!("link {}", self.link), "expansion", "um/m/K", self.um_per_m_k)]

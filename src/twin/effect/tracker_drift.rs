@@ -6,7 +6,20 @@ use crate::twin::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A creep that slows down: `1 - exp(-t/settling)` of a final motion.
+/// The course of a creep over time, with `u = t / settling`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Course {
+    /// `1 - exp(-u)`: slows down towards a final motion.
+    #[default]
+    Settling,
+    /// `u`: never slows down.
+    Linear,
+    /// `sqrt(u)`: as heat creeps into a stand.
+    Root,
+}
+
+/// A creep of the tracker's stand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrackerDrift {
@@ -16,19 +29,30 @@ pub struct TrackerDrift {
     /// Its final rotation vector about the tracker's origin, arcsec.
     #[serde(default)]
     pub turn_arcsec: Vector,
-    /// Time constant, h.
+    /// Time constant, h; for the courses that do not settle, the time at which the motion is as stated.
     pub settling_h: f64,
+    #[serde(default)]
+    pub course: Course,
 }
 
 impl Act for TrackerDrift {
     fn act(&self, state: &State, motion: &mut Motion) {
-        let share = 1.0 - (-state.row.time_s / (3600.0 * self.settling_h)).exp();
+        let u = state.row.time_s / (3600.0 * self.settling_h);
+        let share = match self.course {
+            Course::Settling => 1.0 - (-u).exp(),
+            Course::Linear => u,
+            Course::Root => u.max(0.0).sqrt(),
+        };
         let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
         let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
         motion.tracker = matrix::times(&matrix::times(&moved, &turned), &motion.tracker);
     }
     fn seat(&self) -> Option<usize> {
         None
+    }
+    fn scale(&mut self, by: f64) {
+        self.shift_um = matrix::scale(self.shift_um, by);
+        self.turn_arcsec = matrix::scale(self.turn_arcsec, by);
     }
     fn truth(&self) -> Vec<TrueValue> {
         let axes = ["x", "y", "z"].into_iter().enumerate();

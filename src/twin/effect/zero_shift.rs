@@ -26,6 +26,9 @@ impl Act for ZeroShift {
     fn seat(&self) -> Option<usize> {
         Some(self.joint)
     }
+    fn scale(&mut self, by: f64) {
+        self.step_arcsec *= by;
+    }
     fn truth(&self) -> Vec<TrueValue> {
         let (tag, place) = (format!("j{}", self.joint), format!("joint {}", self.joint));
         vec![

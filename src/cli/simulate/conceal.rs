@@ -1,0 +1,167 @@
+//! `calib simulate conceal`: case folders with hidden effects, and their truth sealed apart.
+
+use super::super::surroundings::cores;
+use super::super::{emit, emit_json};
+use super::seal::{RECORDINGS, SEALED, Seal};
+use crate::error::{Error, Fault, Result, nearest};
+use crate::estimate::threads::in_order;
+use crate::twin::conceal::case::Case;
+use crate::twin::conceal::design::{Content, Design};
+use crate::twin::conceal::family::FAMILIES;
+use crate::twin::conceal::robots::KINDS;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Make recordings in which effects are hidden, and seal the truth.
+///
+/// DIR/recordings/CASE holds what a user has: robot.json, controller.csv, tracker.csv. DIR/sealed/CASE.json holds the truth, and
+/// DIR/seal.json the SHA-256 of every file. The same seed gives the same bytes. Effects are made by other mathematics than those
+/// that `diagnose` knows, many in other forms, and sized so that they range from hardly visible to plain.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25
+  calib simulate conceal --out gears --cases 20 --family gear_cyclic,backlash --robot sr210d --points 200
+  calib simulate conceal --out pairs --seed 3 --cases 30 --pairs 1
+  calib simulate conceal --out strange --cases 30 --open 1")]
+pub(super) struct ConcealArguments {
+    /// The folder to make; it must not exist, or be empty
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// The same seed gives the same recordings
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Recordings to make
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=9999))]
+    cases: u32,
+    /// Effects to draw from, by canonical name [default: all]
+    #[arg(long, value_name = "EFFECT,..", value_delimiter = ',')]
+    family: Vec<String>,
+    /// Robots to draw from: sr210d, compact6, seven7r [default: all]
+    #[arg(long, value_name = "ROBOT,..", value_delimiter = ',')]
+    robot: Vec<String>,
+    /// Points to fit; 25 to 50 % of them are added to validate [default: 50 to 400]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(20..=20_000))]
+    points: Option<u32>,
+    /// Share of recordings without any effect
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    nulls: f64,
+    /// Share of recordings with two effects
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pairs: f64,
+    /// Share of recordings with an effect that is in no list
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    open: f64,
+    /// Share of effects in another form than the obvious one
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    other_forms: f64,
+    /// Share of effects of natural size; others are sized to a drawn visibility
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2)]
+    natural: f64,
+    /// Share of recordings with gross errors or exchanged points
+    #[arg(long, value_name = "SHARE", default_value_t = 0.08)]
+    faulty: f64,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
+    let design = design(arguments)?;
+    vacant(&arguments.out)?;
+    let threads = arguments.jobs.map_or_else(cores, usize::from);
+    let contents = design.contents();
+    let made = in_order(threads, contents.len(), |number| written(&design, number, contents[number]));
+    let mut seal = Seal::new();
+    let mut points = 0;
+    for case in made {
+        let case = case.map_err(|message| Error::spec("conceal", message))?;
+        for (name, text) in &case.recording {
+            seal.write(&arguments.out, format!("{RECORDINGS}/{}/{name}", case.name), text)?;
+        }
+        seal.write(&arguments.out, format!("{SEALED}/{}.json", case.name), &case.sealed)?;
+        points += case.points;
+    }
+    let seal = seal.close(&arguments.out)?;
+    let recordings = arguments.out.join(RECORDINGS);
+    if arguments.json {
+        return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
+    }
+    emit(&format!("{} recordings, {points} points: {}\nseal: {}\n", design.cases, recordings.display(), seal.display()))
+}
+
+/// A case as it goes to the disk.
+struct Written {
+    name: String,
+    points: usize,
+    recording: [(&'static str, String); 3],
+    sealed: String,
+}
+
+fn written(design: &Design, number: usize, content: Content) -> Result<Written, String> {
+    let case = Case::make(design, number, content)?;
+    Ok(Written { recording: case.recording(), sealed: case.sealed(), points: case.shots.len(), name: case.name })
+}
+
+/// The design that the options state; fails with every fault of them.
+fn design(arguments: &ConcealArguments) -> Result<Design> {
+    let mut faults = Vec::new();
+    let shares = [
+        ("--nulls", arguments.nulls),
+        ("--pairs", arguments.pairs),
+        ("--open", arguments.open),
+        ("--other-forms", arguments.other_forms),
+        ("--natural", arguments.natural),
+        ("--faulty", arguments.faulty),
+    ];
+    for (option, share) in shares {
+        if !(0.0..=1.0).contains(&share) {
+            faults.push(Fault::new(option, format!("{share} is no share; allowed: 0 to 1")));
+        }
+    }
+    if arguments.nulls + arguments.pairs + arguments.open > 1.0 + 1e-9 {
+        faults.push(Fault::new("--nulls, --pairs, --open", "add up to more than 1"));
+    }
+    let mut allowed: Vec<&str> = FAMILIES.iter().map(|family| family.name).collect();
+    allowed.dedup();
+    for name in arguments.family.iter().filter(|name| !allowed.contains(&name.as_str())) {
+        faults.push(unknown("--family", name, &allowed));
+    }
+    let kinds: Vec<&str> = KINDS.iter().map(|kind| kind.name()).collect();
+    for name in arguments.robot.iter().filter(|name| !kinds.contains(&name.as_str())) {
+        faults.push(unknown("--robot", name, &kinds));
+    }
+    if !faults.is_empty() {
+        return Err(Error::Spec(faults));
+    }
+    Ok(Design {
+        seed: arguments.seed,
+        cases: arguments.cases as usize,
+        families: arguments.family.clone(),
+        robots: KINDS.into_iter().filter(|kind| arguments.robot.iter().any(|name| name == kind.name())).collect(),
+        points: arguments.points.map(|points| points as usize),
+        nulls: arguments.nulls,
+        pairs: arguments.pairs,
+        open: arguments.open,
+        other_forms: arguments.other_forms,
+        natural: arguments.natural,
+        faulty: arguments.faulty,
+    })
+}
+
+fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {
+    let hint = nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+    Fault::new(option, format!("no `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", ")))
+}
+
+/// Nothing is overwritten: the folder is new or empty.
+fn vacant(folder: &Path) -> Result<()> {
+    let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    if taken {
+        return Err(Error::spec(folder.display().to_string(), "is not empty; name a new folder"));
+    }
+    Ok(())
+}

@@ -1,0 +1,55 @@
+//! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The format of this file.
+const FORMAT: u32 = 1;
+/// Where what belongs to a set lies in its folder.
+pub(super) const SEAL: &str = "seal.json";
+pub(super) const RECORDINGS: &str = "recordings";
+pub(super) const SEALED: &str = "sealed";
+
+/// Hashes by path below the folder of the set, with `/`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Seal {
+    calib_seal: u32,
+    hash: String,
+    files: BTreeMap<String, String>,
+}
+
+impl Seal {
+    pub(super) fn new() -> Seal {
+        Seal { calib_seal: FORMAT, hash: "SHA-256".into(), files: BTreeMap::new() }
+    }
+
+    /// Writes a file of the set below `folder` and takes its hash in.
+    pub(super) fn write(&mut self, folder: &Path, name: String, text: &str) -> Result<()> {
+        let path = folder.join(&name);
+        let fault = |error: std::io::Error| Error::store(path.display().to_string(), error.to_string());
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent).map_err(fault)?;
+        }
+        fs::write(&path, text).map_err(fault)?;
+        self.files.insert(name, digest(text.as_bytes()));
+        Ok(())
+    }
+
+    /// Writes the seal itself.
+    pub(super) fn close(&self, folder: &Path) -> Result<PathBuf> {
+        let path = folder.join(SEAL);
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Bug(error.to_string()))?;
+        fs::write(&path, text + "\n").map_err(|error| Error::store(path.display().to_string(), error.to_string()))?;
+        Ok(path)
+    }
+}
+
+/// SHA-256 in hexadecimal digits.
+fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

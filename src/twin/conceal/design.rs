@@ -1,0 +1,110 @@
+//! What a set of concealed recordings is drawn from, and which kind each of its cases is.
+
+use super::family::{FAMILIES, Family};
+use super::robots::{KINDS, Kind};
+use crate::twin::noise::{Noise, Purpose};
+
+/// Shares and bounds of a set of cases; everything else comes from the seed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Design {
+    pub seed: u64,
+    pub cases: usize,
+    /// Canonical names that single effects and pairs are drawn from; empty: all but `unknown`.
+    pub families: Vec<String>,
+    /// Empty: all.
+    pub robots: Vec<Kind>,
+    /// Points to fit; none: 50 to 400, evenly on a logarithmic scale.
+    pub points: Option<usize>,
+    /// Shares of cases without an effect, with two, with one outside every list; the rest has one.
+    pub nulls: f64,
+    pub pairs: f64,
+    pub open: f64,
+    /// Share of effects in another form than the obvious one.
+    pub other_forms: f64,
+    /// Share of effects of natural size; the others are sized to a drawn visibility.
+    pub natural: f64,
+    /// Share of cases with gross errors or exchanged points in the recording.
+    pub faulty: f64,
+}
+
+impl Default for Design {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            cases: 20,
+            families: Vec::new(),
+            robots: Vec::new(),
+            points: None,
+            nulls: 0.0,
+            pairs: 0.0,
+            open: 0.0,
+            other_forms: 0.5,
+            natural: 0.2,
+            faulty: 0.08,
+        }
+    }
+}
+
+/// What a case conceals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Content {
+    Null,
+    /// One effect of this row of the families.
+    Single(usize),
+    Pair(usize, usize),
+}
+
+impl Design {
+    /// Rows of the families that single effects are drawn from.
+    fn listed(&self) -> Vec<usize> {
+        let chosen = |family: &Family| match self.families.is_empty() {
+            true => family.name != "unknown",
+            false => self.families.iter().any(|name| name == family.name),
+        };
+        (0..FAMILIES.len()).filter(|row| chosen(&FAMILIES[*row])).collect()
+    }
+
+    /// Robots to draw from.
+    pub fn kinds(&self) -> Vec<Kind> {
+        if self.robots.is_empty() { KINDS.to_vec() } else { self.robots.clone() }
+    }
+
+    /// What every case conceals: shares kept exactly, families in turn, in an order that says nothing.
+    pub fn contents(&self) -> Vec<Content> {
+        let mut draw = Noise::new(self.seed, Purpose::Design);
+        let count = |share: f64| (share * self.cases as f64).round() as usize;
+        let listed = self.listed();
+        let open: Vec<usize> = (0..FAMILIES.len()).filter(|row| FAMILIES[*row].name == "unknown").collect();
+        let paired: Vec<usize> = listed.iter().copied().filter(|row| FAMILIES[*row].paired).collect();
+        let mut out = vec![Content::Null; count(self.nulls).min(self.cases)];
+        let room = |out: &Vec<Content>, wanted: usize| wanted.min(self.cases - out.len());
+        for turn in 0..room(&out, count(self.open)) {
+            out.push(Content::Single(open[turn % open.len()]));
+        }
+        let pairs = if paired.len() > 1 { room(&out, count(self.pairs)) } else { 0 };
+        for _ in 0..pairs {
+            let first = draw.index(paired.len());
+            let second = (first + 1 + draw.index(paired.len() - 1)) % paired.len();
+            out.push(Content::Pair(paired[first], paired[second]));
+        }
+        for turn in 0..self.cases - out.len() {
+            out.push(match listed.get(turn % listed.len().max(1)) {
+                Some(row) => Content::Single(*row),
+                None => Content::Null,
+            });
+        }
+        // Fisher and Yates.
+        for last in (1..out.len()).rev() {
+            out.swap(last, draw.index(last + 1));
+        }
+        out
+    }
+
+    /// The seed of a case: splitmix64 of the design's seed and the case's number.
+    pub fn seed_of(&self, case: usize) -> u64 {
+        let mut z = self.seed.wrapping_add((case as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+}

@@ -1,0 +1,58 @@
+//! What is measured: a run without load, one with full load, and held-out points with either, last, while the arm warms up.
+
+use super::robots::Kind;
+use crate::twin::arm::Arm;
+use crate::twin::noise::{Noise, Purpose};
+use crate::twin::plan::{self, Climate, Point, Poses};
+use crate::twin::truth::TrueRobot;
+
+/// Blocks of the plan: points to fit and points held out.
+pub const FIT: usize = 0;
+pub const VALIDATE: usize = 1;
+
+/// How many points, and which of them twice.
+#[derive(Debug, Clone, Copy)]
+pub struct Amount {
+    pub fit: usize,
+    pub validate: usize,
+    /// Share of points that repeat the one before.
+    pub repeated: f64,
+}
+
+/// A step of the controller's display, deg; recorded joints are multiples of it, so that writing them loses nothing.
+const STEP_DEG: f64 = 1e-4;
+
+/// Points in order of measurement; fails with what is wrong where no pose is allowed.
+pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Climate, seed: u64) -> Result<Vec<Point>, String> {
+    let robot = kind.description([0.0; 3]);
+    let arm = Arm::new(&robot, &TrueRobot::default());
+    let [floor_mm, clearance_mm] = kind.room_mm();
+    let poses = Poses { range_deg: ranges_deg.to_vec(), floor_mm, clearance_mm, candidates: 1 };
+    let ranges: Vec<[f64; 2]> = ranges_deg.iter().map(|range| range.map(f64::to_radians)).collect();
+    let mut draw = Noise::new(seed, Purpose::Poses);
+    let mut clock = Noise::new(seed, Purpose::Clock);
+    let (mut out, mut time): (Vec<Point>, f64) = (Vec::new(), 0.0);
+    for number in 0..amount.fit + amount.validate {
+        let block = if number < amount.fit { FIT } else { VALIDATE };
+        let loaded = match block {
+            FIT => 2 * number >= amount.fit,
+            _ => draw.chance(0.5),
+        };
+        let payload_kg = if loaded { robot.payload_mass } else { 0.0 };
+        time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
+        // A repeat: the arm goes away and comes back as it came before, with the same load.
+        let again =
+            out.last().filter(|last| draw.chance(amount.repeated) && last.block == block && last.payload_kg == payload_kg);
+        let (q, before) = match again {
+            Some(last) => (last.q.clone(), last.before.clone()),
+            None => {
+                let (q, _) = plan::allowed(&arm, &poses, &ranges, &mut draw)?;
+                let q = q.iter().map(|angle| ((angle.to_degrees() / STEP_DEG).round() * STEP_DEG).to_radians()).collect();
+                (q, out.last().map_or_else(|| vec![0.0; ranges.len()], |last| last.q.clone()))
+            }
+        };
+        let (direction, temperature_c) = (plan::direction(&q, &before), climate.temperature(time));
+        out.push(Point { block, q, before, direction, time_s: time, temperature_c, payload_kg });
+    }
+    Ok(out)
+}

@@ -1,0 +1,174 @@
+//! What is left of an effect when geometry, ratios and couplings have absorbed what they can: differences of the twin by its own
+//! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
+
+use crate::robot::description::RobotDescription;
+use crate::twin::arm::Arm;
+use crate::twin::effect::{Motion, Physical};
+use crate::twin::matrix;
+use crate::twin::plan::Point;
+use crate::twin::statics::{Row, settle};
+use crate::twin::tracker::Tracker;
+use crate::twin::truth::TrueRobot;
+
+/// What a recording is made of, but for its effects and its noise.
+#[derive(Debug, Clone, Copy)]
+pub struct Site<'a> {
+    pub robot: &'a RobotDescription,
+    /// With a number for every joint, link and coupling.
+    pub truth: &'a TrueRobot,
+    pub tracker: &'a Tracker,
+    pub points: &'a [Point],
+}
+
+/// Coordinates of all points after each other, tracker frame, m.
+type Column = Vec<f64>;
+
+impl Site<'_> {
+    /// What the tracker would see without effects and noise of the joints that are logged under `effects`.
+    fn bare(&self, truth: &TrueRobot, tracker: &Tracker, effects: &[Physical]) -> Column {
+        let arm = Arm::new(self.robot, truth);
+        let (rest, base) = (Motion::none(arm.links.len()), tracker.base());
+        let rows = self.points.iter().flat_map(|point| {
+            let mut q = point.q.clone();
+            effects.iter().for_each(|effect| effect.log(&mut q, &point.before));
+            matrix::place(&base, arm.posture(&truth.drive(self.robot, &q), &rest).tool)
+        });
+        rows.collect()
+    }
+
+    /// What the tracker sees with effects, less what it would see without them of the joints as logged.
+    pub fn displacement(&self, effects: &[Physical]) -> Column {
+        let mut arm = Arm::new(self.robot, self.truth);
+        effects.iter().for_each(|effect| effect.shape(&mut arm));
+        let base = self.tracker.base();
+        let seen = self.points.iter().flat_map(|point| {
+            let row = Row {
+                command: point.q.clone(),
+                drive: self.truth.drive(self.robot, &point.q),
+                direction: point.direction.clone(),
+                time_s: point.time_s,
+                temperature_c: point.temperature_c,
+                payload_kg: point.payload_kg,
+            };
+            let rest = settle(&arm, &row, effects);
+            matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool)
+        });
+        let bare = self.bare(self.truth, self.tracker, effects);
+        seen.zip(bare).map(|(seen, bare)| seen - bare).collect()
+    }
+
+    /// Central differences by every number of geometry, gears, couplings and the tracker's pose.
+    fn geometry(&self) -> Vec<Column> {
+        let mut out = Vec::new();
+        let mut push = |change: &dyn Fn(&mut TrueRobot, &mut Tracker, f64), step: f64| {
+            let at = |side: f64| {
+                let (mut truth, mut tracker) = (self.truth.clone(), self.tracker.clone());
+                change(&mut truth, &mut tracker, side * step);
+                self.bare(&truth, &tracker, &[])
+            };
+            let (above, below) = (at(1.0), at(-1.0));
+            out.push(above.iter().zip(&below).map(|(a, b)| (a - b) / (2.0 * step)).collect());
+        };
+        // Steps of about 1e-5 rad or m: truncation and rounding are both about 1e-10 of the difference.
+        for joint in 0..self.robot.joints.len() {
+            push(&|truth, _, by| truth.offset_deg[joint] += by.to_degrees(), 1e-5);
+            push(&|truth, _, by| truth.ratio[joint] += by, 1e-5);
+            for axis in 0..3 {
+                push(&|truth, _, by| truth.links[joint].shift_mm[axis] += by, 0.01);
+                push(&|truth, _, by| truth.links[joint].tilt_arcsec[axis] += by, 2.0);
+            }
+        }
+        for coupling in 0..self.truth.couplings.len() {
+            push(&|truth, _, by| truth.couplings[coupling].error += by, 1e-5);
+        }
+        for axis in 0..3 {
+            push(&|_, tracker, by| tracker.position_mm[axis] += by, 0.01);
+            push(&|_, tracker, by| tracker.roll_pitch_yaw_deg[axis] += by, 0.0005);
+        }
+        out
+    }
+
+    /// Root mean square of a coordinate's noise: the tracker's, and the joints' from move to move (rad), m.
+    pub fn noise(&self, play_rad: f64) -> f64 {
+        let bare = self.bare(self.truth, self.tracker, &[]);
+        let beam: f64 = bare.as_chunks::<3>().0.iter().map(|point| 3.0 * self.tracker.sigma(*point).powi(2)).sum();
+        let mut play = 0.0;
+        if play_rad > 0.0 {
+            for joint in 0..self.robot.joints.len() {
+                let mut truth = self.truth.clone();
+                truth.offset_deg[joint] += 1e-4f64.to_degrees();
+                let moved = self.bare(&truth, self.tracker, &[]);
+                play += moved.iter().zip(&bare).map(|(a, b)| ((a - b) / 1e-4 * play_rad).powi(2)).sum::<f64>();
+            }
+        }
+        ((beam + play) / bare.len().max(1) as f64).sqrt()
+    }
+
+    /// The space of everything that geometry can do.
+    pub fn shadow(&self) -> Shadow {
+        let mut shadow = Shadow { basis: Vec::new() };
+        let mut left: Vec<Column> = self.geometry().into_iter().filter_map(unit).collect();
+        // The column with most of its own comes first, so that what hardly differs from the others cannot pass on its rounding.
+        while let Some(most) = (0..left.len()).max_by(|a, b| norm(&left[*a]).total_cmp(&norm(&left[*b]))) {
+            let column = left.swap_remove(most);
+            if norm(&column) < OWN {
+                break;
+            }
+            shadow.add(column);
+            if let Some(direction) = shadow.basis.last() {
+                left.iter_mut().for_each(|other| take_out(other, direction));
+            }
+        }
+        shadow
+    }
+}
+
+/// An orthonormal basis.
+#[derive(Debug, Clone)]
+pub struct Shadow {
+    basis: Vec<Column>,
+}
+
+/// What is left of a column below this share of it is rounding, not a direction of its own.
+const OWN: f64 = 1e-6;
+
+impl Shadow {
+    /// Dimension of the space.
+    pub fn rank(&self) -> usize {
+        self.basis.len()
+    }
+
+    /// Takes a direction in; none where the space holds it already.
+    pub fn add(&mut self, column: Column) {
+        let size = norm(&column);
+        let left = self.outside(column);
+        if norm(&left) > OWN * size {
+            self.basis.extend(unit(left));
+        }
+    }
+
+    /// What of a column lies outside of the space.
+    pub fn outside(&self, mut column: Column) -> Column {
+        for _ in 0..2 {
+            self.basis.iter().for_each(|direction| take_out(&mut column, direction));
+        }
+        column
+    }
+}
+
+/// Length of a column.
+pub fn norm(column: &[f64]) -> f64 {
+    column.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Takes what lies along a unit direction out of a column.
+fn take_out(column: &mut [f64], direction: &[f64]) {
+    let along: f64 = direction.iter().zip(&*column).map(|(a, b)| a * b).sum();
+    column.iter_mut().zip(direction).for_each(|(x, d)| *x -= along * d);
+}
+
+/// The column at length 1; none for one of no length.
+fn unit(column: Column) -> Option<Column> {
+    let length = norm(&column);
+    (length > 0.0).then(|| column.into_iter().map(|x| x / length).collect())
+}

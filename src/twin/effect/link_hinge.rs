@@ -1,0 +1,47 @@
+//! A link that gives way at its middle, as a casting with a weak flange does.
+
+use super::{Act, Motion, State, TrueValue, true_value};
+use crate::twin::matrix;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An elastic hinge halfway along the link, soft about both directions across it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinkHinge {
+    /// From 1: the body moved by joint N.
+    pub link: usize,
+    /// Rotation per moment at the middle, rad/Nm.
+    pub rad_per_nm: f64,
+}
+
+impl Act for LinkHinge {
+    fn act(&self, state: &State, motion: &mut Motion) {
+        let index = self.link - 1;
+        let frame = &state.posture.frames[index];
+        let span = state.arm.links[index].span;
+        let length = matrix::norm(span);
+        if length == 0.0 {
+            return;
+        }
+        let along = matrix::scale(span, 1.0 / length);
+        let half = matrix::scale(span, 0.5);
+        let (_, moment) = state.loads.wrench(index + 1, matrix::place(frame, half));
+        let moment = matrix::see(frame, moment);
+        let across = matrix::minus(moment, matrix::scale(along, matrix::dot(moment, along)));
+        let turned = matrix::turn_by(matrix::scale(across, self.rad_per_nm));
+        let back = matrix::times(&turned, &matrix::shift(half));
+        let end = matrix::times(&matrix::shift(matrix::scale(half, -1.0)), &back);
+        motion.link_end[index] = matrix::times(&motion.link_end[index], &end);
+    }
+    fn seat(&self) -> Option<usize> {
+        Some(self.link)
+    }
+    fn scale(&mut self, by: f64) {
+        self.rad_per_nm *= by;
+    }
+    fn truth(&self) -> Vec<TrueValue> {
+        let (tag, place) = (format!("l{}", self.link), format!("link {}", self.link));
+        vec![true_value("link_compliance", &tag, place, "middle", "rad/Nm", self.rad_per_nm)]
+    }
+}
