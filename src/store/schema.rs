@@ -25,6 +25,7 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/recording.json"),
     include_str!("../../schemas/rejected.json"),
     include_str!("../../schemas/robot.json"),
+    include_str!("../../schemas/scoreboard.json"),
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),

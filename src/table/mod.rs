@@ -52,6 +52,7 @@ mod prediction;
 mod recording;
 mod rejected;
 mod robot;
+mod scoreboard;
 mod split;
 mod statistics;
 mod suspects;
@@ -68,6 +69,7 @@ pub use prediction::{Prediction, PredictionRow};
 pub use recording::Recording;
 pub use rejected::{Rejected, RejectedRow};
 pub use robot::{Robot, RobotRow};
+pub use scoreboard::{Scoreboard, ScoreboardRow};
 pub use split::{Split, SplitRow};
 pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
@@ -87,6 +89,7 @@ pub const TABLES: &[&str] = &[
     Recording::KIND,
     Rejected::KIND,
     Robot::KIND,
+    Scoreboard::KIND,
     Split::KIND,
     Statistics::KIND,
     Suspects::KIND,

@@ -11,6 +11,7 @@ pub mod matrix;
 pub mod noise;
 pub mod plan;
 pub mod recorder;
+pub mod reveal;
 pub mod statics;
 pub mod tracker;
 pub mod truth;

@@ -3,7 +3,9 @@
 use calib::twin::conceal::case::Case;
 use calib::twin::conceal::design::{Content, Design};
 use calib::twin::conceal::family::FAMILIES;
-use std::path::Path;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Names of the list of effects that a diagnosis may use.
@@ -135,4 +137,136 @@ fn a_seed_gives_the_same_bytes_on_one_and_two_threads() {
         .into();
     assert_eq!(made[0].len(), 4 * 4 + 1);
     assert_eq!(made[0], made[1]);
+}
+
+/// Recordings with single effects, pairs, open ones and nulls, and verdicts that say what `say` makes of each truth.
+fn judged(root: &Path, say: impl Fn(&Value) -> Vec<Value>) -> (PathBuf, PathBuf) {
+    let (set, verdicts) = (root.join("set"), root.join("verdicts"));
+    let done = calib(&[
+        "simulate",
+        "conceal",
+        "--out",
+        &set.to_string_lossy(),
+        "--cases",
+        "12",
+        "--points",
+        "30",
+        "--nulls",
+        "0.25",
+        "--pairs",
+        "0.25",
+        "--open",
+        "0.1",
+    ]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    std::fs::create_dir(&verdicts).expect("a folder");
+    for entry in std::fs::read_dir(set.join("sealed")).expect("truths") {
+        let path = entry.expect("a truth").path();
+        let truth: Value = serde_json::from_slice(&std::fs::read(&path).expect("a file")).expect("JSON");
+        let findings = say(&truth);
+        let verdict = if findings.is_empty() { "nothing_missing" } else { "explained" };
+        let answer = json!({ "verdict": verdict, "findings": findings });
+        std::fs::write(verdicts.join(path.file_name().expect("a name")), answer.to_string()).expect("written");
+    }
+    (set, verdicts)
+}
+
+fn wanted(truth: &Value) -> Vec<Value> {
+    truth["want"].as_array().expect("a list").clone()
+}
+
+fn score(set: &Path, verdicts: &Path) -> Value {
+    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy(), "--json"]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    serde_json::from_slice(&done.stdout).expect("JSON")
+}
+
+fn total(board: &Value, outcome: &str) -> u64 {
+    let bins = ["alone", "beside"].into_iter().flat_map(|company| board[company].as_array().expect("bins").clone());
+    bins.map(|bin| bin["outcomes"][outcome].as_u64().expect("a count")).sum()
+}
+
+#[test]
+fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), wanted);
+    let board = score(&set, &verdicts);
+    assert_eq!(board["recordings"], 12);
+    assert_eq!(board["failures"], json!([]));
+    assert!(total(&board, "exact") >= 9 && total(&board, "exact") == total(&board, "n"));
+
+    let silent = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(silent.path(), |_| vec![]);
+    let board = score(&set, &verdicts);
+    assert_eq!(total(&board, "silent"), total(&board, "n"));
+    assert_eq!(board["shares"][0]["share"]["count"], 0, "no false alarm");
+}
+
+#[test]
+fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), |_| vec![json!({ "effect": "tracker_scale", "where": "tracker" })]);
+    let board = score(&set, &verdicts);
+    assert_eq!(total(&board, "wrong"), total(&board, "n"));
+    assert_eq!(
+        board["shares"][0]["share"],
+        json!({ "count": 3, "of": 3, "wilson_95": board["shares"][0]["share"]["wilson_95"] })
+    );
+    // Said beside the truth it leaves the outcomes alone, but no recording is right.
+    let both = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(both.path(), |truth| {
+        let mut findings = wanted(truth);
+        findings.push(json!({ "effect": "tracker_scale", "where": "tracker" }));
+        findings
+    });
+    let board = score(&set, &verdicts);
+    assert_eq!((total(&board, "exact"), board["failures"].as_array().map(Vec::len)), (total(&board, "n"), Some(12)));
+}
+
+#[test]
+fn a_rival_and_a_run_of_links_count_as_the_set() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), |truth| {
+        let as_rival = |name: &Value| json!({ "effect": "tracker_scale", "where": "tracker", "rivals": [name] });
+        wanted(truth).iter().map(as_rival).collect()
+    });
+    let board = score(&set, &verdicts);
+    assert_eq!(total(&board, "in_set"), total(&board, "n"));
+    assert_eq!(board["shares"][1]["share"]["count"], 0, "what has the truth for a rival is no stray");
+}
+
+#[test]
+fn one_changed_byte_breaks_the_seal() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), wanted);
+    for name in ["sealed/c0003.json", "recordings/c0002/tracker.csv"] {
+        let path = set.join(name);
+        let before = std::fs::read(&path).expect("a file");
+        let mut after = before.clone();
+        let last = after.iter().rposition(u8::is_ascii_digit).expect("a digit");
+        after[last] = if after[last] == b'1' { b'2' } else { b'1' };
+        std::fs::write(&path, after).expect("written");
+        let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy()]);
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(10), "{said}");
+        assert!(said.contains(&format!("{name}: was changed since it was sealed")) && done.stdout.is_empty(), "{said}");
+        std::fs::write(&path, before).expect("written");
+    }
+    std::fs::remove_file(set.join("recordings/c0001/robot.json")).expect("removed");
+    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy()]);
+    assert!(String::from_utf8_lossy(&done.stderr).contains("recordings/c0001/robot.json: was sealed, but cannot be read"));
+}
+
+#[test]
+fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), wanted);
+    let out = root.path().join("scoreboard.parquet");
+    let text = out.to_string_lossy();
+    let done = calib(&["simulate", "reveal", &set.to_string_lossy(), "--verdicts", &verdicts.to_string_lossy(), "--out", &text]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(&out).expect("a file")).expect("Parquet");
+    let rows: usize = reader.build().expect("a reader").map(|batch| batch.expect("rows").num_rows()).sum();
+    let board = score(&set, &verdicts);
+    assert_eq!(rows as u64, total(&board, "n") + 3, "three nulls have a row, too");
 }

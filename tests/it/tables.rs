@@ -105,7 +105,7 @@ macro_rules! kinds {
         }
     };
 }
-kinds! { Document Fit Intake Network Observability Parameters Prediction Recording Rejected Robot Split Statistics Suspects Training Truth }
+kinds! { Document Fit Intake Network Observability Parameters Prediction Recording Rejected Robot Scoreboard Split Statistics Suspects Training Truth }
 
 #[test]
 fn every_table_is_tested_and_has_exactly_one_schema() {

@@ -1,11 +1,12 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io::ErrorKind;
+use std::path::{Component, Path, PathBuf};
 
 /// The format of this file.
 const FORMAT: u32 = 1;
@@ -38,6 +39,29 @@ impl Seal {
         fs::write(&path, text).map_err(fault)?;
         self.files.insert(name, digest(text.as_bytes()));
         Ok(())
+    }
+
+    /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
+    /// their paths.
+    pub(super) fn check(folder: &Path) -> Result<Vec<String>> {
+        let path = folder.join(SEAL);
+        let place = path.display().to_string();
+        let text = fs::read_to_string(&path).map_err(|error| Error::data(&place, error.to_string()))?;
+        let seal: Seal = serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
+        if seal.calib_seal != FORMAT || seal.hash != Seal::new().hash {
+            return Err(Error::data(place, format!("is no seal of format {FORMAT} with SHA-256")));
+        }
+        let mut faults = Vec::new();
+        for (name, hash) in &seal.files {
+            // A seal comes from a file: it may not lead out of its folder.
+            let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+            match if inside { fs::read(folder.join(name)) } else { Err(ErrorKind::InvalidFilename.into()) } {
+                Ok(bytes) if digest(&bytes) == *hash => (),
+                Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
+                Err(error) => faults.push(Fault::new(name, format!("was sealed, but cannot be read: {error}"))),
+            }
+        }
+        if faults.is_empty() { Ok(seal.files.into_keys().collect()) } else { Err(Error::Data(faults)) }
     }
 
     /// Writes the seal itself.

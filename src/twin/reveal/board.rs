@@ -1,0 +1,213 @@
+//! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
+
+use super::mark::{Case, Marked, Outcome};
+use std::collections::BTreeMap;
+
+/// Lower ends of the bins of visibility L.
+pub const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
+/// From this visibility on an effect should be named.
+pub const DUE: f64 = 50.0;
+
+/// How many of how many, with Wilson's 95 % limits.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Share {
+    pub count: usize,
+    pub of: usize,
+}
+
+impl Share {
+    /// Counts what holds.
+    pub fn of(all: impl IntoIterator<Item = bool>) -> Share {
+        all.into_iter().fold(Share::default(), |share, holds| Share { count: share.count + usize::from(holds), of: share.of + 1 })
+    }
+    pub fn value(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.count as f64 / self.of as f64)
+    }
+    /// E. B. Wilson, 1927.
+    pub fn limits(&self) -> [f64; 2] {
+        if self.of == 0 {
+            return [0.0, 1.0];
+        }
+        let (n, z) = (self.of as f64, 1.959_964f64);
+        let p = self.count as f64 / n;
+        let (middle, wide) = (p + z * z / (2.0 * n), z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt());
+        [(middle - wide) / (1.0 + z * z / n), (middle + wide) / (1.0 + z * z / n)]
+    }
+}
+
+/// Outcomes of causes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Counts {
+    pub exact: usize,
+    pub in_set: usize,
+    pub wrong: usize,
+    pub silent: usize,
+}
+
+impl Counts {
+    fn of<'a>(causes: impl Iterator<Item = &'a Marked>) -> Counts {
+        let mut out = Counts::default();
+        for cause in causes {
+            match cause.outcome {
+                Outcome::Exact => out.exact += 1,
+                Outcome::InSet => out.in_set += 1,
+                Outcome::Wrong => out.wrong += 1,
+                Outcome::Silent => out.silent += 1,
+            }
+        }
+        out
+    }
+    pub fn all(&self) -> usize {
+        self.exact + self.in_set + self.wrong + self.silent
+    }
+    pub fn exactly(&self) -> Share {
+        Share { count: self.exact, of: self.all() }
+    }
+}
+
+/// All marked cases.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Board {
+    pub cases: Vec<Case>,
+    /// Cases without a verdict, or with one that cannot be read, and why.
+    pub missing: Vec<(String, String)>,
+}
+
+/// What a set of effects is counted over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Company {
+    /// The only cause of its recording.
+    Alone,
+    /// One of several.
+    Beside,
+}
+
+impl Board {
+    fn causes(&self) -> impl Iterator<Item = (&Case, &Marked)> {
+        self.cases.iter().flat_map(|case| case.causes.iter().map(move |cause| (case, cause)))
+    }
+
+    /// Outcomes by bin of visibility.
+    pub fn by_strength(&self, company: Company) -> Vec<Counts> {
+        let upper = |bin: usize| BINS.get(bin + 1).copied().unwrap_or(f64::INFINITY);
+        let alone = |case: &Case| (case.causes.len() == 1) == (company == Company::Alone);
+        (0..BINS.len())
+            .map(|bin| {
+                let within = |cause: &Marked| (BINS[bin]..upper(bin)).contains(&cause.strength);
+                Counts::of(self.causes().filter(|(case, cause)| alone(case) && within(cause)).map(|(_, cause)| cause))
+            })
+            .collect()
+    }
+
+    /// Outcomes of due causes by effect.
+    pub fn by_effect(&self) -> BTreeMap<&str, Counts> {
+        let mut names: Vec<&str> = self.causes().map(|(_, cause)| cause.effect.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let due = |name: &str| {
+            Counts::of(self.causes().map(|(_, cause)| cause).filter(|cause| cause.effect == name && cause.strength >= DUE))
+        };
+        names.into_iter().map(|name| (name, due(name))).filter(|(_, counts)| counts.all() > 0).collect()
+    }
+
+    /// Due causes: effect -> what it was called (`=`: rightly; `-`: nothing) -> how often.
+    pub fn confusion(&self) -> BTreeMap<&str, BTreeMap<String, usize>> {
+        let mut out: BTreeMap<&str, BTreeMap<String, usize>> = BTreeMap::new();
+        for (_, cause) in self.causes().filter(|(_, cause)| cause.strength >= DUE) {
+            let called = match (cause.outcome, &cause.said) {
+                (Outcome::Exact, _) => "=".to_string(),
+                (Outcome::InSet, _) => "in the set".to_string(),
+                (Outcome::Wrong, Some(said)) => match said.split_once(" at ") {
+                    Some((name, _)) if name == cause.effect => format!("{name} elsewhere"),
+                    Some((name, _)) => name.to_string(),
+                    None => said.clone(),
+                },
+                (Outcome::Wrong | Outcome::Silent, _) => "-".to_string(),
+            };
+            *out.entry(&cause.effect).or_default().entry(called).or_default() += 1;
+        }
+        out
+    }
+
+    /// Recordings without an effect in which one was declared.
+    pub fn alarms(&self) -> Share {
+        Share::of(self.cases.iter().filter(|case| case.causes.is_empty()).map(|case| !case.strays.is_empty()))
+    }
+
+    /// Recordings with effects in which something was named that is not there.
+    pub fn strays(&self) -> Share {
+        Share::of(self.cases.iter().filter(|case| !case.causes.is_empty()).map(|case| !case.strays.is_empty()))
+    }
+
+    /// Recordings whose causes are all due: all named and nothing else; and the strongest named.
+    pub fn whole(&self, content: &str) -> [Share; 2] {
+        let due = |case: &&Case| case.content == content && case.causes.iter().all(|cause| cause.strength >= DUE);
+        let strongest = |case: &Case| {
+            let most = case.causes.iter().max_by(|a, b| a.strength.total_cmp(&b.strength));
+            most.is_none_or(|cause| cause.outcome == Outcome::Exact)
+        };
+        [
+            Share::of(self.cases.iter().filter(due).map(|case| case.right(DUE))),
+            Share::of(self.cases.iter().filter(due).map(strongest)),
+        ]
+    }
+
+    /// Faults of the recording by kind: how many were named.
+    pub fn tampered(&self) -> BTreeMap<&str, Share> {
+        let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
+        for (kind, named) in self.cases.iter().flat_map(|case| &case.tampered) {
+            out.entry(kind).or_default().push(*named);
+        }
+        out.into_iter().map(|(kind, named)| (kind, Share::of(named))).collect()
+    }
+
+    /// Held-out errors over their bounds, ascending, where an effect is due, and in recordings without one.
+    pub fn ratios(&self) -> [Vec<f64>; 2] {
+        let due = |case: &&Case| case.causes.iter().any(|cause| cause.strength >= DUE);
+        let null = |case: &&Case| case.causes.is_empty();
+        let sorted = |cases: Vec<&Case>| {
+            let mut out: Vec<f64> = cases.iter().filter_map(|case| Some(case.held_out?.ratio())).collect();
+            out.sort_by(f64::total_cmp);
+            out
+        };
+        [sorted(self.cases.iter().filter(due).collect()), sorted(self.cases.iter().filter(null).collect())]
+    }
+
+    /// Explained shares of held-out errors where an effect is due, ascending.
+    pub fn explained(&self) -> Vec<f64> {
+        let due = self.cases.iter().filter(|case| case.causes.iter().any(|cause| cause.strength >= DUE));
+        let mut out: Vec<f64> = due.filter_map(|case| case.held_out?.explained()).collect();
+        out.sort_by(f64::total_cmp);
+        out
+    }
+
+    /// Stated 95 % intervals that hold the true number, by effect.
+    pub fn intervals(&self) -> BTreeMap<&str, Share> {
+        let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
+        for interval in self.cases.iter().flat_map(|case| &case.intervals) {
+            out.entry(&interval.effect).or_default().push(interval.holds);
+        }
+        out.into_iter().map(|(effect, holds)| (effect, Share::of(holds))).collect()
+    }
+
+    /// Verdicts by content.
+    pub fn verdicts(&self) -> BTreeMap<(&str, &str), usize> {
+        let mut out = BTreeMap::new();
+        for case in &self.cases {
+            *out.entry((case.content.as_str(), case.verdict.as_str())).or_default() += 1;
+        }
+        out
+    }
+
+    /// Recordings that were not right: a due cause missed, or something said that is not there.
+    pub fn failures(&self) -> impl Iterator<Item = &Case> {
+        self.cases.iter().filter(|case| !case.right(DUE))
+    }
+}
+
+/// The number at this share of an ascending list, linear between neighbours.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let place = share * (sorted.len().checked_sub(1)?) as f64;
+    let (low, high) = (sorted.get(place.floor() as usize)?, sorted.get(place.ceil() as usize)?);
+    Some(low + (high - low) * place.fract())
+}

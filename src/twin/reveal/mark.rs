@@ -1,0 +1,201 @@
+//! One case: what was found of every concealed cause, and what was said that is not there.
+
+use super::paper::{Answer, Cause, Finding, Number, Truth};
+use crate::units::Unit;
+use std::collections::BTreeSet;
+
+/// What became of a cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// Named, at its place, as the first choice.
+    Exact,
+    /// Among the explanations that the data cannot tell apart, or by a name that is accepted for it.
+    InSet,
+    /// Not named, and something else was.
+    Wrong,
+    /// Not named, and nothing else was.
+    Silent,
+}
+
+impl Outcome {
+    pub fn name(self) -> &'static str {
+        match self {
+            Outcome::Exact => "exact",
+            Outcome::InSet => "in_set",
+            Outcome::Wrong => "wrong",
+            Outcome::Silent => "silent",
+        }
+    }
+}
+
+/// A cause and what became of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Marked {
+    pub effect: String,
+    pub place: String,
+    pub form: String,
+    pub strength: f64,
+    pub outcome: Outcome,
+    /// What was said instead, strongest first: `effect at place`.
+    pub said: Option<String>,
+}
+
+/// Whether a stated 95 % interval holds the true number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interval {
+    pub effect: String,
+    pub name: String,
+    pub holds: bool,
+}
+
+/// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOut {
+    pub before: f64,
+    pub after: f64,
+    /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit.
+    pub bound: f64,
+}
+
+impl HeldOut {
+    /// After over its bound.
+    pub fn ratio(&self) -> f64 {
+        self.after / self.bound
+    }
+    /// Share of the squared error above the bound that is gone; none where there was next to nothing to explain.
+    pub fn explained(&self) -> Option<f64> {
+        let above = |rms: f64| rms.powi(2) - self.bound.powi(2);
+        (above(self.before) > 0.1 * self.bound.powi(2)).then(|| 1.0 - above(self.after).max(0.0) / above(self.before))
+    }
+}
+
+/// A marked case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    pub name: String,
+    pub content: String,
+    pub family: String,
+    pub robot: String,
+    pub points: usize,
+    pub verdict: String,
+    pub causes: Vec<Marked>,
+    /// Faults of the recording, and whether each was named.
+    pub tampered: Vec<(String, bool)>,
+    /// Findings that are neither wanted nor accepted, strongest first.
+    pub strays: Vec<String>,
+    pub held_out: Option<HeldOut>,
+    pub intervals: Vec<Interval>,
+}
+
+impl Case {
+    /// Every cause of at least this strength named exactly, and nothing said that is not there.
+    pub fn right(&self, strength: f64) -> bool {
+        let due = |cause: &&Marked| cause.strength >= strength;
+        self.strays.is_empty() && self.causes.iter().filter(due).all(|cause| cause.outcome == Outcome::Exact)
+    }
+}
+
+/// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
+fn atoms(effect: &str, place: &str) -> BTreeSet<(String, String)> {
+    let run = place.strip_prefix("link ").and_then(|rest| rest.split_once('-'));
+    let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
+    match ends {
+        Some((from, to)) => (from..=to).map(|link| (effect.to_string(), format!("link {link}"))).collect(),
+        None => BTreeSet::from([(effect.to_string(), place.to_string())]),
+    }
+}
+
+fn said(finding: &Finding) -> String {
+    // The names come from a file and go to a terminal.
+    format!("{} at {}", finding.effect, finding.place).chars().filter(|c| !c.is_control()).collect()
+}
+
+/// Everything that a finding may mean: itself and its rivals.
+fn reach(finding: &Finding) -> BTreeSet<(String, String)> {
+    let rivals = finding.rivals.iter().flat_map(|rival| atoms(&rival.effect, &rival.place));
+    atoms(&finding.effect, &finding.place).into_iter().chain(rivals).collect()
+}
+
+/// Marks a diagnosis of a case.
+pub fn mark(truth: &Truth, answer: &Answer) -> Case {
+    let found: BTreeSet<_> = answer.findings.iter().flat_map(|finding| atoms(&finding.effect, &finding.place)).collect();
+    let reached: BTreeSet<_> = answer.findings.iter().flat_map(reach).collect();
+    let accepted: BTreeSet<_> = truth.accepted.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
+    let mut known = accepted.clone();
+    known.extend(truth.effects.iter().flat_map(|cause| atoms(&cause.effect, &cause.place)));
+    // Both kinds of tampering count as known where one is: a swapped pair is two outliers, too.
+    if !truth.tampered.is_empty() {
+        known.extend(["outlier", "mislabelled_point"].into_iter().flat_map(|effect| atoms(effect, "recording")));
+    }
+    let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
+    let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
+    let causes = truth.effects.iter().map(|cause| {
+        let own = atoms(&cause.effect, &cause.place);
+        let outcome = if own.is_subset(&found) {
+            Outcome::Exact
+        } else if own.is_subset(&reached) || !accepted.is_disjoint(&found) {
+            Outcome::InSet
+        } else if strays.is_empty() {
+            Outcome::Silent
+        } else {
+            Outcome::Wrong
+        };
+        Marked {
+            effect: cause.effect.clone(),
+            place: cause.place.clone(),
+            form: cause.form.clone(),
+            strength: cause.strength,
+            outcome,
+            said: (outcome == Outcome::Wrong).then(|| strays.first().cloned()).flatten(),
+        }
+    });
+    let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
+    Case {
+        name: truth.case.clone(),
+        content: truth.content.clone(),
+        family: truth.family.clone(),
+        robot: truth.robot.clone(),
+        points: truth.points.fit,
+        verdict: answer.verdict.clone(),
+        causes: causes.collect(),
+        tampered: truth.tampered.iter().map(|fault| (fault.effect.clone(), named(&fault.effect))).collect(),
+        held_out: held_out(truth, answer),
+        intervals: truth.effects.iter().flat_map(|cause| intervals(cause, &answer.findings)).collect(),
+        strays,
+    }
+}
+
+fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
+    let before = answer.before.as_ref()?.validate_rms_mm?;
+    let after = answer.after.as_ref()?.validate_rms_mm?;
+    let found: usize = answer.findings.iter().map(|finding| finding.parameters.len()).sum();
+    let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
+    let floor = 3f64.sqrt() * truth.noise.validate_rms_per_axis_mm;
+    Some(HeldOut { before, after, bound: floor * (1.0 + p / (n - p - 1.0).max(1.0)).sqrt() })
+}
+
+/// Two-sided 95 % of a normal distribution.
+const NINETY_FIVE: f64 = 1.959_964;
+
+/// Stated intervals of numbers that the truth holds under the same name and in a unit that converts.
+fn intervals(cause: &Cause, findings: &[Finding]) -> Vec<Interval> {
+    let same = findings.iter().filter(|finding| finding.effect == cause.effect && finding.place == cause.place);
+    let stated: Vec<&Number> = same.flat_map(|finding| &finding.parameters).collect();
+    let judge = |truth: &Number| {
+        let number = stated.iter().find(|number| number.name == truth.name)?;
+        let sigma = number.sigma.filter(|sigma| *sigma > 0.0)?;
+        let expected = convert(truth.value, &truth.unit, &number.unit)?;
+        let holds = (number.value - expected).abs() <= NINETY_FIVE * sigma;
+        Some(Interval { effect: cause.effect.clone(), name: truth.name.clone(), holds })
+    };
+    cause.parameters.iter().filter_map(judge).collect()
+}
+
+/// A value in another unit; none where the units do not convert.
+fn convert(value: f64, from: &str, to: &str) -> Option<f64> {
+    if from == to {
+        return Some(value);
+    }
+    let (from, to) = (Unit::parse(from)?, Unit::parse(to)?);
+    (from.quantity() == to.quantity()).then(|| to.from_si(from.to_si(value)))
+}

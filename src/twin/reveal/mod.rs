@@ -1,0 +1,8 @@
+//! Verdicts held against sealed truths: [`paper`] reads both, [`mark`] marks one case, [`board`] counts, `text` prints the board.
+//!
+//! Nothing of the diagnosis is used: what it said is read as any reader of its JSON would.
+
+pub mod board;
+pub mod mark;
+pub mod paper;
+mod text;

@@ -1,0 +1,147 @@
+//! The scoreboard for people and for programs.
+
+use super::board::{BINS, Board, Company, Counts, DUE, Share, quantile};
+use super::mark::Case;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+impl Board {
+    /// The scoreboard as text, mm and percent.
+    pub fn text(&self) -> String {
+        let mut out = format!("{} recordings judged, {} without a verdict\n", self.cases.len(), self.missing.len());
+        for (title, company) in [("alone in its recording", Company::Alone), ("beside others", Company::Beside)] {
+            let bins = self.by_strength(company);
+            if bins.iter().all(|counts| counts.all() == 0) {
+                continue;
+            }
+            let _ = writeln!(out, "\neffects {title}\n  L             n  exact  in set  wrong  silent   exact");
+            for (bin, counts) in bins.iter().enumerate() {
+                let _ = writeln!(out, "  {:<9}{}", range(bin), line(counts));
+            }
+        }
+        let by_effect = self.by_effect();
+        if !by_effect.is_empty() {
+            let _ = writeln!(
+                out,
+                "\neffects with L of {DUE} or more\n  effect                     n  exact  in set  wrong  silent   exact"
+            );
+            for (effect, counts) in by_effect {
+                let _ = writeln!(out, "  {effect:<22}{}", line(&counts));
+            }
+        }
+        let confusion = self.confusion();
+        if !confusion.is_empty() {
+            let _ = writeln!(out, "\ncalled (`=` rightly, `-` nothing)");
+            for (effect, called) in confusion {
+                let called: Vec<String> = called.iter().map(|(name, count)| format!("{name} {count}")).collect();
+                let _ = writeln!(out, "  {effect:<22}{}", called.join(", "));
+            }
+        }
+        out.push('\n');
+        for (title, share) in self.shares() {
+            if share.of > 0 {
+                let _ = writeln!(out, "{title}: {}", percent(&share));
+            }
+        }
+        for (effect, share) in self.intervals() {
+            let _ = writeln!(out, "95 % intervals that hold the truth, {effect}: {}", percent(&share));
+        }
+        let [due, null] = self.ratios();
+        for (title, ratios) in [(format!("with an L of {DUE} or more"), due), ("without an effect".into(), null)] {
+            if let (Some(median), Some(late)) = (quantile(&ratios, 0.5), quantile(&ratios, 0.9)) {
+                let within = Share::of(ratios.iter().map(|ratio| *ratio <= 1.1));
+                let within = percent(&within);
+                let _ = writeln!(
+                    out,
+                    "held-out rms over its bound, {title}: median {median:.3}, 90th percentile {late:.3}, within 1.1: {within}"
+                );
+            }
+        }
+        if let Some(median) = quantile(&self.explained(), 0.5) {
+            let _ = writeln!(out, "explained share of the held-out error: median {median:.4}");
+        }
+        for ((content, verdict), count) in self.verdicts() {
+            let _ = writeln!(out, "{content}: {verdict} {count}");
+        }
+        let failures: Vec<String> = self.failures().map(failure).collect();
+        if !failures.is_empty() {
+            let _ = writeln!(out, "\nnot right ({})\n{}", failures.len(), failures.join("\n"));
+        }
+        for (case, why) in &self.missing {
+            let _ = writeln!(out, "no verdict: {case}: {why}");
+        }
+        out
+    }
+
+    fn shares(&self) -> Vec<(String, Share)> {
+        let [pairs, strongest] = self.whole("pair");
+        let mut out = vec![
+            ("false alarms in recordings without an effect".to_string(), self.alarms()),
+            ("recordings with effects in which something was named that is not there".into(), self.strays()),
+            (format!("two effects of L {DUE} or more, both named and nothing else"), pairs),
+            ("  the stronger one named".into(), strongest),
+        ];
+        out.extend(self.tampered().into_iter().map(|(kind, share)| (format!("{kind} named"), share)));
+        out
+    }
+
+    /// The scoreboard as JSON.
+    pub fn document(&self) -> Value {
+        let share = |share: &Share| json!({ "count": share.count, "of": share.of, "wilson_95": share.limits() });
+        let counts = |counts: &Counts| {
+            json!({ "n": counts.all(), "exact": counts.exact, "in_set": counts.in_set, "wrong": counts.wrong,
+                "silent": counts.silent, "exact_wilson_95": counts.exactly().limits() })
+        };
+        let bins = |company| {
+            let by_strength = self.by_strength(company);
+            by_strength.iter().enumerate().map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) })).collect::<Vec<_>>()
+        };
+        let [due, null] = self.ratios();
+        let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
+        json!({
+            "recordings": self.cases.len(),
+            "without_verdict": self.missing.iter().map(|(case, why)| json!({ "case": case, "why": why })).collect::<Vec<_>>(),
+            "alone": bins(Company::Alone),
+            "beside": bins(Company::Beside),
+            "by_effect": self.by_effect().iter().map(|(name, of)| (name.to_string(), counts(of))).collect::<serde_json::Map<_, _>>(),
+            "confusion": self.confusion(),
+            "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
+            "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
+            "held_out_over_bound": { "due": spread(&due), "null": spread(&null) },
+            "explained_share": spread(&self.explained()),
+            "failures": self.failures().map(failure).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// E.g. `15-50`.
+fn range(bin: usize) -> String {
+    match BINS.get(bin + 1) {
+        Some(upper) => format!("{}-{upper}", BINS[bin]),
+        None => format!("> {}", BINS[bin]),
+    }
+}
+
+fn line(counts: &Counts) -> String {
+    let Counts { exact, in_set, wrong, silent } = counts;
+    format!("{:>6}{exact:>7}{in_set:>8}{wrong:>7}{silent:>8}   {}", counts.all(), percent(&counts.exactly()))
+}
+
+/// E.g. `39 of 40 = 97.5 % (87.1 to 99.6)`, in brackets the 95 % limits.
+fn percent(share: &Share) -> String {
+    let [low, high] = share.limits().map(|limit| 100.0 * limit);
+    match share.value() {
+        Some(value) => format!("{} of {} = {:.1} % ({low:.1} to {high:.1})", share.count, share.of, 100.0 * value),
+        None => "-".into(),
+    }
+}
+
+fn failure(case: &Case) -> String {
+    let wanted = case.causes.iter().map(|cause| {
+        format!("{} at {} [{}, L {:.0}: {}]", cause.effect, cause.place, cause.form, cause.strength, cause.outcome.name())
+    });
+    let wanted: Vec<String> = wanted.collect();
+    let wanted = if wanted.is_empty() { "nothing".into() } else { wanted.join(", ") };
+    let strays = if case.strays.is_empty() { "nothing else".into() } else { case.strays.join(", ") };
+    format!("  {} ({}, {} points): {wanted}; said besides: {strays}", case.name, case.robot, case.points)
+}
