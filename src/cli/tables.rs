@@ -14,7 +14,8 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
     Ok(rows)
 }
 
-/// Two tables: points that no model has seen, and those that the models were fitted to. `expected` is the rms of a complete
+/// Three tables: points that no model has seen, those that the models were fitted to, and these again
+/// cross-validated. `expected` is the rms of a complete
 /// model under the instrument's noise.
 pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
@@ -28,8 +29,42 @@ pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
             text.push_str(&block(title, &rows));
         }
     }
+    text.push_str(&folds(&rows));
     text.push_str(&references(&rows));
     Ok(text)
+}
+
+/// Training points under fits without them; nothing where no step made folds.
+fn folds(rows: &[StatisticsRow]) -> String {
+    let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.fold_rms_mm.is_some()).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
+        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+    };
+    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let mut text = format!(
+        "training points, each under a fit without it (cross-validated), error in mm: parts drawn at random | contiguous parts\n  \
+         {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",
+        "step", "set", "mean", "max", "rms", "expected", "mean", "max", "rms"
+    );
+    let show = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
+    for row in rows {
+        text.push_str(&format!(
+            "  {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",
+            row.step,
+            row.set,
+            show(row.fold_mean_mm),
+            show(row.fold_max_mm),
+            show(row.fold_rms_mm),
+            show(row.fold_expected_mm),
+            show(row.block_mean_mm),
+            show(row.block_max_mm),
+            show(row.block_rms_mm)
+        ));
+    }
+    text + "\n"
 }
 
 /// Our figures beside those that the pipeline names; nothing where it names none.
@@ -95,6 +130,9 @@ pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
             "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
             "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
+            "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
+            "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
+            "fold_expected_mm": row.fold_expected_mm,
             "reference": row.reference, "reference_mean_mm": row.reference_mean_mm,
             "reference_std_mm": row.reference_std_mm, "reference_max_mm": row.reference_max_mm,
         })

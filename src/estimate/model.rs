@@ -7,11 +7,13 @@ use crate::spatial::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The forward model of measured points.
+#[derive(Clone)]
 pub struct Model {
     pub robot: RobotModel,
-    pub stack: EffectStack,
+    pub stack: Arc<EffectStack>,
     /// Parameter values, SI, in the order of the stack's specs.
     pub x: Vec<f64>,
     /// What is known of some parameters beforehand, by position in the stack.
@@ -22,7 +24,7 @@ impl Model {
     /// The model with all parameters zero: the nominal robot.
     pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
         let x = vec![0.0; stack.specs().len()];
-        Self { robot, stack, x, known: BTreeMap::new() }
+        Self { robot, stack: Arc::new(stack), x, known: BTreeMap::new() }
     }
 
     /// Where the base stands in the tracker's frame, corrections included.

@@ -40,6 +40,7 @@ pub(super) struct Errors {
     /// Sets still held out after the last step, the verdict's first; then those that a later step was fitted to.
     held_out: Vec<Block>,
     training: Vec<Block>,
+    folds: Vec<Fold>,
     references: Vec<Beside>,
     pictures: Vec<Picture>,
     legend: Vec<(String, String)>,
@@ -72,6 +73,16 @@ struct Row {
     last: bool,
     /// mean, std, p95, max, rms, median, rms x, y, z, noise.
     values: Vec<String>,
+}
+
+/// Training points of one step and set, each under a fit without it.
+#[derive(Serialize)]
+struct Fold {
+    step: String,
+    colour: String,
+    set: String,
+    /// Parts drawn at random: mean, max, rms, expected rms; contiguous parts: mean, max, rms.
+    values: [String; 7],
 }
 
 /// Our figures of one step and set beside those that the pipeline names.
@@ -120,6 +131,7 @@ impl Errors {
             verdict: verdict(rows, &last),
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
+            folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
             legend: steps.0.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
@@ -158,6 +170,25 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         last: Some(row.order) == steps.last(),
         values: values.into_iter().map(mm).collect(),
     }
+}
+
+fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Fold> {
+    row.fold_rms_mm?;
+    let values = [
+        row.fold_mean_mm,
+        row.fold_max_mm,
+        row.fold_rms_mm,
+        row.fold_expected_mm,
+        row.block_mean_mm,
+        row.block_max_mm,
+        row.block_rms_mm,
+    ];
+    Some(Fold {
+        step: row.step.clone(),
+        colour: steps.colour(row.order),
+        set: row.set.clone(),
+        values: values.map(|value| value.map_or_else(String::new, mm)),
+    })
 }
 
 fn beside(row: &StatisticsRow) -> Option<Beside> {

@@ -1,10 +1,10 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect};
+use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::{Context, repeated, screened};
-use crate::table::{Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
+use crate::table::{Beside, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -63,6 +63,10 @@ macro_rules! identification {
             /// `{arcsec: 3}`.
             #[serde(default)]
             pub repeatability: crate::stage::repeated::Repeatability,
+            /// Cross-validation: the fit is repeated without each of so many parts of its poses, drawn at random, and again without
+            /// each contiguous stretch; 0 for none.
+            #[serde(default = "crate::stage::identified::five")]
+            pub folds: usize,
         }
 
         impl $name {
@@ -81,6 +85,10 @@ macro_rules! identification {
                 if self.on.is_empty() {
                     faults.push(crate::error::Fault::new("on", format!("expected at least one set, e.g. [{example}]")));
                 }
+                if self.folds == 1 || self.folds > crate::stage::identified::MOST_FOLDS {
+                    let most = crate::stage::identified::MOST_FOLDS;
+                    faults.push(crate::error::Fault::new("folds", format!("allowed: 0 for none, or 2 to {most}")));
+                }
                 faults.extend(self.repeatability.fault());
                 faults.extend(self.tracker.fault().map(|fault| crate::error::Fault::new("tracker", fault)));
                 faults
@@ -89,6 +97,13 @@ macro_rules! identification {
     };
 }
 pub(crate) use identification;
+
+/// Beyond this, every fold is a fit for next to no news.
+pub(crate) const MOST_FOLDS: usize = 100;
+
+pub(crate) fn five() -> usize {
+    5
+}
 
 pub(crate) fn yes() -> bool {
     true
@@ -124,6 +139,8 @@ pub struct Fitting<'a> {
     pub geometry: Option<(usize, usize)>,
     /// One standard deviation of every revolute joint that rows are weighted by, rad.
     pub repeatability: Option<f64>,
+    /// Parts of a cross-validation.
+    pub folds: usize,
 }
 
 impl Identified {
@@ -143,12 +160,22 @@ impl Identified {
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
         let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
+        let folds = cross_validate(model, fitting.data, fitting.rows, fitted, fitting.folds, context.seed);
+        let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
+        let errors =
+            folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
+        let beside = Beside {
+            geometry: fitting.geometry,
+            repeatability: fitting.repeatability,
+            folds: folds.as_ref().map(|folds| folds.count),
+        };
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
             fit: Fit::of(step, fitted),
-            observability: Observability::of(step, fitted, fitting.geometry, fitting.repeatability),
+            observability: Observability::of(step, fitted, &beside),
             prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
-                .with_suspects(aside),
+                .with_suspects(aside)
+                .with_folds(errors),
             suspects: Suspects::of(step, fitting.screening, fitting.recording, fitting.split),
         }
     }

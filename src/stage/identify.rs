@@ -42,7 +42,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -92,6 +92,7 @@ impl Stage for Identify {
             seen_before: &vec![false; data.rows()],
             geometry: geometric_rank(&model, &fitted),
             repeatability,
+            folds: self.folds,
         };
         question_ratios(&model, &fitted, &fitting, &setting, context);
         Ok(Identified::of(context, &model, &fitted, &fitting))

@@ -33,7 +33,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses, everything identified before is kept";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -81,6 +81,7 @@ impl Stage for Stiffness {
             seen_before: &seen_before,
             geometry: None,
             repeatability,
+            folds: self.folds,
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }

@@ -51,7 +51,7 @@ writes! {
 impl Stage for Validate {
     const NAME: &'static str = "validate";
     const SUMMARY: &'static str = "States the position error after every step, on held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 
@@ -65,11 +65,19 @@ impl Stage for Validate {
         let mut statistics = Statistics::default();
         for (order, step) in (0..).zip(&reads.prediction) {
             let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
-            let unmodelled =
-                fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == "unmodelled_mm")).map(|row| row.value);
+            let value =
+                |quantity: &str| fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == quantity)).map(|row| row.value);
+            let unmodelled = value("unmodelled_mm");
+            let fitted = step.table.0.iter().filter(|row| row.fold_error_mm.is_some()).count();
+            // Without a k-th part of the rows, three values each.
+            let inflation = value("folds").zip(value("free")).map(|(folds, free)| {
+                let values = 3.0 * fitted as f64 * (1.0 - 1.0 / folds);
+                (1.0 + free / (values - free - 1.0).max(1.0)).sqrt()
+            });
             for ((name, set, held_out), rows) in groups(step)? {
                 let row = describe(order, name, set, held_out, &rows);
-                statistics.0.push(StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row });
+                let row = StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row };
+                statistics.0.push(cross_validated(row, &rows, inflation));
             }
         }
         for row in statistics.0.iter().filter(|row| row.held_out) {
@@ -152,10 +160,39 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         mean_without_mm: some.then(|| average(1)),
         rms_without_mm: some.then(|| average(2).sqrt()),
         max_without_mm: without.last().copied().filter(|_| some),
+        fold_mean_mm: None,
+        fold_rms_mm: None,
+        fold_max_mm: None,
+        block_mean_mm: None,
+        block_rms_mm: None,
+        block_max_mm: None,
+        fold_expected_mm: None,
         reference: None,
         reference_mean_mm: None,
         reference_std_mm: None,
         reference_max_mm: None,
+    }
+}
+
+/// The row with what cross-validation says of its points; `inflation` of the noise is to be expected.
+fn cross_validated(row: StatisticsRow, points: &[&PredictionRow], inflation: Option<f64>) -> StatisticsRow {
+    let figures = |error: fn(&PredictionRow) -> Option<f64>| {
+        let errors: Vec<f64> = points.iter().filter_map(|point| error(point)).collect();
+        let count = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / count;
+        let rms = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
+        (!errors.is_empty()).then(|| (mean, rms, errors.iter().copied().fold(0.0, f64::max)))
+    };
+    let (fold, block) = (figures(|point| point.fold_error_mm), figures(|point| point.block_error_mm));
+    StatisticsRow {
+        fold_mean_mm: fold.map(|figures| figures.0),
+        fold_rms_mm: fold.map(|figures| figures.1),
+        fold_max_mm: fold.map(|figures| figures.2),
+        block_mean_mm: block.map(|figures| figures.0),
+        block_rms_mm: block.map(|figures| figures.1),
+        block_max_mm: block.map(|figures| figures.2),
+        fold_expected_mm: fold.and(inflation).map(|inflation| row.noise_rms_mm * inflation),
+        ..row
     }
 }
 

@@ -63,7 +63,7 @@ pub use document::{Document, DocumentRow};
 pub use fit::{Fit, FitRow};
 pub use intake::{Intake, IntakeRow};
 pub use network::{Network, NetworkRow};
-pub use observability::{Observability, ObservabilityRow};
+pub use observability::{Beside, Observability, ObservabilityRow};
 pub use parameters::{ParameterRow, Parameters};
 pub use prediction::{Prediction, PredictionRow};
 pub use recording::Recording;

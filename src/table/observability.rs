@@ -15,10 +15,21 @@ crate::table::rows! { "observability",
 
 use crate::estimate::Fitted;
 
+/// What stands beside a fit in its table.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Beside {
+    /// Rank of the geometry, found and by theory, where all of it was asked for.
+    pub geometry: Option<(usize, usize)>,
+    /// Standard deviation of the joints that rows are weighted by, rad.
+    pub repeatability: Option<f64>,
+    /// Parts of the cross-validation.
+    pub folds: Option<usize>,
+}
+
 impl Observability {
-    /// What a fit could see. `expected` is the rank that theory gives for the geometry, where it was asked for;
-    /// `repeatability` the standard deviation of the joints (rad) that rows are weighted by.
-    pub fn of(step: &str, fitted: &Fitted, geometry: Option<(usize, usize)>, repeatability: Option<f64>) -> Self {
+    /// What a fit could see.
+    pub fn of(step: &str, fitted: &Fitted, beside: &Beside) -> Self {
+        let Beside { geometry, repeatability, folds } = *beside;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
@@ -78,6 +89,9 @@ impl Observability {
                 fitted.clusters as f64,
                 "poses whose rows the covariance takes as one: sigma allows for what they share",
             );
+        }
+        if let Some(folds) = folds {
+            push("folds", 0, folds as f64, "parts of the poses without each of which the fit was repeated");
         }
         push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
         for (name, value, meaning) in &fitted.indices {

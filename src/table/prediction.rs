@@ -24,6 +24,11 @@ crate::table::rows! { "prediction",
         noise_mm: f64,
         /// One-sigma length of the predicted position's uncertainty from the parameters'; null where this step does not know it.
         sigma_mm: Option<f64>,
+        /// Length of the residual under a fit of this step without the row's fold, folds drawn at random by pose; null where the step
+        /// was not fitted to the row, or made no folds.
+        fold_error_mm: Option<f64>,
+        /// The same with contiguous stretches of the recording as folds.
+        block_error_mm: Option<f64>,
     }
 }
 
@@ -64,9 +69,20 @@ impl Prediction {
                 error_mm: residual.norm(),
                 noise_mm: data.noise(row) * 1e3,
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
+                fold_error_mm: None,
+                block_error_mm: None,
             }
         });
         Self(rows.collect())
+    }
+
+    /// The same with the errors of `rows` under fits without them.
+    pub fn with_folds<'a>(mut self, rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>) -> Self {
+        for (row, (fold, block)) in rows {
+            self.0[*row].fold_error_mm = Some(fold * 1e3);
+            self.0[*row].block_error_mm = Some(block * 1e3);
+        }
+        self
     }
 
     /// The same with the rows marked that a screen set aside.

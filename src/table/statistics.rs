@@ -37,6 +37,17 @@ crate::table::rows! { "statistics",
         mean_without_mm: Option<f64>,
         rms_without_mm: Option<f64>,
         max_without_mm: Option<f64>,
+        /// Cross-validation of a step that was fitted to these rows: the error length of each under a fit without its fold, folds
+        /// drawn at random by pose; null where the step made no folds.
+        fold_mean_mm: Option<f64>,
+        fold_rms_mm: Option<f64>,
+        fold_max_mm: Option<f64>,
+        /// The same with contiguous stretches of the recording as folds.
+        block_mean_mm: Option<f64>,
+        block_rms_mm: Option<f64>,
+        block_max_mm: Option<f64>,
+        /// What `fold_rms_mm` to expect of a complete model of p parameters fitted to n values: noise x sqrt(1 + p / (n - p - 1)).
+        fold_expected_mm: Option<f64>,
         /// A published or agreed figure of the same quantity, named by the pipeline.
         reference: Option<String>,
         reference_mean_mm: Option<f64>,

@@ -4,7 +4,7 @@ use crate::problem::Case;
 use calib::robot::Instrument;
 use calib::store::key::{KEY_FORMAT, StageKey};
 use calib::store::{Account, Product, Store};
-use calib::table::{Fit, Observability, Parameters, Recording, Table};
+use calib::table::{Beside, Fit, Observability, Parameters, Recording, Table};
 use std::collections::BTreeMap;
 
 /// Points of each robot.
@@ -33,7 +33,7 @@ pub fn fleet(robots: usize) -> calib::error::Result<()> {
         let products = vec![
             ("parameters".to_string(), Product::Frame(Parameters::of("identify", &model, &fitted, &[], None).to_frame()?)),
             ("fit".to_string(), Product::Frame(Fit::of("identify", &fitted).to_frame()?)),
-            ("observability".to_string(), Product::Frame(Observability::of("identify", &fitted, None, None).to_frame()?)),
+            ("observability".to_string(), Product::Frame(Observability::of("identify", &fitted, &Beside::default()).to_frame()?)),
         ];
         let clock = add(&mut spent, "3 tables", clock);
         store.publish(&key("identify", robot), products, Account::default())?;

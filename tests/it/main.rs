@@ -7,6 +7,7 @@ mod desk;
 mod disk;
 mod effects;
 mod fixture;
+mod folds;
 mod identify;
 mod ingest;
 mod layers;

@@ -350,7 +350,8 @@ fn a_million_rows_stream_in_bounded_memory() {
         for name in ["held_out", "suspect"] {
             frame.push(name, Arc::new(arrow::array::BooleanArray::from(vec![false; keys.len()])));
         }
-        for name in ["x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm"] {
+        let numbers = ["x_mm", "y_mm", "z_mm", "dx_mm", "dy_mm", "dz_mm", "error_mm", "noise_mm", "sigma_mm"];
+        for name in numbers.into_iter().chain(["fold_error_mm", "block_error_mm"]) {
             frame.push(name, Arc::new(Float64Array::from_iter_values(keys.iter().map(|key| (*key as f64 * 0.7371).fract()))));
         }
         frame.push("sequence", Arc::new(Int64Array::from(keys)));

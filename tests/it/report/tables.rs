@@ -23,6 +23,8 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
         noise_mm: 0.03 + 0.01 * (sequence % 2) as f64,
         sigma_mm: None,
+        fold_error_mm: None,
+        block_error_mm: None,
     }
 }
 

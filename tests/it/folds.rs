@@ -1,0 +1,112 @@
+//! Cross-validation: as honest as held-out points, repeats together, and the same on any number of threads.
+
+use crate::desk::{Desk, table};
+use crate::fixture;
+use crate::identify::{GEOMETRY, SIGMA, model, recording};
+use crate::sr210d::{experiment, settings};
+use calib::estimate::{FitOptions, Fitted, Folds, Model, align, cross_validate, fit};
+use calib::robot::{Measurements, RobotModel};
+use calib::stage::{Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
+use calib::table::{Observability, Prediction, Statistics};
+
+fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
+    let robot = RobotModel::new(fixture::offset_wrist());
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let mut model = model(&robot, align(&robot, data, &rows), effects);
+    let candidates: Vec<usize> = (0..model.x.len()).collect();
+    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
+    (model, fitted)
+}
+
+fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
+    let (model, fitted) = identify(data, effects);
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    cross_validate(&model, data, &rows, &fitted, count, 7)
+}
+
+fn rms(errors: &[f64]) -> f64 {
+    (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
+}
+
+#[test]
+fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    let (mut random, mut blocks, mut training) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 200..220 {
+        let (data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
+        let found = folds(&data, &effects, 5).expect("enough poses");
+        random.extend(found.random);
+        blocks.extend(found.blocks);
+        let (model, _) = identify(&data, &effects);
+        training
+            .extend(model.predict(&data).iter().zip(&data.position).map(|(predicted, measured)| (measured - predicted).norm()));
+    }
+    // 33 parameters from 64 points of three values.
+    let expected = SIGMA * 3f64.sqrt() * f64::sqrt(1.0 + 33.0 / (192.0 - 34.0));
+    for (name, errors) in [("random", &random), ("blocks", &blocks)] {
+        let ratio = rms(errors) / expected;
+        assert!((0.96..1.06).contains(&ratio), "{name}: {ratio:.3} of what is expected");
+    }
+    assert!(rms(&training) < 0.95 * SIGMA * 3f64.sqrt());
+}
+
+#[test]
+fn rows_of_one_pose_are_never_on_both_sides() {
+    let (once, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 5);
+    let mut twice = once.clone();
+    twice.q.extend_from_within(..);
+    twice.position.extend_from_within(..);
+    twice.sigma.extend_from_within(..);
+    twice.payload.extend_from_within(..);
+    let (one, two) = (folds(&once, &GEOMETRY, 6).expect("poses"), folds(&twice, &GEOMETRY, 6).expect("poses"));
+    // A row whose twin was fitted would be predicted far better.
+    for (one, two) in [(one.random, two.random), (one.blocks, two.blocks)] {
+        assert!((rms(&two) / rms(&one) - 1.0).abs() < 0.05, "{:e} and {:e}", rms(&two), rms(&one));
+    }
+}
+
+#[test]
+fn too_few_poses_make_no_folds() {
+    let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 9, 5);
+    assert_eq!(folds(&data, &["base_frame"], 5), None);
+    let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 11, 5);
+    assert_eq!(folds(&data, &GEOMETRY, 5), None);
+    assert!(folds(&data, &["base_frame"], 5).is_some());
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_folds() {
+    let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 6);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| folds(&data, &GEOMETRY, 5))
+    };
+    assert_eq!(on(1), on(2));
+}
+
+#[test]
+fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
+    let of = experiment("none", 5);
+    let stage: Identify = settings("geometry", "none");
+    let reads = IdentifyReads { robot: of.robot.clone(), recording: of.recording.clone(), split: of.split.clone() };
+    let tables = Desk::default().run(&stage, reads).expect("identify runs");
+    let prediction: Prediction = table(&tables).remove(0);
+    assert!(prediction.0.iter().all(|row| row.fold_error_mm.is_some() == (row.set == "unloaded_fit")));
+    let observability: Observability = table(&tables).remove(0);
+    let label = |stage: &str| stage.to_string();
+    let reads = ValidateReads {
+        prediction: vec![Labelled { stage: label("geometry"), table: prediction.clone() }],
+        observability: vec![Labelled { stage: label("geometry"), table: observability }],
+    };
+    let statistics: Statistics = table(&Desk::default().run(&Validate::default(), reads).expect("validate runs")).remove(0);
+    for row in &statistics.0 {
+        assert_eq!(row.fold_rms_mm.is_some(), row.set == "unloaded_fit", "{}", row.set);
+    }
+    let row = statistics.0.iter().find(|row| row.set == "unloaded_fit").expect("the set");
+    let errors: Vec<f64> = prediction.0.iter().filter_map(|row| row.fold_error_mm).collect();
+    assert!(row.fold_rms_mm.is_some_and(|found| (found / rms(&errors) - 1.0).abs() < 1e-12));
+    assert!(row.fold_rms_mm > Some(row.rms_mm));
+    assert!(row.fold_expected_mm.is_some_and(|expected| (1.02..1.4).contains(&(expected / row.noise_rms_mm))));
+    let wrong = Identify { folds: 1, ..stage };
+    assert!(wrong.check().iter().any(|fault| fault.to_string() == "folds: allowed: 0 for none, or 2 to 100"));
+}
