@@ -1,7 +1,7 @@
 //! `calib` makes industrial robots accurate and says why they were not.
 //!
 //! # The map
-//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate`) has no files
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate -> diagnose`) has no files
 //! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
@@ -14,6 +14,7 @@
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
+//! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
@@ -33,7 +34,7 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | `src/effect/<name>.rs` | one line in [`effect::EFFECTS`] |
+//! | effect | `src/effect/<name>.rs` | one line in [`effect::EFFECTS`] (of the whole arm) or [`effect::CAUSES`] and `effect::Form` (at a place) |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
@@ -51,6 +52,8 @@ pub mod robot;
 pub mod effect;
 
 pub mod estimate;
+
+pub mod diagnose;
 
 pub mod twin;
 

@@ -22,6 +22,7 @@ pub enum Unit {
     Ampere,
     Milliampere,
     NewtonMetre,
+    KilogramMetre,
     Celsius,
     Kelvin,
     NewtonMetrePerAmpere,
@@ -40,6 +41,7 @@ pub enum Quantity {
     Mass,
     Current,
     Torque,
+    FirstMoment,
     Temperature,
     TorqueConstant,
     Compliance,
@@ -66,6 +68,7 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
     (Unit::Kilogram, "kg", Q::Mass, 1.0, 0.0),
     (Unit::Ampere, "A", Q::Current, 1.0, 0.0),
     (Unit::Milliampere, "mA", Q::Current, 1e-3, 0.0),
+    (Unit::KilogramMetre, "kg m", Q::FirstMoment, 1.0, 0.0),
     (Unit::NewtonMetre, "Nm", Q::Torque, 1.0, 0.0),
     // Celsius is kept as the base of temperature: effects need differences, people need degrees.
     (Unit::Celsius, "C", Q::Temperature, 1.0, 0.0),

@@ -1,6 +1,7 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
 mod check;
+mod diagnose;
 mod poses;
 mod run;
 mod schema;
@@ -26,6 +27,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Check(check::CheckArguments),
+    Diagnose(diagnose::DiagnoseArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
     Simulate(simulate::SimulateArguments),
@@ -48,6 +50,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
     let result = match parsed.verb {
         Verb::Run(verb) => run::main(&verb, &arguments),
         Verb::Check(verb) => check::main(&verb),
+        Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb),

@@ -2,18 +2,48 @@
 //!
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
-use super::{ArmState, Deflection, Effect, Load, ParameterSpec};
+use super::{ArmState, Deflection, Effect, Hypothesis, Load, ParameterSpec, Place, Placed, Survey};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
+use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JointCompliance {
     load: Load,
+    /// One joint (from 0), or all that turn.
+    joint: Option<usize>,
 }
 
 impl JointCompliance {
+    /// Of every joint that turns.
     pub fn new(load: Load) -> Self {
-        Self { load }
+        Self { load, joint: None }
+    }
+
+    /// Of one joint, from 0.
+    pub fn of(joint: usize, load: Load) -> Self {
+        Self { load, joint: Some(joint) }
+    }
+
+    fn joints(&self, robot: &RobotModel) -> impl Iterator<Item = usize> {
+        let one = self.joint;
+        (0..robot.joints()).filter(move |j| one.is_none_or(|joint| joint == *j)).filter(|j| robot.is_revolute(*j))
+    }
+
+    /// Every loaded joint, by gravity and, where currents were recorded, by those.
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let loads: &[Load] =
+            if survey.data.current.is_some() { &[Load::GravityTorque, Load::MotorCurrent] } else { &[Load::GravityTorque] };
+        let loaded = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+        loaded
+            .flat_map(|joint| {
+                loads.iter().map(move |load| {
+                    let hypothesis = Hypothesis::new(Self::of(joint, *load), loads.len());
+                    // The sign of a current is the controller's.
+                    if *load == Load::GravityTorque { hypothesis.positive() } else { hypothesis.charged(2.0) }
+                })
+            })
+            .collect()
     }
 }
 
@@ -27,8 +57,7 @@ impl Effect for JointCompliance {
             Load::GravityTorque => (Unit::RadianPerNewtonMetre, 1e-3),
             Load::MotorCurrent => (Unit::RadianPerAmpere, 1e-2),
         };
-        (0..robot.joints())
-            .filter(|j| robot.is_revolute(*j))
+        self.joints(robot)
             .map(|j| ParameterSpec {
                 name: format!("joint_compliance.j{}", j + 1),
                 place: format!("joint {}", j + 1),
@@ -39,7 +68,7 @@ impl Effect for JointCompliance {
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        for (parameter, joint) in (0..robot.joints()).filter(|j| robot.is_revolute(*j)).enumerate() {
+        for (parameter, joint) in self.joints(robot).enumerate() {
             let load = match self.load {
                 Load::GravityTorque => state.torque()[joint],
                 Load::MotorCurrent => match state.current().map(|all| all[joint]) {
@@ -66,5 +95,11 @@ impl Effect for JointCompliance {
             }
             _ => None,
         }
+    }
+}
+
+impl Placed for JointCompliance {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint.unwrap_or(0))
     }
 }

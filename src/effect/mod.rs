@@ -3,23 +3,58 @@
 //! An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
 //! and compensation use the same effects through one composition, the [`EffectStack`].
 
+mod axis_wobble;
+mod backlash;
+mod base_compliance;
 mod base_frame;
+mod counterbalance;
 mod coupling_ratio;
 mod deflection;
+mod form;
+mod frame_shift;
+mod gear_cyclic;
+mod gear_motor_cyclic;
 mod joint_compliance;
+mod joint_hardening;
+mod joint_log_lag;
 mod joint_offset;
+mod joint_table;
+mod link_compliance;
 mod link_geometry;
+mod link_mass;
+mod payload_error;
+mod place;
 mod reduction_ratio;
 mod stack;
+mod survey;
+mod thermal_growth;
 mod tool_offset;
+mod tracker_drift;
+mod unknown;
+mod zero_shift;
 
+pub use backlash::{Backlash, Side};
 pub use base_frame::BaseFrame;
+pub use counterbalance::Counterbalance;
 pub use deflection::{Deflection, Direction};
+pub use form::{Form, Placed};
+pub use gear_cyclic::GearCyclic;
+pub use joint_compliance::JointCompliance;
+pub use joint_hardening::{JointHardening, Law};
+pub use joint_table::JointTable;
+pub use link_mass::LinkMass;
+pub use payload_error::PayloadError;
+pub use place::Place;
 pub use stack::{EffectStack, Scratch, Sight};
+pub use survey::{Hypothesis, Survey};
+pub use thermal_growth::{ThermalGrowth, Warmth};
+pub use tracker_drift::{Course, TrackerDrift};
+pub use unknown::{Signature, Unknown};
 
 use crate::robot::{Burden, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
+use serde::{Deserialize, Serialize};
 
 /// A parameter of an effect: its name, its unit and how large it may plausibly be.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,8 +133,9 @@ pub trait Effect: Send + Sync {
     fn needs_torque(&self) -> bool {
         false
     }
-    /// Adds what parameters `p` change about the load of the arm at joint positions `q`; its partials belong into `deflect`.
-    fn burden(&self, _q: &[f64], _p: &[f64], _out: &mut Burden) {}
+    /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared
+    /// `payload` (kg); its partials belong into `deflect`.
+    fn burden(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut Burden) {}
     /// What the recording or the robot lacks for this effect, if anything, as a sentence.
     fn missing(&self, _robot: &RobotModel, _data: &Measurements) -> Option<String> {
         None
@@ -107,7 +143,8 @@ pub trait Effect: Send + Sync {
 }
 
 /// What stands in for the torque that winds a joint up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Load {
     /// Gravity torque from the masses of the robot file; compliance in rad/Nm.
     GravityTorque,
@@ -182,3 +219,42 @@ pub const EFFECTS: &[EffectEntry] = &[
 pub fn entry(name: &str) -> Option<&'static EffectEntry> {
     EFFECTS.iter().find(|entry| entry.name == name)
 }
+
+/// What may be left out of a model: causes that diagnosis tries, each at all its places and in all its forms.
+pub struct Cause {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// Every hypothesis that the recording can speak of.
+    pub propose: fn(&Survey) -> Vec<Hypothesis>,
+}
+
+/// Every cause that diagnosis tries, one line each.
+pub const CAUSES: &[Cause] = &[
+    Cause { name: "joint_compliance", summary: "wind-up proportional to load", propose: JointCompliance::propose },
+    Cause { name: "joint_hardening", summary: "wind-up not proportional to load", propose: JointHardening::propose },
+    Cause { name: "link_compliance", summary: "bending of a link", propose: link_compliance::LinkCompliance::propose },
+    Cause { name: "base_compliance", summary: "the foundation tilts", propose: base_compliance::BaseCompliance::propose },
+    Cause { name: "gear_cyclic", summary: "error periodic in the joint angle", propose: GearCyclic::propose },
+    Cause {
+        name: "gear_motor_cyclic",
+        summary: "error periodic in the motor angle",
+        propose: gear_motor_cyclic::GearMotorCyclic::propose,
+    },
+    Cause { name: "joint_table", summary: "repeatable joint error of no simple form", propose: JointTable::propose },
+    Cause { name: "backlash", summary: "lost motion", propose: Backlash::propose },
+    Cause { name: "thermal_growth", summary: "links grow with temperature", propose: ThermalGrowth::propose },
+    Cause { name: "counterbalance", summary: "balancer missing from the torque model", propose: Counterbalance::propose },
+    Cause { name: "link_mass", summary: "mass or centre of a link is wrong", propose: LinkMass::propose },
+    Cause { name: "payload_error", summary: "payload differs from the declared", propose: PayloadError::propose },
+    Cause { name: "axis_wobble", summary: "an axis moves as its joint turns", propose: axis_wobble::AxisWobble::propose },
+    Cause { name: "zero_shift", summary: "a joint's zero steps", propose: zero_shift::ZeroShift::propose },
+    Cause { name: "base_shift", summary: "base or tool mounting steps", propose: frame_shift::FrameShift::propose },
+    Cause { name: "tracker_drift", summary: "the tracker's frame creeps", propose: TrackerDrift::propose },
+    Cause { name: "coupling_ratio", summary: "a joint moves with another", propose: coupling_ratio::PairRatio::propose },
+    Cause {
+        name: "joint_log_lag",
+        summary: "joints logged before the arm settled",
+        propose: joint_log_lag::JointLogLag::propose,
+    },
+    Cause { name: "unknown", summary: "something that no entry explains", propose: Unknown::propose },
+];

@@ -103,7 +103,7 @@ impl EffectStack {
             scratch.deflection.keep();
             scratch.burden.clear();
             for (effect, range) in &self.effects {
-                effect.burden(data.q(row), &x[range.clone()], &mut scratch.burden);
+                effect.burden(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.burden);
             }
             for _ in 0..2 {
                 scratch.posture.hang(robot, data.payload[row], &scratch.burden);

@@ -37,6 +37,7 @@ pub enum Fate {
 }
 
 /// The outcome of [`fit`]; the values are in the model.
+#[derive(Clone)]
 pub struct Fitted {
     pub fates: Vec<Fate>,
     pub course: Vec<Iteration>,

@@ -27,5 +27,6 @@ pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};
 pub use levenberg::{Iteration, Stop};
 pub use model::Model;
 pub use observe::Visibility;
+pub(crate) use problem::Weight;
 pub use repeats::{Poses, Repeated, spread};
 pub use screen::{Kind, Screening, Suspect, fit_screened};

@@ -80,6 +80,28 @@ impl Plan {
         })
     }
 
+    /// The plan of a stage and those that it reads from, directly or not.
+    pub fn needed_for(mut self, stage: usize) -> Self {
+        let mut needed = vec![false; self.stages.len()];
+        needed[stage] = true;
+        for at in (0..=stage).rev().filter(|at| *at < self.stages.len()) {
+            if needed[at] {
+                let origins: Vec<usize> = self.stages[at].inputs.iter().flat_map(|input| &input.from).map(|o| o.stage).collect();
+                origins.into_iter().for_each(|origin| needed[origin] = true);
+            }
+        }
+        let place: Vec<usize> =
+            needed.iter().scan(0, |next, needed| Some(std::mem::replace(next, *next + usize::from(*needed)))).collect();
+        let mut at = 0;
+        self.stages.retain(|_| {
+            at += 1;
+            needed[at - 1]
+        });
+        let origins = self.stages.iter_mut().flat_map(|stage| &mut stage.inputs).flat_map(|input| &mut input.from);
+        origins.for_each(|origin| origin.stage = place[origin.stage]);
+        self
+    }
+
     /// The place of a stage, or what is allowed.
     pub fn find(&self, id: &str, option: &str) -> Result<usize> {
         self.stages.iter().position(|stage| stage.id == id).ok_or_else(|| {

@@ -1,5 +1,6 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
+mod diagnose;
 mod identified;
 mod identify;
 pub mod ingest;
@@ -15,6 +16,7 @@ pub mod split;
 mod stiffness;
 mod validate;
 
+pub use diagnose::{Diagnose, DiagnoseReads};
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use registry::{ErasedStage, StageEntry};
@@ -254,6 +256,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<split::SplitBy>(),
     StageEntry::of::<Identify>(),
     StageEntry::of::<Stiffness>(),
+    StageEntry::of::<Diagnose>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Validate>(),
     StageEntry::of::<Report>(),

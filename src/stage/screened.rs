@@ -18,16 +18,20 @@ pub fn fit_rows(
         let kept = options.rows.to_vec();
         return (fit(model, data, options), Screening { kept, ..Screening::default() });
     }
+    fit_screened(model, data, options, &numbered(split))
+}
+
+/// The number of the set that each row belongs to.
+pub fn numbered(split: &Split) -> Vec<usize> {
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
-    let set: Vec<usize> = split
+    split
         .0
         .iter()
         .map(|row| {
             let next = numbers.len();
             *numbers.entry(&row.set).or_insert(next)
         })
-        .collect();
-    fit_screened(model, data, options, &set)
+        .collect()
 }
 
 /// So many cases of one kind are named; the table has all.

@@ -29,6 +29,10 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),
+    include_str!("../../schemas/finding_numbers.json"),
+    include_str!("../../schemas/findings.json"),
+    include_str!("../../schemas/rivals.json"),
+    include_str!("../../schemas/verdict.json"),
     include_str!("../../schemas/training.json"),
     include_str!("../../schemas/truth.json"),
 ];

@@ -43,6 +43,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 mod document;
+mod findings;
 mod fit;
 mod intake;
 mod network;
@@ -58,8 +59,10 @@ mod statistics;
 mod suspects;
 mod training;
 mod truth;
+mod verdict;
 
 pub use document::{Document, DocumentRow};
+pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
 pub use fit::{Fit, FitRow};
 pub use intake::{Intake, IntakeRow};
 pub use network::{Network, NetworkRow};
@@ -76,10 +79,13 @@ pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
 pub use training::{Training, TrainingRow};
 pub use truth::{Truth, TruthRow};
+pub use verdict::{Verdict, VerdictRow};
 
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
     Document::KIND,
+    FindingNumbers::KIND,
+    Findings::KIND,
     Fit::KIND,
     Intake::KIND,
     Network::KIND,
@@ -88,6 +94,7 @@ pub const TABLES: &[&str] = &[
     Prediction::KIND,
     Recording::KIND,
     Rejected::KIND,
+    Rivals::KIND,
     Robot::KIND,
     Scoreboard::KIND,
     Split::KIND,
@@ -95,4 +102,5 @@ pub const TABLES: &[&str] = &[
     Suspects::KIND,
     Training::KIND,
     Truth::KIND,
+    Verdict::KIND,
 ];

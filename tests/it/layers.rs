@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// What every layer may use without saying so.
 const FREE: [&str; 2] = ["error", "units"];
-const NUMERICS: [&str; 4] = ["spatial", "robot", "effect", "estimate"];
+const NUMERICS: [&str; 5] = ["spatial", "robot", "effect", "estimate", "diagnose"];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")

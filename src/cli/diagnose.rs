@@ -1,0 +1,157 @@
+//! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
+
+use super::surroundings::{cores, default_store, surroundings};
+use super::{emit, emit_json};
+use crate::error::{Error, Result};
+use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::progress::{Progress, Verbosity};
+use crate::stage::{Diagnose, STAGES, Stage};
+use crate::store::Store;
+use crate::table::{FindingNumbers, Findings, Rivals, Table, Verdict, VerdictRow};
+use clap::Args;
+use serde_json::{Value, json};
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
+///
+/// Runs the pipeline's `diagnose` stage and what it needs. The simulation is the nominal robot with its geometry, reduction
+/// ratios and declared couplings identified from the recording; everything else is a finding.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct DiagnoseArguments {
+    /// The pipeline's YAML file, with a stage `diagnose`
+    #[arg(value_name = "PIPELINE")]
+    pipeline: PathBuf,
+    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Prints no progress; warnings and errors remain
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+const EXAMPLES: &str = "Examples:
+  calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
+  calib diagnose pipeline.yaml --json > diagnosis.json";
+
+pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
+    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
+    let Some(stage) = plan.stages.iter().position(|stage| stage.entry.name == Diagnose::NAME) else {
+        let place = arguments.pipeline.display().to_string();
+        return Err(Error::spec(place, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
+    };
+    let plan = plan.needed_for(stage);
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
+    let options = RunOptions { selection: Selection::default(), jobs: arguments.jobs.map_or_else(cores, usize::from) };
+    let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
+    progress.finish();
+    let told = Told::read(&result?, &store)?;
+    if arguments.json { emit_json(&told.document()) } else { emit(&told.text()) }
+}
+
+/// The tables of a diagnosis.
+struct Told {
+    verdict: VerdictRow,
+    findings: Findings,
+    numbers: FindingNumbers,
+    rivals: Rivals,
+}
+
+fn table<T: Table + Default>(outcome: &Outcome, store: &Store) -> Result<T> {
+    let last = outcome.tables(T::KIND).last();
+    last.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
+}
+
+impl Told {
+    fn read(outcome: &Outcome, store: &Store) -> Result<Self> {
+        let verdict: Verdict = table(outcome, store)?;
+        let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
+        let (findings, numbers) = (table(outcome, store)?, table(outcome, store)?);
+        Ok(Self { verdict, findings, numbers, rivals: table(outcome, store)? })
+    }
+
+    fn document(&self) -> Value {
+        let v = &self.verdict;
+        let errors = |mean: Option<f64>, rms: Option<f64>, max: Option<f64>| json!({ "validate_mean_mm": mean, "validate_rms_mm": rms, "validate_max_mm": max });
+        let findings = self.findings.0.iter().map(|finding| {
+            let numbers = self.numbers.0.iter().filter(|number| number.rank == finding.rank);
+            let numbers = numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma }));
+            let rivals = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank);
+            let rivals =
+                rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic }));
+            let valid = match (finding.valid_joint, finding.valid_from_rad, finding.valid_to_rad) {
+                (Some(joint), Some(from), Some(to)) => {
+                    json!({ format!("q{joint}_deg"): [from.to_degrees(), to.to_degrees()] })
+                }
+                _ => json!({}),
+            };
+            json!({
+                "effect": finding.effect, "where": finding.place, "statement": finding.statement,
+                "parameters": numbers.collect::<Vec<_>>(),
+                "evidence": {
+                    "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
+                    "heldout_gain_mm": finding.heldout_gain_mm, "effect_rms_mm": finding.effect_rms_mm,
+                },
+                "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,
+            })
+        });
+        let lines = |text: &str| text.lines().map(String::from).collect::<Vec<_>>();
+        json!({
+            "verdict": v.verdict,
+            "noise_floor_mm": v.noise_floor_mm,
+            "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
+            "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
+            "held_out": v.held_out,
+            "findings": findings.collect::<Vec<_>>(),
+            "not_observable": lines(&v.not_observable),
+            "leftover": {
+                "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
+            },
+            "next_measurements": v.next_measurements.as_deref().map(lines),
+            "noise": { "repeatability_rad": v.repeatability_rad, "repeats": v.repeats },
+        })
+    }
+
+    fn text(&self) -> String {
+        let v = &self.verdict;
+        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
+        let mut text = format!("{}\n\n", v.verdict.replace('_', " "));
+        text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
+        for (name, mean, rms, max) in [
+            ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
+            ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
+        ] {
+            text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
+        }
+        text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
+        for finding in &self.findings.0 {
+            text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
+            let rivals: Vec<String> = (self.rivals.0.iter().filter(|rival| rival.rank == finding.rank))
+                .map(|rival| format!("{} at {}", rival.effect, rival.place))
+                .collect();
+            if !rivals.is_empty() {
+                text.push_str(&format!("   these data cannot tell it from: {}\n", rivals.join(", ")));
+            }
+        }
+        for line in v.not_observable.lines() {
+            text.push_str(&format!("not observable: {line}\n"));
+        }
+        for line in v.next_measurements.iter().flat_map(|lines| lines.lines()) {
+            text.push_str(&format!("measure next: {line}\n"));
+        }
+        text
+    }
+}

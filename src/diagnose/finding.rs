@@ -1,0 +1,225 @@
+//! Findings: what the chosen causes are called, how large they are, what else would explain them.
+
+use super::Course;
+use super::Question;
+use super::pool::Pool;
+use super::search::falls;
+use super::state::solve;
+use super::verdict::Looked;
+use crate::effect::{Effect, Form, Placed};
+use crate::estimate::Fate;
+use crate::robot::Measurements;
+use crate::units::Unit;
+use std::collections::BTreeMap;
+
+/// A number of a finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    pub name: String,
+    pub value: f64,
+    pub unit: &'static str,
+    pub sigma: Option<f64>,
+}
+
+/// How well a finding stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evidence {
+    pub f_statistic: f64,
+    pub p_value: f64,
+    /// How much worse the criterion is without it.
+    pub delta_bic: f64,
+    /// Fall of the held-out rms error, m.
+    pub heldout_gain: f64,
+    /// Rms of the whole effect over the recording, m.
+    pub effect_rms: f64,
+    /// Fall of the whitened squared residual.
+    pub gain: f64,
+}
+
+/// Another explanation that these data cannot tell apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rival {
+    pub effect: &'static str,
+    pub place: String,
+    pub delta_bic: f64,
+}
+
+/// A cause of what the base model leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    pub effect: &'static str,
+    pub place: String,
+    pub statement: String,
+    pub numbers: Vec<Number>,
+    /// None for faults of single rows.
+    pub evidence: Option<Evidence>,
+    pub rivals: Vec<Rival>,
+    /// Joint (from 0) and range (rad) over which it holds, for joint errors.
+    pub valid: Option<(usize, [f64; 2])>,
+    pub forms: Vec<Form>,
+}
+
+/// Effects that are faults of the recording, not of the robot.
+const FAULTS: [&str; 3] = ["outlier", "mislabelled_point", "joint_log_lag"];
+
+impl Finding {
+    pub fn is_physics(&self) -> bool {
+        !FAULTS.contains(&self.effect)
+    }
+}
+
+/// Sets that are worse by less than this explain as well.
+const ALIKE: f64 = 6.0;
+
+/// The chosen causes as findings, strongest first.
+pub(crate) fn findings(
+    question: &Question,
+    data: &Measurements,
+    last: &Course,
+    _free: &[usize],
+    looked: &Looked,
+) -> Vec<Finding> {
+    let pool = looked.pool;
+    let set = &looked.found.set;
+    let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
+    for (i, k) in set.iter().enumerate() {
+        let form = &pool.hypotheses[*k].form;
+        groups.entry((form.name(), form.place().to_string())).or_default().push(i);
+    }
+    // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
+    let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
+    for place in hard {
+        if let Some(more) = groups.remove(&("joint_compliance", place.clone())) {
+            groups.entry(("joint_hardening", place)).or_default().extend(more);
+        }
+    }
+    let whole = solve(pool, set);
+    let bic = pool.bic(set);
+    let ranges = last.model.stack.effects().count() - last.forms.len();
+    let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
+    let mut out = Vec::new();
+    for ((effect, place), members) in groups {
+        let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
+        let rest: Vec<usize> = set.iter().copied().filter(|k| !own.contains(k)).collect();
+        let without = solve(pool, &rest);
+        let gain = whole.gain - without.gain;
+        let rank = whole.rank.saturating_sub(without.rank).max(1);
+        let freedom = pool.lines.saturating_sub(pool.rank() + whole.rank).max(1) as f64;
+        let f_statistic = gain / rank as f64 / ((pool.square - whole.gain) / freedom);
+        let mut numbers = Vec::new();
+        for i in &members {
+            let range = &ranges[*i];
+            for k in range.clone() {
+                let spec = &last.model.stack.specs()[k];
+                let sigma = match last.fitted.fates[k] {
+                    Fate::Free(sigma) => Some(sigma),
+                    _ => None,
+                };
+                let (unit, symbol) = people(spec.unit);
+                let number = spec.name.strip_prefix(effect).unwrap_or(&spec.name).trim_start_matches('.');
+                numbers.push(Number {
+                    name: number.to_string(),
+                    value: unit.from_si(last.model.x[k]),
+                    unit: symbol,
+                    sigma: sigma.map(|sigma| unit.from_si(sigma)),
+                });
+            }
+        }
+        let forms: Vec<Form> = members.iter().map(|i| last.forms[*i].clone()).collect();
+        let mut rivals = rivals(pool, &rest, &own, bic, (effect, &place));
+        exact(&forms, &place, &mut rivals);
+        rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
+        let effect_rms = size(pool, &own, &whole, set);
+        let evidence = Evidence {
+            f_statistic,
+            p_value: looked.first,
+            delta_bic: pool.bic(&rest) - bic,
+            heldout_gain: 0.0,
+            effect_rms,
+            gain,
+        };
+        let valid = match forms[0].place() {
+            crate::effect::Place::Joint(joint) => Some((joint, looked.survey.range[joint])),
+            _ => None,
+        };
+        let statement = format!("{effect} at {place}");
+        out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
+    }
+    let _ = (question, data);
+    let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
+    out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    out
+}
+
+/// The unit in which people read a number of this unit.
+fn people(unit: Unit) -> (Unit, &'static str) {
+    match unit {
+        Unit::Radian => (Unit::Arcsecond, "arcsec"),
+        other => (other, other.symbol()),
+    }
+}
+
+/// Rms length (m) of the whole effect over the fitted rows, the absorbed part included.
+fn size(pool: &Pool, own: &[usize], whole: &super::state::Solution, set: &[usize]) -> f64 {
+    // In standard deviations of the rows; the mean noise turns it into a length.
+    let mut at = 0;
+    let mut sum = vec![0.0; pool.lines];
+    for k in set {
+        let count = pool.first[k + 1] - pool.first[*k];
+        if own.contains(k) {
+            let columns = pool.lens.columns(&pool.hypotheses[*k].form);
+            for (column, coefficient) in columns.chunks(pool.lines).zip(&whole.coefficients[at..at + count]) {
+                sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+            }
+        }
+        at += count;
+    }
+    let rows = pool.lens.rows;
+    let squares = rows.iter().enumerate().map(|(i, row)| {
+        let whitened: f64 = (0..3).map(|axis| sum[3 * i + axis].powi(2)).sum();
+        whitened * pool.lens.data.noise(*row).powi(2) / 3.0
+    });
+    (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+}
+
+/// Other single causes that do as well in place of `own`.
+fn rivals(pool: &Pool, rest: &[usize], own: &[usize], bic: f64, named: (&str, &str)) -> Vec<Rival> {
+    let state = pool.state(rest);
+    let mut scored = falls(pool, &state);
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let own_charge: f64 = own.iter().map(|k| pool.charge[*k]).sum();
+    let mut out: Vec<Rival> = Vec::new();
+    for (_, h) in scored.into_iter().take(60) {
+        let form = &pool.hypotheses[h].form;
+        let (effect, place) = (form.name(), form.place().to_string());
+        if (effect, place.as_str()) == named || out.iter().any(|rival| rival.effect == effect && rival.place == place) {
+            continue;
+        }
+        let mut set = rest.to_vec();
+        set.push(h);
+        set.sort_unstable();
+        let delta = pool.bic(&set) - bic;
+        // What counts is the fit: the prior's charges are opinions.
+        if delta - pool.charge[h] + own_charge < ALIKE {
+            out.push(Rival { effect, place, delta_bic: delta });
+        }
+    }
+    out
+}
+
+/// Identities of kinematics and statics, whatever the data.
+fn exact(forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
+    let mut add = |effect: &'static str, place: &str| {
+        if !rivals.iter().any(|rival| rival.effect == effect && rival.place == place) {
+            rivals.push(Rival { effect, place: place.to_string(), delta_bic: 0.0 });
+        }
+    };
+    for form in forms {
+        match form {
+            Form::ZeroShift(_) if place == "joint 1" => add("base_shift", "base"),
+            Form::GearCyclic(gear) if gear.order() == 1 => add("counterbalance", place),
+            Form::Counterbalance(_) => add("gear_cyclic", place),
+            _ => (),
+        }
+    }
+}

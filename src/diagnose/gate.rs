@@ -1,0 +1,67 @@
+//! Whether what is left holds anything at all: a wild bootstrap of the best hypothesis, one sign a pose.
+//!
+//! Under each draw the residuals of a pose change sign together, which keeps their size, their correlation within the pose and
+//! heavy tails, and destroys every dependence on angles, loads and time (Wu 1986; Cameron, Gelbach and Miller 2008).
+
+use super::pool::{Pool, project};
+use super::state::{State, fall};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, Par};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+
+/// Hypotheses that one thread tests, or draws that it projects, at once.
+const CHUNK: usize = 32;
+
+/// The probability that the best hypothesis of any kind would do as well on noise. `pose[i]` numbers the pose of row i.
+pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, seed: u64) -> f64 {
+    let lines = pool.lines;
+    let mut residual = pool.residual.clone();
+    project(&state.basis, &mut residual);
+    // Fitted residuals are too small where a row has leverage.
+    let leverage = |i: usize| {
+        let of = |basis: &Mat<f64>| (0..basis.ncols()).map(|k| basis[(i, k)] * basis[(i, k)]).sum::<f64>();
+        (of(&pool.base) + of(&state.basis)).min(0.99)
+    };
+    for (i, value) in residual.iter_mut().enumerate() {
+        *value /= (1.0 - leverage(i)).sqrt();
+    }
+    let mut dice = ChaCha8Rng::seed_from_u64(seed);
+    let poses = pose.iter().copied().max().map_or(0, |last| last + 1);
+    let mut drawn = Vec::with_capacity(lines * draws);
+    for _ in 0..draws {
+        let signs: Vec<f64> = (0..poses).map(|_| if dice.random::<bool>() { 1.0 } else { -1.0 }).collect();
+        drawn.extend(residual.iter().enumerate().map(|(i, value)| value * signs[pose[i / 3]]));
+    }
+    drawn.par_chunks_mut(CHUNK * lines).for_each(|some| {
+        project(&pool.base, some);
+        project(&state.basis, some);
+    });
+    let squares: Vec<f64> = drawn.chunks(lines).map(|column| super::pool::dot(column, column)).collect();
+    let drawn = faer::MatRef::from_column_major_slice(&drawn, lines, draws);
+    let hypotheses: Vec<usize> = (0..pool.hypotheses.len()).filter(|h| state.admits(pool, *h)).collect();
+    let best: Vec<(f64, Vec<f64>)> = hypotheses
+        .par_chunks(CHUNK)
+        .map(|some| {
+            let mut seen = f64::NEG_INFINITY;
+            let mut most = vec![f64::NEG_INFINITY; draws];
+            for h in some {
+                let (first, end) = (pool.first[*h], pool.first[*h + 1]);
+                let mut gradients = Mat::zeros(end - first, draws);
+                let columns = pool.all().subcols(first, end - first);
+                matmul(gradients.as_mut(), Accum::Replace, columns.transpose(), drawn, 1.0, Par::Seq);
+                seen = seen.max(state.fall(pool, *h));
+                state.gains(pool, *h, &gradients, |draw, gain, rank| {
+                    if rank > 0 {
+                        most[draw] = most[draw].max(fall(lines, squares[draw], gain, rank, pool.charge[*h]));
+                    }
+                });
+            }
+            (seen, most)
+        })
+        .collect();
+    let seen = best.iter().map(|(seen, _)| *seen).fold(f64::NEG_INFINITY, f64::max);
+    let as_good = (0..draws).filter(|draw| best.iter().any(|(_, most)| most[*draw] >= seen)).count();
+    (1.0 + as_good as f64) / (1.0 + draws as f64)
+}

@@ -1,0 +1,247 @@
+//! Diagnosis: where simulation and recording differ, what physics was left out, and how much better the model is with it.
+//!
+//! The base is the robot as its user believes it: rigid geometry, reduction ratios, declared couplings. Every cause of the
+//! library and form-free signatures are projected off it and compared in one pool; what wins is refitted together with the base
+//! on the full model, and everything is looked at again from there, until nothing changes.
+
+mod finding;
+mod gate;
+mod lens;
+mod noise;
+mod pool;
+mod search;
+mod state;
+mod verdict;
+
+pub use finding::{Evidence, Finding, Number, Rival};
+pub use noise::Repeatability;
+pub use verdict::{Diagnosis, Errors, Verdict};
+
+use crate::effect::{EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey};
+use crate::estimate::{Fate, FitOptions, Fitted, Model, Screening, align, fit_screened};
+use crate::robot::{Measurements, RobotModel};
+use lens::Lens;
+use nalgebra::Matrix3;
+use pool::Pool;
+use search::{Search, SearchOptions};
+
+/// Effects that the user's simulation has.
+pub const BASE: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
+
+/// What is to be diagnosed.
+pub struct Question<'a> {
+    pub robot: &'a RobotModel,
+    pub data: &'a Measurements,
+    /// Rows to fit, ascending.
+    pub fit: &'a [usize],
+    /// Rows that judge, ascending; empty if none are held out.
+    pub validate: &'a [usize],
+    /// The number of the set that each row belongs to.
+    pub set: &'a [usize],
+    pub seed: u64,
+}
+
+/// Most rounds of search and refit; it settles in two or three.
+const ROUNDS: usize = 6;
+/// Repeats that make the noise known; with fewer it is taken from a residual without structure.
+const REPEATS: usize = 10;
+/// A repeatability that changes by less than this share is settled.
+const SETTLED: f64 = 0.25;
+
+/// The model between rounds.
+struct Course {
+    model: Model,
+    fitted: Fitted,
+    screening: Screening,
+    forms: Vec<Form>,
+}
+
+/// Diagnoses a recording. `tell` hears what is going on.
+pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
+    let robot = question.robot;
+    let mut data = question.data.clone();
+    let base = base_model(robot, &data, question.fit);
+    let rigid = base.stack.effects().count();
+    let mut now = fitted((&base, rigid), None, &[], &data, question);
+    let free: Vec<usize> = (0..now.fitted.fates.len()).filter(|k| matches!(now.fitted.fates[*k], Fate::Free(_))).collect();
+    let spread = spreads(&now.model, &data);
+    let mut repeatability = noise::from_repeats(&data, &now.screening.kept, &spread);
+    if repeatability.sigma > 0.0 {
+        data.spread = Some(scaled(&spread, repeatability.sigma));
+        now = fitted((&base, rigid), Some(&free), &[], &data, question);
+    }
+    let before = now.model.predict(&data);
+    tell(format!("{} rows, {} numbers of the base model estimated", now.screening.kept.len(), free.len()));
+    let mut asked_residual = false;
+    let mut first = None;
+    let mut round = 0;
+    loop {
+        round += 1;
+        let pose = poses(&data, &now.screening.kept);
+        let lens = Lens::new(&now.model, &data, &now.screening.kept);
+        let torque = lens.torques();
+        let yielding = yielding(&now, robot.joints());
+        let survey = Survey::new(robot, &data, &now.screening.kept, &torque, &yielding);
+        let mut pool = pool_of(&lens, &now, &free, &survey);
+        let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
+        let mut search = Search::new(&mut pool, &survey, &pose, options);
+        let start: Vec<usize> = now.forms.iter().map(|form| search.position(Hypothesis::new(form.clone(), 1))).collect();
+        let mut start: Vec<usize> = start;
+        start.sort_unstable();
+        start.dedup();
+        let found = search.run(start);
+        first.get_or_insert(found.first);
+        let forms: Vec<Form> = found.set.iter().map(|k| search.pool.hypotheses[*k].form.clone()).collect();
+        let coefficients: Vec<Vec<f64>> = search.coefficients(&found.set);
+        tell(format!(
+            "round {round}: {} hypotheses, {} causes{} (p = {:.3} that the rest is noise)",
+            search.pool.hypotheses.len(),
+            forms.len(),
+            forms.iter().map(|form| format!("; {}", form.key())).collect::<String>(),
+            found.last
+        ));
+        let same = same_forms(&forms, &now.forms);
+        let start: Vec<(Form, Vec<f64>)> = forms.into_iter().zip(coefficients).collect();
+        let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
+        let kept_same = next.screening.kept == now.screening.kept;
+        let last_round = round >= ROUNDS;
+        if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > 0.01 {
+            asked_residual = true;
+            let rows = &next.screening.kept;
+            let predicted = next.model.predict(&data);
+            let residuals: Vec<_> = rows.iter().map(|row| data.position[*row] - predicted[*row]).collect();
+            let parameters = next.fitted.singular.len();
+            let own: Vec<Matrix3<f64>> = rows.iter().map(|row| spread[*row]).collect();
+            let other = noise::from_residuals(&data, rows, &residuals, &own, parameters);
+            if (other.sigma - repeatability.sigma).abs() > SETTLED * other.sigma.max(repeatability.sigma) {
+                repeatability = Repeatability { sigma: other.sigma, repeats: repeatability.repeats };
+                data.spread = (other.sigma > 0.0).then(|| scaled(&spread, other.sigma));
+                now = fitted((&next.model, rigid), Some(&free), &start_of(&next), &data, question);
+                continue;
+            }
+        }
+        if (same && kept_same) || last_round {
+            let looked = verdict::Looked { pool: search.pool, found, first: first.unwrap_or(1.0), survey: &survey };
+            return verdict::conclude(question, &data, &before, &next, &free, repeatability, looked);
+        }
+        drop(pool);
+        now = next;
+    }
+}
+
+fn same_forms(a: &[Form], b: &[Form]) -> bool {
+    a.len() == b.len() && a.iter().all(|form| b.contains(form))
+}
+
+/// Forms of a model with their coefficients.
+fn start_of(now: &Course) -> Vec<(Form, Vec<f64>)> {
+    let ranges = now.model.stack.effects().map(|(_, range)| range);
+    let own = ranges.skip(now.model.stack.effects().count() - now.forms.len());
+    now.forms.iter().cloned().zip(own.map(|range| now.model.x[range].to_vec())).collect()
+}
+
+/// The base model at its start: the nominal robot, aligned.
+fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Model {
+    let setting = Setting { base: align(robot, data, rows), load: Load::GravityTorque };
+    let effects: Vec<Box<dyn Effect>> = EFFECTS
+        .iter()
+        .filter(|entry| BASE.contains(&entry.name))
+        .map(|entry| (entry.make)(&setting))
+        .filter(|effect| effect.missing(robot, data).is_none())
+        .collect();
+    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects))
+}
+
+/// The first `base` effects of `from` with causes at their coefficients, fitted to the rows that belong.
+///
+/// `free` are the base parameters to estimate, all of them if `None`.
+fn fitted(
+    (from, base): (&Model, usize),
+    free: Option<&[usize]>,
+    causes: &[(Form, Vec<f64>)],
+    data: &Measurements,
+    question: &Question,
+) -> Course {
+    let robot = question.robot;
+    let setting = Setting { base: *from.stack.base(), load: Load::GravityTorque };
+    let rigid: Vec<Box<dyn Effect>> = from
+        .stack
+        .effects()
+        .take(base)
+        .filter_map(|(effect, _)| crate::effect::entry(effect.name()))
+        .map(|entry| (entry.make)(&setting))
+        .collect();
+    let count = rigid.iter().map(|effect| effect.parameters(robot).len()).sum::<usize>();
+    let own = causes.iter().map(|(form, _)| Box::new(form.clone()) as Box<dyn Effect>);
+    let stack = EffectStack::new(robot, setting.base, rigid.into_iter().chain(own).collect());
+    let mut model = Model::nominal(robot.clone(), stack);
+    model.x[..count].copy_from_slice(&from.x[..count]);
+    let coefficients: Vec<f64> = causes.iter().flat_map(|(_, coefficients)| coefficients.iter().copied()).collect();
+    model.x[count..].copy_from_slice(&coefficients);
+    let all: Vec<usize> = (0..count).collect();
+    let candidates: Vec<usize> = free.unwrap_or(&all).iter().copied().chain(count..model.x.len()).collect();
+    let options = FitOptions { rows: question.fit, candidates: &candidates };
+    let (fitted, screening) = fit_screened(&mut model, data, &options, question.set);
+    Course { model, fitted, screening, forms: causes.iter().map(|(form, _)| form.clone()).collect() }
+}
+
+/// The pool of all causes around the present model: the residual is that without them.
+fn pool_of<'a>(lens: &'a Lens<'a>, now: &Course, free: &[usize], survey: &Survey) -> Pool<'a> {
+    let jacobian = lens.jacobian(&now.model, free);
+    let mut residual = lens.residual.clone();
+    for (form, coefficients) in start_of(now) {
+        let columns = lens.columns(&form);
+        for (column, coefficient) in columns.chunks(lens.lines()).zip(coefficients) {
+            residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+        }
+    }
+    let hypotheses = crate::effect::CAUSES.iter().flat_map(|cause| (cause.propose)(survey)).collect();
+    Pool::new(lens, &jacobian, &residual, hypotheses)
+}
+
+/// How far each joint yields in the present model, rad/Nm.
+fn yielding(now: &Course, joints: usize) -> Vec<f64> {
+    let mut out = vec![0.0; joints];
+    for (form, coefficients) in start_of(now) {
+        if let (Form::JointCompliance(_) | Form::JointHardening(_), crate::effect::Place::Joint(joint)) =
+            (&form, crate::effect::Placed::place(&form))
+        {
+            out[joint] += coefficients.first().copied().unwrap_or(0.0).max(0.0);
+        }
+    }
+    out
+}
+
+/// Poses of rows, numbered in order: repeats share one.
+fn poses(data: &Measurements, rows: &[usize]) -> Vec<usize> {
+    let mut out = Vec::with_capacity(rows.len());
+    let mut number = 0;
+    for (i, row) in rows.iter().enumerate() {
+        if i > 0 && !data.same_pose(rows[i - 1], *row) {
+            number += 1;
+        }
+        out.push(number);
+    }
+    out
+}
+
+/// Covariance of every row's point per squared joint deviation.
+fn spreads(model: &Model, data: &Measurements) -> Vec<Matrix3<f64>> {
+    let all: Vec<usize> = (0..data.rows()).collect();
+    let lens = Lens::new(model, data, &all);
+    all.iter().map(|row| noise::by_all(lens.by_joint(*row))).collect()
+}
+
+fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
+    spread.iter().map(|matrix| matrix * (sigma * sigma)).collect()
+}
+
+/// A stack like that of a model whose last effects are `forms`.
+fn stack_of(model: &Model, forms: &[Form]) -> EffectStack {
+    let setting = Setting { base: *model.stack.base(), load: Load::GravityTorque };
+    let count = model.stack.effects().count() - forms.len();
+    let base = model.stack.effects().take(count).filter_map(|(effect, _)| crate::effect::entry(effect.name()));
+    let base = base.map(|entry| (entry.make)(&setting));
+    let own = forms.iter().map(|form| Box::new(form.clone()) as Box<dyn Effect>);
+    EffectStack::new(&model.robot, setting.base, base.chain(own).collect())
+}

@@ -1,0 +1,226 @@
+//! The problem with some hypotheses estimated: what each of the others would still gain.
+
+use super::pool::{LINES_EACH, Pool, dot};
+use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Par};
+
+/// What is left of a squared column of unit length below this is rounding and second order, not sight.
+const INVISIBLE: f64 = 1e-6;
+
+/// Coefficients of a set of hypotheses.
+pub(crate) struct Solution {
+    /// By which the squared residual falls.
+    pub gain: f64,
+    /// How many numbers the data see.
+    pub rank: usize,
+    /// SI, one for every column of the set.
+    pub coefficients: Vec<f64>,
+    /// Standard errors from the residual's scatter, SI.
+    pub errors: Vec<f64>,
+}
+
+/// A pivoted Cholesky factor of a small Gram matrix: what is below [`INVISIBLE`] is left out.
+struct Pivoted {
+    /// Kept columns in order.
+    order: Vec<usize>,
+    /// Lower triangle, row `a` of length `a + 1`.
+    rows: Vec<Vec<f64>>,
+}
+
+impl Pivoted {
+    /// Of a q x q matrix, row by row.
+    fn of(mut gram: Vec<f64>, q: usize) -> Self {
+        let mut order: Vec<usize> = Vec::new();
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        for _ in 0..q {
+            let left = (0..q).filter(|k| !order.contains(k));
+            let Some(pivot) = left.max_by(|a, b| gram[a * q + a].total_cmp(&gram[b * q + b])) else { break };
+            let size = gram[pivot * q + pivot];
+            if size <= INVISIBLE {
+                break;
+            }
+            let root = size.sqrt();
+            let column: Vec<f64> = (0..q).map(|k| gram[k * q + pivot] / root).collect();
+            for i in 0..q {
+                for j in 0..q {
+                    gram[i * q + j] -= column[i] * column[j];
+                }
+            }
+            order.push(pivot);
+            columns.push(column);
+            rows.push(columns.iter().map(|column| column[pivot]).collect());
+        }
+        Self { order, rows }
+    }
+
+    fn rank(&self) -> usize {
+        self.order.len()
+    }
+
+    /// L^-1 of a vector over all columns.
+    fn forward(&self, vector: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut out: Vec<f64> = Vec::with_capacity(self.rank());
+        for (row, k) in self.rows.iter().zip(&self.order) {
+            let known: f64 = row.iter().zip(&out).map(|(a, b)| a * b).sum();
+            out.push((vector(*k) - known) / row[row.len() - 1]);
+        }
+        out
+    }
+
+    /// L^-T of a vector over the kept columns.
+    fn backward(&self, vector: &[f64]) -> Vec<f64> {
+        let mut out = vector.to_vec();
+        for a in (0..self.rank()).rev() {
+            out[a] /= self.rows[a][a];
+            for b in 0..a {
+                out[b] -= self.rows[a][b] * out[a];
+            }
+        }
+        out
+    }
+}
+
+/// Estimates a set of hypotheses together, beside the base model.
+pub(crate) fn solve(pool: &Pool, set: &[usize]) -> Solution {
+    let columns = pool.columns_of(set);
+    let q = columns.len();
+    let mut gram = vec![0.0; q * q];
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate().take(i + 1) {
+            gram[i * q + j] = dot(pool.column(*a), pool.column(*b));
+            gram[j * q + i] = gram[i * q + j];
+        }
+    }
+    let factor = Pivoted::of(gram, q);
+    let forward = factor.forward(|k| pool.gradient[columns[k]]);
+    let gain: f64 = forward.iter().map(|value| value * value).sum();
+    let solved = factor.backward(&forward);
+    let rank = factor.rank();
+    let freedom = pool.lines.saturating_sub(pool.rank() + rank).max(1) as f64;
+    let scatter = (pool.square - gain).max(0.0) / freedom;
+    let (mut coefficients, mut errors) = (vec![0.0; q], vec![0.0; q]);
+    for (a, k) in factor.order.iter().enumerate() {
+        let scale = pool.scale[columns[*k]];
+        coefficients[*k] = solved[a] / scale;
+        let mut unit = vec![0.0; rank];
+        unit[a] = 1.0;
+        // Row a of (L L^T)^-1: |L^-1 e_a|^2.
+        let mut lower: Vec<f64> = Vec::with_capacity(rank);
+        for (b, row) in factor.rows.iter().enumerate() {
+            let known: f64 = row.iter().zip(&lower).map(|(x, y)| x * y).sum();
+            lower.push((unit[b] - known) / row[b]);
+        }
+        errors[*k] = (scatter * lower.iter().map(|value| value * value).sum::<f64>()).sqrt() / scale;
+    }
+    Solution { gain, rank, coefficients, errors }
+}
+
+/// The problem with a set of hypotheses estimated.
+pub(crate) struct State {
+    pub set: Vec<usize>,
+    /// Numbers that the set adds to the base model.
+    pub rank: usize,
+    /// Squared residual.
+    pub square: f64,
+    /// Orthonormal columns that the set spans: lines x rank.
+    pub basis: Mat<f64>,
+    /// Product of every column with the residual.
+    pub gradient: Vec<f64>,
+    /// What the set takes off every column: rank x columns.
+    pub share: Mat<f64>,
+}
+
+impl State {
+    pub fn of(pool: &Pool, set: &[usize]) -> Self {
+        let columns = pool.columns_of(set);
+        let basis = span(pool, &columns);
+        let rank = basis.ncols();
+        let mut share = Mat::zeros(rank, pool.scale.len());
+        matmul(share.as_mut(), Accum::Replace, basis.transpose(), pool.all(), 1.0, Par::Seq);
+        let along: Vec<f64> = (0..rank).map(|k| basis.col(k).iter().zip(&pool.residual).map(|(a, b)| a * b).sum()).collect();
+        let square = pool.square - along.iter().map(|value| value * value).sum::<f64>();
+        let gradient = pool.gradient.iter().enumerate();
+        let gradient = gradient.map(|(c, g)| g - (0..rank).map(|k| share[(k, c)] * along[k]).sum::<f64>()).collect();
+        Self { set: set.to_vec(), rank, square, basis, gradient, share }
+    }
+
+    /// By how much hypothesis `h` would lower the squared residual with `gradient`, and how many numbers the data see of it.
+    pub fn gain(&self, pool: &Pool, h: usize) -> (f64, usize) {
+        let factor = self.factor(pool, h);
+        let first = pool.first[h];
+        (factor.forward(|k| self.gradient[first + k]).iter().map(|value| value * value).sum(), factor.rank())
+    }
+
+    /// The same for many residuals at once: `gradients` is the hypothesis' columns x draws.
+    pub fn gains(&self, pool: &Pool, h: usize, gradients: &Mat<f64>, mut each: impl FnMut(usize, f64, usize)) {
+        let factor = self.factor(pool, h);
+        for draw in 0..gradients.ncols() {
+            let gain = factor.forward(|k| gradients[(k, draw)]).iter().map(|value| value * value).sum();
+            each(draw, gain, factor.rank());
+        }
+    }
+
+    fn factor(&self, pool: &Pool, h: usize) -> Pivoted {
+        let (first, q) = (pool.first[h], pool.first[h + 1] - pool.first[h]);
+        let mut gram = pool.gram[h].clone();
+        for i in 0..q {
+            for j in 0..q {
+                gram[i * q + j] -= (0..self.rank).map(|k| self.share[(k, first + i)] * self.share[(k, first + j)]).sum::<f64>();
+            }
+        }
+        Pivoted::of(gram, q)
+    }
+
+    /// Whether a hypothesis could join this set.
+    pub fn admits(&self, pool: &Pool, h: usize) -> bool {
+        let lines = pool.lines.saturating_sub(pool.rank() + self.rank);
+        let small = LINES_EACH * (pool.first[h + 1] - pool.first[h]) <= lines;
+        small && !self.set.iter().any(|k| pool.keys[*k] == pool.keys[h])
+    }
+
+    /// How much the criterion would fall with hypothesis `h`; minus infinity where it cannot join or is not seen.
+    pub fn fall(&self, pool: &Pool, h: usize) -> f64 {
+        if !self.admits(pool, h) {
+            return f64::NEG_INFINITY;
+        }
+        let (gain, rank) = self.gain(pool, h);
+        if rank == 0 { f64::NEG_INFINITY } else { fall(pool.lines, self.square, gain, rank, pool.charge[h]) }
+    }
+}
+
+/// Fall of the criterion by `rank` more numbers that lower the squared residual by `gain`.
+pub(crate) fn fall(lines: usize, square: f64, gain: f64, rank: usize, charge: f64) -> f64 {
+    let n = lines as f64;
+    n * (square / (square - gain).max(1e-300)).ln() - n.ln() * rank as f64 - charge
+}
+
+/// Orthonormal basis of some of the pool's columns; what is below [`INVISIBLE`] is left out.
+fn span(pool: &Pool, columns: &[usize]) -> Mat<f64> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let mut rest = pool.column(*column).to_vec();
+        for _ in 0..2 {
+            for direction in &basis {
+                let along = dot(&rest, direction);
+                rest.iter_mut().zip(direction).for_each(|(value, b)| *value -= along * b);
+            }
+        }
+        let size = dot(&rest, &rest);
+        if size > INVISIBLE {
+            let root = size.sqrt();
+            rest.iter_mut().for_each(|value| *value /= root);
+            basis.push(rest);
+        }
+    }
+    Mat::from_fn(pool.lines, basis.len(), |i, j| basis[j][i])
+}
+
+/// By how much columns (one after another, unit raw length, projected) lower a squared residual.
+pub(crate) fn gain(columns: &[f64], lines: usize, residual: &[f64]) -> f64 {
+    let own: Vec<&[f64]> = columns.chunks(lines).collect();
+    let gram = own.iter().flat_map(|a| own.iter().map(|b| dot(a, b))).collect();
+    let factor = Pivoted::of(gram, own.len());
+    factor.forward(|k| dot(own[k], residual)).iter().map(|value| value * value).sum()
+}

@@ -1,0 +1,162 @@
+//! The verdict: findings with their evidence, before and after on held-out rows, and what is left.
+
+use super::finding::{Finding, findings};
+use super::noise::Repeatability;
+use super::pool::Pool;
+use super::search::Found;
+use super::{Course, Question};
+use crate::effect::Survey;
+use crate::estimate::{Fitted, Model, Screening, Weight};
+use crate::robot::Measurements;
+use nalgebra::Vector3;
+
+/// What the data say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Explained,
+    NothingMissing,
+    Unexplained,
+}
+
+impl Verdict {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Explained => "explained",
+            Self::NothingMissing => "nothing_missing",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// Lengths of position errors, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    pub mean: f64,
+    pub rms: f64,
+    pub max: f64,
+}
+
+impl Errors {
+    /// Of some rows; `None` of no rows.
+    fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
+        let lengths: Vec<f64> = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect();
+        let count = lengths.len() as f64;
+        (count > 0.0).then(|| Self {
+            mean: lengths.iter().sum::<f64>() / count,
+            rms: (lengths.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
+            max: lengths.iter().copied().fold(0.0, f64::max),
+        })
+    }
+}
+
+/// The outcome of a diagnosis.
+pub struct Diagnosis {
+    pub verdict: Verdict,
+    /// Length of the noise of a row, rms, m.
+    pub noise_floor: f64,
+    /// Of held-out rows (of the fitted ones where none are held out), suspects apart.
+    pub before: Option<Errors>,
+    pub after: Option<Errors>,
+    /// Whether the errors are of held-out rows.
+    pub held_out: bool,
+    /// Strongest first.
+    pub findings: Vec<Finding>,
+    pub screening: Screening,
+    /// What these data cannot show, a sentence each.
+    pub not_observable: Vec<String>,
+    /// What is left looks like, where it is not noise.
+    pub signature: Option<String>,
+    /// What to measure next, a sentence each.
+    pub next_measurements: Vec<String>,
+    /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise.
+    pub leftover_rms: f64,
+    pub chi_square: f64,
+    pub gate_first: f64,
+    pub gate_last: f64,
+    pub repeatability: Repeatability,
+    /// The corrected model and its fit.
+    pub model: Model,
+    pub fitted: Fitted,
+    /// Rows that were fitted.
+    pub kept: Vec<usize>,
+}
+
+/// What the last round looked at.
+pub(crate) struct Looked<'a, 'b> {
+    pub pool: &'b Pool<'a>,
+    pub found: Found,
+    pub first: f64,
+    pub survey: &'b Survey<'a>,
+}
+
+/// A gate above this holds nothing.
+const SIGNIFICANT: f64 = 0.01;
+/// With structure left, a residual this much larger than the noise is not explained; without, this much.
+const LOUD: f64 = 1.25;
+const TOO_LOUD: f64 = 2.5;
+/// Without repeats a residual is not called noise where it is this many times the instrument's.
+const NOT_NOISE: f64 = 4.0;
+const REPEATS: usize = 10;
+
+/// Draws the conclusions of the last round.
+pub(crate) fn conclude(
+    question: &Question,
+    data: &Measurements,
+    before: &[Vector3<f64>],
+    last: &Course,
+    free: &[usize],
+    repeatability: Repeatability,
+    looked: Looked,
+) -> Diagnosis {
+    let predicted = last.model.predict(data);
+    let aside: Vec<usize> = last.screening.suspects.iter().filter(|s| !s.used()).map(|s| s.row).collect();
+    let judges: Vec<usize> = question.validate.iter().copied().filter(|row| !aside.contains(row)).collect();
+    let held_out = !judges.is_empty();
+    let rows = if held_out { &judges } else { &last.screening.kept };
+    let square = |rows: &[usize], length: &dyn Fn(usize) -> f64| {
+        (rows.iter().map(|row| length(*row).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt()
+    };
+    let noise_floor = square(rows, &|row| data.noise(row));
+    let instrument = square(rows, &|row| data.sigma[row].norm());
+    let findings = findings(question, data, last, free, &looked);
+    let kept = &last.screening.kept;
+    let whitened: f64 =
+        kept.iter().map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared()).sum();
+    let freedom = (3 * kept.len()).saturating_sub(last.fitted.singular.len()).max(1) as f64;
+    let chi_square = whitened / freedom;
+    let physics: Vec<&Finding> = findings.iter().filter(|finding| finding.is_physics()).collect();
+    let blind = repeatability.repeats < REPEATS && noise_floor > NOT_NOISE * instrument;
+    let left = (looked.found.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD;
+    let only_unknown = !physics.is_empty() && physics.iter().all(|finding| finding.effect == "unknown");
+    let verdict = if blind || left || only_unknown {
+        Verdict::Unexplained
+    } else if findings.is_empty() {
+        Verdict::NothingMissing
+    } else {
+        Verdict::Explained
+    };
+    Diagnosis {
+        verdict,
+        noise_floor,
+        before: Errors::of(data, before, rows),
+        after: Errors::of(data, &predicted, rows),
+        held_out,
+        findings,
+        screening: last.screening.clone(),
+        not_observable: Vec::new(),
+        signature: None,
+        next_measurements: Vec::new(),
+        leftover_rms: square(kept, &|row| (data.position[row] - predicted[row]).norm()),
+        chi_square,
+        gate_first: looked.first,
+        gate_last: looked.found.last,
+        repeatability,
+        model: Model {
+            robot: last.model.robot.clone(),
+            stack: super::stack_of(&last.model, &last.forms),
+            x: last.model.x.clone(),
+        },
+        fitted: last.fitted.clone(),
+        kept: kept.clone(),
+    }
+}

@@ -1,0 +1,95 @@
+//! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
+
+use super::form::parameters;
+use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+
+/// What decides on the side.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The direction of approach.
+    Approach,
+    /// The sign of the load, blurred over some torque.
+    Load { width_nm: f64 },
+    /// The direction of approach under small loads, the sign of the load above.
+    Mixed { threshold_nm: f64 },
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Backlash {
+    joint: usize,
+    side: Side,
+}
+
+impl Backlash {
+    pub fn side(&self) -> Side {
+        self.side
+    }
+
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let mut out = Vec::new();
+        for joint in survey.revolute() {
+            let both = survey.both_directions(joint);
+            if survey.is_loaded(joint) {
+                let most = survey.load(joint);
+                let widths = [1e-9, 0.03, 0.08].map(|share| Side::Load { width_nm: share * most });
+                out.extend(widths.map(|side| Hypothesis::new(Self { joint, side }, 3).positive()));
+                if both {
+                    let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
+                    loads.sort_by(f64::total_cmp);
+                    let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
+                    let mixed = shares.map(|threshold_nm| Self { joint, side: Side::Mixed { threshold_nm } });
+                    out.extend(mixed.map(|form| Hypothesis::new(form, 5).positive()));
+                }
+            }
+            if both {
+                out.push(Hypothesis::new(Self { joint, side: Side::Approach }, 1));
+            }
+        }
+        out
+    }
+}
+
+impl Effect for Backlash {
+    fn name(&self) -> &'static str {
+        "backlash"
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        parameters(self, [("half_gap", Unit::Radian, 0.01)])
+    }
+
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let side = match self.side {
+            Side::Approach => state.direction(self.joint),
+            Side::Load { width_nm } => libm::tanh(state.torque()[self.joint] / width_nm),
+            Side::Mixed { threshold_nm } => match state.torque()[self.joint] {
+                small if small.abs() < threshold_nm => state.direction(self.joint),
+                torque => torque.signum(),
+            },
+        };
+        out.turn(0, p, self.joint, side);
+    }
+
+    fn needs_torque(&self) -> bool {
+        self.side != Side::Approach
+    }
+}
+
+impl Placed for Backlash {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint)
+    }
+
+    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+        let Side::Mixed { threshold_nm } = self.side else { return Vec::new() };
+        let power = libm::exp2(-0.5 * f64::from(level));
+        let factors = [1.6, 1.25, 0.8, 0.625].map(|factor| libm::pow(factor, power));
+        factors
+            .map(|factor| Self { joint: self.joint, side: Side::Mixed { threshold_nm: threshold_nm * factor } }.into())
+            .to_vec()
+    }
+}

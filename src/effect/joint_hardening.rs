@@ -1,0 +1,124 @@
+//! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
+
+use super::form::{cosines, parameters};
+use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+
+/// What is added to the proportional part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// tau / (1 + |tau| / at): a gear that stiffens.
+    Saturating { at_nm: f64 },
+    /// at tanh(tau / at): a soft zone around no load.
+    SoftZone { at_nm: f64 },
+    /// at (|tau| / at)^exponent with the sign of tau.
+    Power { exponent: f64, at_nm: f64 },
+    /// A curve over the torques seen.
+    Curve { low_nm: f64, high_nm: f64 },
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointHardening {
+    joint: usize,
+    law: Law,
+}
+
+/// Cosines of a free curve.
+const CURVE: usize = 6;
+
+impl JointHardening {
+    pub fn law(&self) -> Law {
+        self.law
+    }
+
+    /// Every loaded joint with several laws each.
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let mut out = Vec::new();
+        for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
+            let most = survey.load(joint);
+            let (low, high) = survey.torques(joint).fold((0.0_f64, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
+            let laws = [0.05, 0.15, 0.5, 1.5].map(|share| Law::Saturating { at_nm: share * most }).into_iter();
+            let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
+            let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
+            out.extend(laws.map(|law| Hypothesis::new(Self { joint, law }, 7).charged(4.0)));
+            out.push(Hypothesis::new(Self { joint, law: Law::Curve { low_nm: low, high_nm: high } }, 1).charged(4.0));
+        }
+        out
+    }
+
+    /// f and its slope.
+    fn bend(&self, torque: f64) -> (f64, f64) {
+        match self.law {
+            Law::Saturating { at_nm } => {
+                let rest = 1.0 + torque.abs() / at_nm;
+                (torque / rest, 1.0 / (rest * rest))
+            }
+            Law::SoftZone { at_nm } => {
+                let t = libm::tanh(torque / at_nm);
+                (at_nm * t, 1.0 - t * t)
+            }
+            Law::Power { exponent, at_nm } => {
+                let share = torque.abs() / at_nm;
+                (at_nm * libm::pow(share, exponent) * torque.signum(), exponent * libm::pow(share, exponent - 1.0))
+            }
+            Law::Curve { .. } => (0.0, 0.0),
+        }
+    }
+}
+
+impl Effect for JointHardening {
+    fn name(&self) -> &'static str {
+        "joint_hardening"
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let linear = ("linear", Unit::RadianPerNewtonMetre, 1e-3);
+        match self.law {
+            Law::Curve { .. } => {
+                let names: Vec<String> = (1..=CURVE).map(|k| format!("cos{k}")).collect();
+                let curve = names.iter().map(|name| (name.as_str(), Unit::Radian, 0.01));
+                parameters(self, std::iter::once(linear).chain(curve))
+            }
+            _ => parameters(self, [linear, ("bend", Unit::RadianPerNewtonMetre, 1e-3)]),
+        }
+    }
+
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let torque = state.torque()[self.joint];
+        out.turn(0, p, self.joint, torque);
+        if let Law::Curve { low_nm, high_nm } = self.law {
+            for (k, value) in cosines(torque, [low_nm, high_nm], CURVE).enumerate() {
+                out.turn(k + 1, p, self.joint, value);
+            }
+            out.yields(self.joint, p[0]);
+        } else {
+            let (value, slope) = self.bend(torque);
+            out.turn(1, p, self.joint, value);
+            out.yields(self.joint, p[0] + p[1] * slope);
+        }
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+}
+
+impl Placed for JointHardening {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint)
+    }
+
+    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+        let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
+        let scaled = |factor: f64| match self.law {
+            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: at_nm * factor }),
+            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: at_nm * factor }),
+            Law::Power { exponent, at_nm } => Some(Law::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm }),
+            Law::Curve { .. } => None,
+        };
+        [step, 1.0 / step].into_iter().filter_map(scaled).map(|law| Self { joint: self.joint, law }.into()).collect()
+    }
+}

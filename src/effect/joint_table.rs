@@ -1,0 +1,76 @@
+//! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
+
+use super::form::{cosines, parameters};
+use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct JointTable {
+    joint: usize,
+    /// Valid range, rad; beyond it the value at its end holds.
+    range_rad: [f64; 2],
+    /// Cosines over the range.
+    count: usize,
+}
+
+/// Highest orders per joint turn that a curve resolves.
+const RESOLUTIONS: [f64; 3] = [12.0, 24.0, 36.0];
+/// Measured values for each number of a curve.
+const VALUES_EACH: f64 = 20.0;
+/// How large a number of the curve may be, rad (60 arcsec): holds it down where points are sparse.
+const PLAUSIBLE: f64 = 3e-4;
+
+impl JointTable {
+    pub fn joint(&self) -> usize {
+        self.joint
+    }
+
+    pub fn range(&self) -> [f64; 2] {
+        self.range_rad
+    }
+
+    /// The curve with coefficients `p`, rad.
+    pub fn value(&self, q: f64, p: &[f64]) -> f64 {
+        cosines(q, self.range_rad, self.count).zip(p).map(|(value, p)| value * p).sum()
+    }
+
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let mut out = Vec::new();
+        for joint in survey.revolute() {
+            for resolution in RESOLUTIONS {
+                let count = (resolution * survey.travel(joint) / PI).ceil();
+                if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
+                    let form = Self { joint, range_rad: survey.range[joint], count: count as usize };
+                    out.push(Hypothesis::new(form, RESOLUTIONS.len()).charged(4.0));
+                }
+            }
+        }
+        out
+    }
+}
+
+impl Effect for JointTable {
+    fn name(&self) -> &'static str {
+        "joint_table"
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let names: Vec<String> = (1..=self.count).map(|k| format!("cos{k}")).collect();
+        parameters(self, names.iter().map(|name| (name.as_str(), Unit::Radian, PLAUSIBLE)))
+    }
+
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        for (k, value) in cosines(state.q[self.joint], self.range_rad, self.count).enumerate() {
+            out.turn(k, p, self.joint, value);
+        }
+    }
+}
+
+impl Placed for JointTable {
+    fn place(&self) -> Place {
+        Place::Joint(self.joint)
+    }
+}

@@ -1,0 +1,90 @@
+//! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
+
+use super::form::parameters;
+use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::spatial::screw;
+use crate::units::Unit;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Which moments bend the link.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bending {
+    /// Those across the link.
+    AcrossLink,
+    /// Those across the axis that moves it: what the joint's own compliance does not show.
+    AcrossAxis,
+    /// Two stiffnesses across that axis.
+    TwoDirections,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinkCompliance {
+    /// From 0.
+    link: usize,
+    bending: Bending,
+}
+
+/// From the point of a link's joint to that of the next one, m, zero pose; the last link ends at the tool.
+pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
+    let end = if link + 1 < robot.joints() { *robot.point(link + 1) } else { robot.home().translation };
+    end - robot.point(link)
+}
+
+/// Shorter links (m) neither bend nor grow visibly.
+pub(super) const SHORT: f64 = 1e-6;
+
+impl LinkCompliance {
+    /// Every link that something hangs on.
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let n = survey.joints();
+        let loaded = (0..n).any(|joint| survey.is_loaded(joint));
+        let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
+        let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
+        let forms = links.flat_map(|link| bendings.map(|bending| Self { link, bending }));
+        forms.map(|form| Hypothesis::new(form, bendings.len()).positive()).collect()
+    }
+}
+
+impl Effect for LinkCompliance {
+    fn name(&self) -> &'static str {
+        "link_compliance"
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let unit = Unit::RadianPerNewtonMetre;
+        match self.bending {
+            Bending::TwoDirections => parameters(self, [("first", unit, 1e-3), ("second", unit, 1e-3)]),
+            _ => parameters(self, [("", unit, 1e-3)]),
+        }
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let along = extent(robot, self.link);
+        let middle = robot.point(self.link) + along * 0.5;
+        let station = self.link + 1;
+        let moment = state.posture.moment(station, &middle);
+        let without = |direction: &Vector3<f64>| moment - direction * direction.dot(&moment);
+        match self.bending {
+            Bending::AcrossLink => out.shift(0, p, station, screw(&without(&along.normalize()), &middle)),
+            Bending::AcrossAxis => out.shift(0, p, station, screw(&without(robot.axis(self.link)), &middle)),
+            Bending::TwoDirections => {
+                for (k, (_, normal)) in robot.normals(self.link).iter().enumerate() {
+                    out.shift(k, p, station, screw(&(normal * normal.dot(&moment)), &middle));
+                }
+            }
+        }
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+}
+
+impl Placed for LinkCompliance {
+    fn place(&self) -> Place {
+        Place::Links(self.link, self.link)
+    }
+}

@@ -1,0 +1,132 @@
+//! What a recording offers to hypotheses: ranges, loads, times, and which columns it has.
+
+use super::Form;
+use crate::robot::{Measurements, RobotModel};
+
+/// The fitted rows of a recording as seen from the present model.
+pub struct Survey<'a> {
+    pub robot: &'a RobotModel,
+    pub data: &'a Measurements,
+    /// Fitted rows of the recording, ascending.
+    pub rows: &'a [usize],
+    /// Load torque (Nm) of every fitted row and joint, row-major.
+    pub torque: &'a [f64],
+    /// How far each joint yields under load in the present model, rad/Nm.
+    pub yielding: &'a [f64],
+    /// Lowest and highest position of each joint, rad or m.
+    pub range: Vec<[f64; 2]>,
+    /// Times (s) between neighbouring fitted rows, ascending, ends left out.
+    pub boundaries: Vec<f64>,
+    /// First and last time of fitted rows, s.
+    pub time: [f64; 2],
+    /// First temperature, C, where recorded.
+    pub reference_c: Option<f64>,
+}
+
+/// At either end of a recording so many rows must lie beyond a change point.
+const EDGE: usize = 3;
+
+impl<'a> Survey<'a> {
+    pub fn new(robot: &'a RobotModel, data: &'a Measurements, rows: &'a [usize], torque: &'a [f64], yielding: &'a [f64]) -> Self {
+        let range = (0..robot.joints())
+            .map(|joint| {
+                let values = rows.iter().map(|row| data.q(*row)[joint]);
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+            })
+            .collect();
+        let mut times: Vec<f64> = rows.iter().map(|row| data.time(*row)).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let between: Vec<f64> = times.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
+        let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
+        let reference_c = rows.first().and_then(|row| data.temperature(*row));
+        Self { robot, data, rows, torque, yielding, range, boundaries, time, reference_c }
+    }
+
+    pub fn joints(&self) -> usize {
+        self.robot.joints()
+    }
+
+    /// Joints that turn.
+    pub fn revolute(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.joints()).filter(|joint| self.robot.is_revolute(*joint))
+    }
+
+    /// How far a joint moves, rad or m.
+    pub fn travel(&self, joint: usize) -> f64 {
+        (self.range[joint][1] - self.range[joint][0]).max(0.0)
+    }
+
+    /// Load torques of a joint, Nm.
+    pub fn torques(&self, joint: usize) -> impl Iterator<Item = f64> + '_ {
+        self.torque.iter().skip(joint).step_by(self.joints().max(1)).copied()
+    }
+
+    /// Largest load torque of a joint, Nm.
+    pub fn load(&self, joint: usize) -> f64 {
+        self.torques(joint).fold(0.0, |most, torque| most.max(torque.abs()))
+    }
+
+    /// Whether gravity loads the joint enough to speak of it.
+    pub fn is_loaded(&self, joint: usize) -> bool {
+        let most = (0..self.joints()).map(|joint| self.load(joint)).fold(0.0, f64::max);
+        self.robot.is_revolute(joint) && self.load(joint) > (1e-3 * most).max(1e-6)
+    }
+
+    /// Whether the joint came from both sides.
+    pub fn both_directions(&self, joint: usize) -> bool {
+        let signs = || self.rows.iter().map(|row| self.data.direction(*row, joint));
+        signs().any(|sign| sign > 0.0) && signs().any(|sign| sign < 0.0)
+    }
+
+    /// At most `most` change points, evenly taken.
+    pub fn changes(&self, most: usize) -> impl Iterator<Item = f64> + '_ {
+        self.boundaries.iter().step_by(self.boundaries.len().div_ceil(most.max(1)).max(1)).copied()
+    }
+
+    /// The change points around one.
+    pub fn changes_near(&self, time: f64) -> Vec<f64> {
+        let at = self.boundaries.partition_point(|other| *other < time);
+        let reach = self.boundaries.len().div_ceil(40).max(1) + 1;
+        self.boundaries[at.saturating_sub(reach)..(at + reach).min(self.boundaries.len())].to_vec()
+    }
+
+    /// Whether some but not all rows carry (more than half of the largest) payload.
+    pub fn payload_changes(&self) -> bool {
+        let heavy = self.heavy_payload();
+        let loaded = self.rows.iter().filter(|row| self.data.payload[**row] > heavy).count();
+        loaded > 0 && loaded < self.rows.len()
+    }
+
+    /// Half of the largest payload, kg.
+    pub fn heavy_payload(&self) -> f64 {
+        0.5 * self.rows.iter().map(|row| self.data.payload[*row]).fold(0.0, f64::max)
+    }
+}
+
+/// An effect at a place in a form, as a possible cause of what the model leaves.
+#[derive(Debug, Clone)]
+pub struct Hypothesis {
+    pub form: Form,
+    /// How many forms of the kind are tried; twice its logarithm is charged.
+    pub tried: f64,
+    /// -2 ln of the prior odds beyond those of effects, places and forms being alike.
+    pub charge: f64,
+    /// True where only positive coefficients make sense.
+    pub positive: bool,
+}
+
+impl Hypothesis {
+    pub fn new(form: impl Into<Form>, tried: usize) -> Self {
+        Self { form: form.into(), tried: tried.max(1) as f64, charge: 0.0, positive: false }
+    }
+
+    pub fn positive(self) -> Self {
+        Self { positive: true, ..self }
+    }
+
+    pub fn charged(self, charge: f64) -> Self {
+        Self { charge: self.charge + charge, ..self }
+    }
+}

@@ -1,0 +1,109 @@
+//! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
+
+use super::form::parameters;
+use super::link_compliance::{SHORT, extent};
+use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::spatial::Twist;
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+
+/// How far something has warmed up.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Warmth {
+    /// K above the first measured temperature.
+    Temperature { reference_c: f64 },
+    /// 1 - exp(-t / T) since the start.
+    Time { start_s: f64, constant_s: f64 },
+}
+
+impl Warmth {
+    /// What the recording offers: its temperature, else warm-ups of several time constants.
+    pub fn all(survey: &Survey) -> Vec<Self> {
+        let [start_s, end] = survey.time;
+        match survey.reference_c {
+            Some(reference_c) => vec![Self::Temperature { reference_c }],
+            None if end > start_s => {
+                [0.1, 0.25, 0.5, 1.0, 2.5].map(|share| Self::Time { start_s, constant_s: share * (end - start_s) }).to_vec()
+            }
+            None => Vec::new(),
+        }
+    }
+
+    pub fn at(&self, state: &ArmState) -> f64 {
+        match self {
+            Self::Temperature { reference_c } => state.temperature().map_or(0.0, |now| now - reference_c),
+            Self::Time { start_s, constant_s } => 1.0 - libm::exp(-(state.time() - start_s).max(0.0) / constant_s),
+        }
+    }
+
+    /// The same with time constants around its own.
+    pub fn near(&self, level: i32) -> Vec<Self> {
+        let Self::Time { start_s, constant_s } = *self else { return Vec::new() };
+        let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
+        [step, 1.0 / step].map(|factor| Self::Time { start_s, constant_s: constant_s * factor }).to_vec()
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ThermalGrowth {
+    /// From 0.
+    first: usize,
+    last: usize,
+    by: Warmth,
+}
+
+impl ThermalGrowth {
+    pub fn by(&self) -> Warmth {
+        self.by
+    }
+
+    /// Every run of neighbouring links.
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let links = survey.joints() - 1;
+        let long = |link: &usize| extent(survey.robot, *link).norm() > SHORT;
+        let all = Warmth::all(survey);
+        let mut out = Vec::new();
+        for by in &all {
+            for (first, last) in (0..links).flat_map(|first| (first..links).map(move |last| (first, last))) {
+                // A run begins and ends with a link that can grow, else it is the same as a shorter one.
+                if long(&first) && long(&last) {
+                    out.push(Hypothesis::new(Self { first, last, by: *by }, all.len()).positive());
+                }
+            }
+        }
+        out
+    }
+}
+
+impl Effect for ThermalGrowth {
+    fn name(&self) -> &'static str {
+        "thermal_growth"
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        match self.by {
+            Warmth::Temperature { .. } => parameters(self, [("per_kelvin", Unit::One, 1e-3)]),
+            Warmth::Time { .. } => parameters(self, [("in_the_end", Unit::One, 1e-2)]),
+        }
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let warmth = self.by.at(state);
+        for link in self.first..=self.last {
+            let growth = extent(robot, link) * warmth;
+            out.shift(0, p, link + 1, Twist::new(growth.x, growth.y, growth.z, 0.0, 0.0, 0.0));
+        }
+    }
+}
+
+impl Placed for ThermalGrowth {
+    fn place(&self) -> Place {
+        Place::Links(self.first, self.last)
+    }
+
+    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+        self.by.near(level).into_iter().map(|by| Self { by, ..self.clone() }.into()).collect()
+    }
+}

@@ -1,0 +1,265 @@
+//! `unknown`: form-free signatures, for what no entry of the library explains: placed and described, never christened.
+
+use super::form::{cosines, parameters};
+use super::frame_shift::{MOTION, unit};
+use super::thermal_growth::Warmth;
+use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What an unknown motion depends on, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Signature {
+    /// A smooth function of a joint position.
+    Angle { by: usize, low: f64, high: f64 },
+    /// A bump around a joint position.
+    Bump { centre_rad: f64, width_rad: f64 },
+    /// A hinge: nothing up to a joint position, then in proportion.
+    Hinge { by: usize, from_rad: f64, upwards: bool },
+    /// A sine of another joint's angle.
+    Periodic { by: usize, order: u32 },
+    /// Products of sines and cosines of two angles.
+    Product { a: usize, b: usize },
+    /// A smooth function of two joint positions.
+    Surface { a: usize, b: usize, a_range: [f64; 2], b_range: [f64; 2] },
+    /// A smooth function of time.
+    Time { start_s: f64, end_s: f64 },
+    /// With temperature or warm-up.
+    Warming(Warmth),
+    /// Differs where a payload is carried.
+    Payload { above_kg: f64 },
+}
+
+impl fmt::Display for Signature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Angle { by, .. } => write!(f, "function of q{}", by + 1),
+            Self::Bump { centre_rad, width_rad } => {
+                write!(f, "local bump at {:.1} deg, width {:.1} deg", centre_rad.to_degrees(), width_rad.to_degrees())
+            }
+            Self::Hinge { by, from_rad, upwards } => {
+                let side = if *upwards { "above" } else { "below" };
+                write!(f, "grows with q{} {side} {:.1} deg, nothing on the other side", by + 1, from_rad.to_degrees())
+            }
+            Self::Periodic { by, order } => write!(f, "periodic in q{}, {order} a turn", by + 1),
+            Self::Product { a, b } => write!(f, "product of functions of q{} and q{}", a + 1, b + 1),
+            Self::Surface { a, b, .. } => write!(f, "function of q{} and q{}", a + 1, b + 1),
+            Self::Time { .. } => f.write_str("function of time"),
+            Self::Warming(_) => f.write_str("goes with the warm-up"),
+            Self::Payload { .. } => f.write_str("differs with the payload"),
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Unknown {
+    place: Place,
+    signature: Signature,
+}
+
+/// Cosines of a smooth function of one variable, and of each of two.
+const CURVE: usize = 8;
+const EACH: usize = 3;
+/// Widths (rad) and spacing of bumps.
+const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
+/// Orders in another joint's angle.
+const ORDERS: u32 = 3;
+/// -2 ln of the odds of things outside the library.
+const OPEN: f64 = 4.0;
+
+impl Unknown {
+    pub fn signature(&self) -> Signature {
+        self.signature
+    }
+
+    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+        let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
+        let mut add = |place, signature, tried, charge: f64| {
+            out.push(Hypothesis::new(Self { place, signature }, tried).charged(OPEN + charge));
+        };
+        let [start_s, end_s] = survey.time;
+        if end_s > start_s {
+            add(Place::Base, Signature::Time { start_s, end_s }, 1, 0.0);
+        }
+        if survey.payload_changes() {
+            let signature = Signature::Payload { above_kg: survey.heavy_payload() };
+            add(Place::Tool, signature, 1, 6.0);
+            add(Place::Base, signature, 1, 6.0);
+        }
+        out
+    }
+
+    fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
+        let mut out = Vec::new();
+        let place = Place::Joint(joint);
+        let mut add = |signature, tried: usize, charge: f64| {
+            out.push(Hypothesis::new(Self { place, signature }, tried).charged(OPEN + charge));
+        };
+        let n = survey.joints();
+        let [low, high] = survey.range[joint];
+        let bumps = (survey.travel(joint) / 0.1) as usize + 1;
+        for width_rad in WIDTHS {
+            let count = ((high - low - 0.5 * width_rad) / width_rad).ceil().max(0.0) as usize;
+            for k in 0..count {
+                add(Signature::Bump { centre_rad: low + width_rad * (k as f64 + 0.5), width_rad }, bumps, 0.0);
+            }
+        }
+        for share in [0.25, 0.5, 0.75] {
+            for upwards in [true, false] {
+                let from_rad = low + share * (high - low);
+                add(Signature::Hinge { by: joint, from_rad, upwards }, bumps, 0.0);
+            }
+        }
+        for by in 0..n {
+            let [low, high] = survey.range[by];
+            add(Signature::Angle { by, low, high }, 1, 0.0);
+            if by != joint {
+                (1..=ORDERS).for_each(|order| add(Signature::Periodic { by, order }, 6, 0.0));
+            }
+            for b in by + 1..n {
+                add(Signature::Product { a: by, b }, 3, 0.0);
+                add(Signature::Surface { a: by, b, a_range: survey.range[by], b_range: survey.range[b] }, 1, 0.0);
+            }
+        }
+        let [start_s, end_s] = survey.time;
+        if end_s > start_s {
+            add(Signature::Time { start_s, end_s }, 1, 0.0);
+        }
+        let warm = Warmth::all(survey);
+        warm.iter().for_each(|by| add(Signature::Warming(*by), warm.len(), 4.0));
+        out
+    }
+
+    /// Values of the signature in a row: the motion is their combination.
+    fn values(&self, state: &ArmState, mut each: impl FnMut(usize, f64)) {
+        let at = |joint: usize| state.q[joint];
+        match self.signature {
+            Signature::Angle { by, low, high } => {
+                cosines(at(by), [low, high], CURVE).enumerate().for_each(|(k, value)| each(k, value));
+            }
+            Signature::Bump { centre_rad, width_rad } => {
+                let Place::Joint(joint) = self.place else { return };
+                let distance = (at(joint) - centre_rad) / width_rad;
+                each(0, libm::exp(-distance * distance));
+            }
+            Signature::Hinge { by, from_rad, upwards } => {
+                let beyond = at(by) - from_rad;
+                each(0, if upwards { beyond.max(0.0) } else { (-beyond).max(0.0) });
+            }
+            Signature::Periodic { by, order } => {
+                let (sine, cosine) = libm::sincos(f64::from(order) * at(by));
+                each(0, sine);
+                each(1, cosine);
+            }
+            Signature::Product { a, b } => {
+                let ((sa, ca), (sb, cb)) = (libm::sincos(at(a)), libm::sincos(at(b)));
+                [sa * sb, sa * cb, ca * sb, ca * cb].into_iter().enumerate().for_each(|(k, value)| each(k, value));
+            }
+            Signature::Surface { a, b, a_range, b_range } => {
+                for (i, x) in cosines(at(a), a_range, EACH).enumerate() {
+                    cosines(at(b), b_range, EACH).enumerate().for_each(|(k, y)| each(EACH * i + k, x * y));
+                }
+            }
+            Signature::Time { start_s, end_s } => {
+                let count = if self.is_joint() { CURVE } else { EACH };
+                cosines(state.time(), [start_s, end_s], count).enumerate().for_each(|(k, value)| each(k, value));
+            }
+            Signature::Warming(by) => each(0, by.at(state)),
+            Signature::Payload { above_kg } => each(0, f64::from(state.payload() > above_kg)),
+        }
+    }
+
+    fn is_joint(&self) -> bool {
+        matches!(self.place, Place::Joint(_))
+    }
+
+    fn count(&self) -> usize {
+        match self.signature {
+            Signature::Angle { .. } => CURVE,
+            Signature::Periodic { .. } => 2,
+            Signature::Product { .. } => 4,
+            Signature::Surface { .. } => EACH * EACH,
+            Signature::Time { .. } if self.is_joint() => CURVE,
+            Signature::Time { .. } => EACH,
+            _ => 1,
+        }
+    }
+
+    /// Directions at a frame: displacement of a tool, all of a base.
+    fn axes(&self) -> usize {
+        if self.place == Place::Tool { 3 } else { 6 }
+    }
+}
+
+impl Effect for Unknown {
+    fn name(&self) -> &'static str {
+        "unknown"
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let numbers: Vec<(String, Unit, f64)> = match self.place {
+            Place::Joint(joint) => {
+                let unit = if robot.is_revolute(joint) { Unit::Radian } else { Unit::Millimetre };
+                (1..=self.count()).map(|k| (format!("c{k}"), unit, 0.01)).collect()
+            }
+            _ => (1..=self.count())
+                .flat_map(|k| MOTION.into_iter().take(self.axes()).map(move |m| (format!("{}{k}", m.0), m.1, 0.01)))
+                .collect(),
+        };
+        parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let axes = self.axes();
+        self.values(state, |k, value| match self.place {
+            Place::Joint(joint) => out.turn(k, p, joint, value),
+            place => {
+                let station = if place == Place::Tool { robot.joints() } else { 0 };
+                (0..axes).for_each(|axis| out.shift(axes * k + axis, p, station, unit(axis) * value));
+            }
+        });
+    }
+}
+
+impl Placed for Unknown {
+    fn place(&self) -> Place {
+        self.place
+    }
+
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
+        let with = |signature| Form::from(Self { place: self.place, signature });
+        match self.signature {
+            Signature::Bump { centre_rad, width_rad } => {
+                let step = libm::exp2(-f64::from(level));
+                let power = libm::exp2(-0.5 * f64::from(level));
+                let widths = [0.75, 1.0, 1.33].map(|factor| width_rad * libm::pow(factor, power));
+                let centres = [-0.4, 0.0, 0.4].map(|share| centre_rad + share * width_rad * step);
+                let pairs = centres.into_iter().flat_map(|c| widths.map(|w| (c, w)));
+                pairs.map(|(centre_rad, width_rad)| with(Signature::Bump { centre_rad, width_rad })).collect()
+            }
+            Signature::Hinge { by, from_rad, upwards } => {
+                let [low, high] = survey.range[by];
+                let step = 0.12 * (high - low) * libm::exp2(-0.7 * f64::from(level));
+                let places = [from_rad - step, from_rad + step].into_iter().filter(|at| *at > low && *at < high);
+                places.map(|from_rad| with(Signature::Hinge { by, from_rad, upwards })).collect()
+            }
+            Signature::Warming(by) => by.near(level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    fn variant(&self) -> String {
+        match self.signature {
+            Signature::Angle { by, .. } | Signature::Periodic { by, .. } => format!("q{}", by + 1),
+            Signature::Hinge { .. } => "hinge".into(),
+            Signature::Bump { .. } => "bump".into(),
+            Signature::Product { a, b } | Signature::Surface { a, b, .. } => format!("q{}_q{}", a + 1, b + 1),
+            Signature::Time { .. } => "time".into(),
+            Signature::Warming(_) => "warm".into(),
+            Signature::Payload { .. } => "payload".into(),
+        }
+    }
+}

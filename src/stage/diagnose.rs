@@ -1,0 +1,90 @@
+//! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
+
+use crate::diagnose::{Question, diagnose};
+use crate::error::{Fault, Result};
+use crate::estimate::Suspect;
+use crate::robot::{Instrument, RobotModel};
+use crate::stage::{Context, Stage, screened};
+use crate::table::{FindingNumbers, Findings, Prediction, Recording, Rivals, Robot, Split, Suspects, Verdict};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `diagnose`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Diagnose {
+    /// Sets of the split to fit; all others judge.
+    #[serde(default = "fit_set")]
+    pub on: Vec<String>,
+    /// The tracker's noise.
+    #[serde(default)]
+    pub tracker: Instrument,
+}
+
+fn fit_set() -> Vec<String> {
+    vec!["fit".into()]
+}
+
+crate::stage::reads! {
+    /// Input ports of [`Diagnose`].
+    pub struct DiagnoseReads {
+        robot: Robot,
+        recording: Recording,
+        split: Split,
+    }
+}
+
+crate::stage::writes! {
+    /// Output ports of [`Diagnose`].
+    pub struct DiagnoseWrites {
+        verdict: Verdict,
+        findings: Findings,
+        finding_numbers: FindingNumbers,
+        rivals: Rivals,
+        prediction: Prediction,
+        suspects: Suspects,
+    }
+}
+
+impl Stage for Diagnose {
+    const NAME: &'static str = "diagnose";
+    const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = DiagnoseReads;
+    type Writes = DiagnoseWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        if self.on.is_empty() {
+            faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
+        }
+        if let Some(fault) = self.tracker.fault() {
+            faults.push(Fault::new("tracker", fault));
+        }
+        faults
+    }
+
+    fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let data = reads.recording.measurements(&self.tracker);
+        let fit = reads.split.rows(&reads.recording, &self.on)?;
+        let validate: Vec<usize> = (0..data.rows()).filter(|row| fit.binary_search(row).is_err()).collect();
+        let set = screened::numbered(&reads.split);
+        let question = Question { robot: &robot, data: &data, fit: &fit, validate: &validate, set: &set, seed: context.seed };
+        let diagnosis = diagnose(&question, |line| context.services.note(line));
+        let step = context.id;
+        let mut held_out = vec![true; data.rows()];
+        fit.iter().for_each(|row| held_out[*row] = false);
+        let covariance = diagnosis.fitted.covariance.as_ref();
+        let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
+        Ok(DiagnoseWrites {
+            verdict: Verdict::of(step, &diagnosis),
+            findings: Findings::of(&diagnosis),
+            finding_numbers: FindingNumbers::of(&diagnosis),
+            rivals: Rivals::of(&diagnosis),
+            prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
+                .with_suspects(aside),
+            suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
+        })
+    }
+}

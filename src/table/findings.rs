@@ -1,0 +1,112 @@
+//! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
+
+use crate::diagnose::Diagnosis;
+
+crate::table::rows! { "findings",
+    /// Findings, strongest first; key `rank`.
+    pub struct Findings of FindingRow {
+        /// From 1.
+        rank: i64,
+        /// Canonical effect name.
+        effect: String,
+        /// E.g. `joint 3`.
+        place: String,
+        /// One sentence for a person.
+        statement: String,
+        f_statistic: Option<f64>,
+        p_value: Option<f64>,
+        /// How much worse the criterion is without it.
+        delta_bic: Option<f64>,
+        /// By how much the held-out rms is larger without it.
+        heldout_gain_mm: Option<f64>,
+        /// Rms of the whole effect over the fitted rows.
+        effect_rms_mm: Option<f64>,
+        /// Joint whose range bounds it, from 1.
+        valid_joint: Option<i64>,
+        valid_from_rad: Option<f64>,
+        valid_to_rad: Option<f64>,
+        /// Its forms as JSON, by which the model is rebuilt.
+        forms: String,
+    }
+}
+
+crate::table::rows! { "finding_numbers",
+    /// Numbers of findings; key (`rank`, `name`).
+    pub struct FindingNumbers of FindingNumberRow {
+        rank: i64,
+        name: String,
+        value: f64,
+        unit: String,
+        /// One standard deviation.
+        sigma: Option<f64>,
+    }
+}
+
+crate::table::rows! { "rivals",
+    /// Explanations that these data cannot tell from a finding; key (`rank`, `effect`, `place`).
+    pub struct Rivals of RivalRow {
+        rank: i64,
+        effect: String,
+        place: String,
+        /// Criterion with the rival in place of the finding, minus that of the finding.
+        delta_bic: f64,
+    }
+}
+
+fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &crate::diagnose::Finding)> {
+    (1..).zip(&diagnosis.findings)
+}
+
+impl Findings {
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let rows = ranked(diagnosis).map(|(rank, finding)| FindingRow {
+            rank,
+            effect: finding.effect.into(),
+            place: finding.place.clone(),
+            statement: finding.statement.clone(),
+            f_statistic: finding.evidence.map(|e| e.f_statistic),
+            p_value: finding.evidence.map(|e| e.p_value),
+            delta_bic: finding.evidence.map(|e| e.delta_bic),
+            heldout_gain_mm: finding.evidence.map(|e| e.heldout_gain * 1e3),
+            effect_rms_mm: finding.evidence.map(|e| e.effect_rms * 1e3),
+            valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
+            valid_from_rad: finding.valid.map(|(_, range)| range[0]),
+            valid_to_rad: finding.valid.map(|(_, range)| range[1]),
+            forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
+        });
+        Self(rows.collect())
+    }
+}
+
+impl FindingNumbers {
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
+            finding.numbers.iter().map(move |number| FindingNumberRow {
+                rank,
+                name: number.name.clone(),
+                value: number.value,
+                unit: number.unit.into(),
+                sigma: number.sigma.filter(|sigma| sigma.is_finite()),
+            })
+        });
+        let mut rows: Vec<FindingNumberRow> = rows.collect();
+        rows.sort_by(|a, b| (a.rank, &a.name).cmp(&(b.rank, &b.name)));
+        Self(rows)
+    }
+}
+
+impl Rivals {
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
+            finding.rivals.iter().map(move |rival| RivalRow {
+                rank,
+                effect: rival.effect.into(),
+                place: rival.place.clone(),
+                delta_bic: rival.delta_bic,
+            })
+        });
+        let mut rows: Vec<RivalRow> = rows.collect();
+        rows.sort_by(|a, b| (a.rank, &a.effect, &a.place).cmp(&(b.rank, &b.effect, &b.place)));
+        Self(rows)
+    }
+}

@@ -1,0 +1,70 @@
+//! The verdict of a diagnosis, with errors before and after.
+
+crate::table::rows! { "verdict",
+    /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects apart.
+    pub struct Verdict of VerdictRow {
+        step: String,
+        /// `explained`, `nothing_missing` or `unexplained`.
+        verdict: String,
+        /// Rms length of the noise of these rows: instrument and joint repeatability.
+        noise_floor_mm: f64,
+        /// Whether the errors are of rows that no model has seen.
+        held_out: bool,
+        before_mean_mm: Option<f64>,
+        before_rms_mm: Option<f64>,
+        before_max_mm: Option<f64>,
+        after_mean_mm: Option<f64>,
+        after_rms_mm: Option<f64>,
+        after_max_mm: Option<f64>,
+        /// Rms length of what is left at fitted rows.
+        leftover_rms_mm: f64,
+        /// Squared whitened residual per degree of freedom.
+        chi_square: f64,
+        /// Probability that what the base model leaves, and what is left in the end, is noise.
+        p_before: f64,
+        p_after: f64,
+        /// Standard deviation of every joint from move to move.
+        repeatability_rad: f64,
+        /// Immediate repeats of a pose that it rests on.
+        repeats: i64,
+        /// Rows that were fitted.
+        points: i64,
+        /// What these data cannot show, one sentence a line.
+        not_observable: String,
+        /// What is left looks like, where it is not noise.
+        signature: Option<String>,
+        /// What to measure next, one sentence a line.
+        next_measurements: Option<String>,
+    }
+}
+
+use crate::diagnose::{Diagnosis, Errors};
+
+impl Verdict {
+    /// The verdict of the stage `step`.
+    pub fn of(step: &str, diagnosis: &Diagnosis) -> Self {
+        let mm = |errors: Option<Errors>, of: fn(Errors) -> f64| errors.map(|errors| of(errors) * 1e3);
+        Self(vec![VerdictRow {
+            step: step.into(),
+            verdict: diagnosis.verdict.name().into(),
+            noise_floor_mm: diagnosis.noise_floor * 1e3,
+            held_out: diagnosis.held_out,
+            before_mean_mm: mm(diagnosis.before, |e| e.mean),
+            before_rms_mm: mm(diagnosis.before, |e| e.rms),
+            before_max_mm: mm(diagnosis.before, |e| e.max),
+            after_mean_mm: mm(diagnosis.after, |e| e.mean),
+            after_rms_mm: mm(diagnosis.after, |e| e.rms),
+            after_max_mm: mm(diagnosis.after, |e| e.max),
+            leftover_rms_mm: diagnosis.leftover_rms * 1e3,
+            chi_square: diagnosis.chi_square,
+            p_before: diagnosis.gate_first,
+            p_after: diagnosis.gate_last,
+            repeatability_rad: diagnosis.repeatability.sigma,
+            repeats: diagnosis.repeatability.repeats as i64,
+            points: diagnosis.kept.len() as i64,
+            not_observable: diagnosis.not_observable.join("\n"),
+            signature: diagnosis.signature.clone(),
+            next_measurements: (!diagnosis.next_measurements.is_empty()).then(|| diagnosis.next_measurements.join("\n")),
+        }])
+    }
+}
