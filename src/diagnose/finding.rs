@@ -1,14 +1,12 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::Course;
-use super::Question;
 use super::pool::Pool;
 use super::search::falls;
 use super::state::solve;
 use super::verdict::Looked;
-use crate::effect::{Effect, Form, Placed};
-use crate::estimate::Fate;
-use crate::robot::Measurements;
+use crate::effect::{Effect, Form, Place, Placed};
+use crate::estimate::{Fate, Kind, Screening};
 use crate::units::Unit;
 use std::collections::BTreeMap;
 
@@ -72,13 +70,7 @@ impl Finding {
 const ALIKE: f64 = 6.0;
 
 /// The chosen causes as findings, strongest first.
-pub(crate) fn findings(
-    question: &Question,
-    data: &Measurements,
-    last: &Course,
-    _free: &[usize],
-    looked: &Looked,
-) -> Vec<Finding> {
+pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let pool = looked.pool;
     let set = &looked.found.set;
     let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
@@ -139,15 +131,52 @@ pub(crate) fn findings(
             gain,
         };
         let valid = match forms[0].place() {
-            crate::effect::Place::Joint(joint) => Some((joint, looked.survey.range[joint])),
+            Place::Joint(joint) => Some((joint, looked.survey.range[joint])),
             _ => None,
         };
         let statement = format!("{effect} at {place}");
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
-    let _ = (question, data);
+    out.extend(faults(&last.screening));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    out
+}
+
+/// Rows of the recording that no model can follow, as findings.
+fn faults(screening: &Screening) -> Vec<Finding> {
+    let of = |kinds: fn(Kind) -> bool| -> Vec<usize> {
+        screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind)).map(|s| s.row + 1).collect()
+    };
+    let list = |rows: &[usize]| {
+        let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
+        let more = rows.len().saturating_sub(20);
+        format!("{}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+    };
+    let finding = |effect, statement| Finding {
+        effect,
+        place: Place::Recording.to_string(),
+        statement,
+        numbers: Vec::new(),
+        evidence: None,
+        rivals: Vec::new(),
+        valid: None,
+        forms: Vec::new(),
+    };
+    let mut out = Vec::new();
+    let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
+    if !swapped.is_empty() {
+        out.push(finding("mislabelled_point", format!("points carry another point's name: rows {}", list(&swapped))));
+    }
+    let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
+    if !shifted.is_empty() {
+        let text = format!("joints and points are rows apart in the recording: rows {}", list(&shifted));
+        out.push(finding("joint_log_lag", text));
+    }
+    let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
+    if !wrong.is_empty() {
+        out.push(finding("outlier", format!("single wrong points: rows {}", list(&wrong))));
+    }
     out
 }
 

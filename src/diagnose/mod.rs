@@ -111,8 +111,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             let predicted = next.model.predict(&data);
             let residuals: Vec<_> = rows.iter().map(|row| data.position[*row] - predicted[*row]).collect();
             let parameters = next.fitted.singular.len();
-            let own: Vec<Matrix3<f64>> = rows.iter().map(|row| spread[*row]).collect();
-            let other = noise::from_residuals(&data, rows, &residuals, &own, parameters);
+            let other = noise::from_residuals(&data, rows, &residuals, &spread, parameters);
             if (other.sigma - repeatability.sigma).abs() > SETTLED * other.sigma.max(repeatability.sigma) {
                 repeatability = Repeatability { sigma: other.sigma, repeats: repeatability.repeats };
                 data.spread = (other.sigma > 0.0).then(|| scaled(&spread, other.sigma));
@@ -122,7 +121,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         if (same && kept_same) || last_round {
             let looked = verdict::Looked { pool: search.pool, found, first: first.unwrap_or(1.0), survey: &survey };
-            return verdict::conclude(question, &data, &before, &next, &free, repeatability, looked);
+            return verdict::conclude(question, &data, &before, &next, repeatability, looked);
         }
         drop(pool);
         now = next;

@@ -104,7 +104,6 @@ pub(crate) fn conclude(
     data: &Measurements,
     before: &[Vector3<f64>],
     last: &Course,
-    free: &[usize],
     repeatability: Repeatability,
     looked: Looked,
 ) -> Diagnosis {
@@ -118,7 +117,7 @@ pub(crate) fn conclude(
     };
     let noise_floor = square(rows, &|row| data.noise(row));
     let instrument = square(rows, &|row| data.sigma[row].norm());
-    let findings = findings(question, data, last, free, &looked);
+    let findings = findings(last, &looked);
     let kept = &last.screening.kept;
     let whitened: f64 =
         kept.iter().map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared()).sum();
@@ -155,6 +154,7 @@ pub(crate) fn conclude(
             robot: last.model.robot.clone(),
             stack: super::stack_of(&last.model, &last.forms),
             x: last.model.x.clone(),
+            known: last.model.known.clone(),
         },
         fitted: last.fitted.clone(),
         kept: kept.clone(),

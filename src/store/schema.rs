@@ -16,6 +16,8 @@ use crate::units::Unit;
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/document.json"),
+    include_str!("../../schemas/finding_numbers.json"),
+    include_str!("../../schemas/findings.json"),
     include_str!("../../schemas/fit.json"),
     include_str!("../../schemas/intake.json"),
     include_str!("../../schemas/network.json"),
@@ -24,17 +26,15 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/prediction.json"),
     include_str!("../../schemas/recording.json"),
     include_str!("../../schemas/rejected.json"),
+    include_str!("../../schemas/rivals.json"),
     include_str!("../../schemas/robot.json"),
     include_str!("../../schemas/scoreboard.json"),
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),
-    include_str!("../../schemas/finding_numbers.json"),
-    include_str!("../../schemas/findings.json"),
-    include_str!("../../schemas/rivals.json"),
-    include_str!("../../schemas/verdict.json"),
     include_str!("../../schemas/training.json"),
     include_str!("../../schemas/truth.json"),
+    include_str!("../../schemas/verdict.json"),
 ];
 
 static PARSED: LazyLock<BTreeMap<String, TableSchema>> = LazyLock::new(|| {

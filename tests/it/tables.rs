@@ -105,7 +105,8 @@ macro_rules! kinds {
         }
     };
 }
-kinds! { Document Fit Intake Network Observability Parameters Prediction Recording Rejected Robot Scoreboard Split Statistics Suspects Training Truth }
+kinds! { Document FindingNumbers Findings Fit Intake Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard Split
+ Statistics Suspects Training Truth Verdict }
 
 #[test]
 fn every_table_is_tested_and_has_exactly_one_schema() {
