@@ -106,7 +106,7 @@ macro_rules! kinds {
     };
 }
 kinds! { Document FindingNumbers Findings Fit Intake Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard Split
- Statistics Suspects Training Truth Verdict }
+Statistics Suspects Training Truth Verdict }
 
 #[test]
 fn every_table_is_tested_and_has_exactly_one_schema() {
