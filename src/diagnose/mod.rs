@@ -234,13 +234,3 @@ fn spreads(model: &Model, data: &Measurements) -> Vec<Matrix3<f64>> {
 fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
     spread.iter().map(|matrix| matrix * (sigma * sigma)).collect()
 }
-
-/// A stack like that of a model whose last effects are `forms`.
-fn stack_of(model: &Model, forms: &[Form]) -> EffectStack {
-    let setting = Setting { base: *model.stack.base(), load: Load::GravityTorque };
-    let count = model.stack.effects().count() - forms.len();
-    let base = model.stack.effects().take(count).filter_map(|(effect, _)| crate::effect::entry(effect.name()));
-    let base = base.map(|entry| (entry.make)(&setting));
-    let own = forms.iter().map(|form| Box::new(form.clone()) as Box<dyn Effect>);
-    EffectStack::new(&model.robot, setting.base, base.chain(own).collect())
-}

@@ -150,12 +150,7 @@ pub(crate) fn conclude(
         gate_first: looked.first,
         gate_last: looked.found.last,
         repeatability,
-        model: Model {
-            robot: last.model.robot.clone(),
-            stack: super::stack_of(&last.model, &last.forms),
-            x: last.model.x.clone(),
-            known: last.model.known.clone(),
-        },
+        model: last.model.clone(),
         fitted: last.fitted.clone(),
         kept: kept.clone(),
     }
