@@ -1,6 +1,7 @@
 //! `calib simulate`: recordings of a robot whose truth is known.
 
 mod conceal;
+mod prove;
 mod reveal;
 mod seal;
 
@@ -18,11 +19,13 @@ pub(super) struct SimulateArguments {
 enum SimulateVerb {
     Conceal(conceal::ConcealArguments),
     Reveal(reveal::RevealArguments),
+    Prove(prove::ProveArguments),
 }
 
 pub(super) fn main(arguments: &SimulateArguments) -> Result<()> {
     match &arguments.verb {
         SimulateVerb::Conceal(verb) => conceal::main(verb),
         SimulateVerb::Reveal(verb) => reveal::main(verb),
+        SimulateVerb::Prove(verb) => prove::main(verb),
     }
 }

@@ -270,3 +270,41 @@ fn the_scoreboard_is_a_table_with_a_row_for_each_effect() {
     let board = score(&set, &verdicts);
     assert_eq!(rows as u64, total(&board, "n") + 3, "three nulls have a row, too");
 }
+
+/// What is diagnosed already is not diagnosed again: with all verdicts at hand a proof reveals at once.
+#[test]
+fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (set, verdicts) = judged(root.path(), wanted);
+    std::fs::rename(verdicts, set.join("verdicts")).expect("moved");
+    let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/case/pipeline.yaml");
+    let prove = |cases: &str| {
+        calib(&[
+            "simulate",
+            "prove",
+            "--out",
+            &set.to_string_lossy(),
+            "--cases",
+            cases,
+            "--points",
+            "30",
+            "--nulls",
+            "0.25",
+            "--pairs",
+            "0.25",
+            "--open",
+            "0.1",
+            "--pipeline",
+            pipeline,
+            "--json",
+        ])
+    };
+    let done = prove("12");
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.success() && said.matches("diagnosed before").count() == 12, "{said}");
+    let board: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+    assert_eq!((&board["recordings"], &board["failures"]), (&json!(12), &json!([])));
+    let other = prove("11");
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("holds another set"));
+}

@@ -2,7 +2,7 @@
 
 use super::super::surroundings::cores;
 use super::super::{emit, emit_json};
-use super::seal::{RECORDINGS, SEALED, Seal};
+use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::threads::in_order;
 use crate::twin::conceal::case::Case;
@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct ConcealArguments {
     /// The folder to make; it must not exist, or be empty
     #[arg(long, short, value_name = "DIR")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// The same seed gives the same recordings
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -66,16 +66,31 @@ pub(super) struct ConcealArguments {
     jobs: Option<u16>,
     /// Prints one JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
+}
+
+impl ConcealArguments {
+    pub(super) fn threads(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
 }
 
 pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
     let design = design(arguments)?;
     vacant(&arguments.out)?;
-    let threads = arguments.jobs.map_or_else(cores, usize::from);
+    let points = make(arguments, &design)?;
+    let (recordings, seal) = (arguments.out.join(RECORDINGS), arguments.out.join(SEAL));
+    if arguments.json {
+        return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
+    }
+    emit(&format!("{} recordings, {points} points: {}\nseal: {}\n", design.cases, recordings.display(), seal.display()))
+}
+
+/// Writes the recordings, their truths and the seal; gives the number of points.
+pub(super) fn make(arguments: &ConcealArguments, design: &Design) -> Result<usize> {
     let contents = design.contents();
-    let made = in_order(threads, contents.len(), |number| written(&design, number, contents[number]));
-    let mut seal = Seal::new();
+    let made = in_order(arguments.threads(), contents.len(), |number| written(design, number, contents[number]));
+    let mut seal = Seal::new(design);
     let mut points = 0;
     for case in made {
         let case = case.map_err(|message| Error::spec("conceal", message))?;
@@ -85,12 +100,8 @@ pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
         seal.write(&arguments.out, format!("{SEALED}/{}.json", case.name), &case.sealed)?;
         points += case.points;
     }
-    let seal = seal.close(&arguments.out)?;
-    let recordings = arguments.out.join(RECORDINGS);
-    if arguments.json {
-        return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
-    }
-    emit(&format!("{} recordings, {points} points: {}\nseal: {}\n", design.cases, recordings.display(), seal.display()))
+    seal.close(&arguments.out)?;
+    Ok(points)
 }
 
 /// A case as it goes to the disk.
@@ -107,7 +118,7 @@ fn written(design: &Design, number: usize, content: Content) -> Result<Written, 
 }
 
 /// The design that the options state; fails with every fault of them.
-fn design(arguments: &ConcealArguments) -> Result<Design> {
+pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
     let mut faults = Vec::new();
     let shares = [
         ("--nulls", arguments.nulls),
@@ -158,7 +169,7 @@ fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {
 }
 
 /// Nothing is overwritten: the folder is new or empty.
-fn vacant(folder: &Path) -> Result<()> {
+pub(super) fn vacant(folder: &Path) -> Result<()> {
     let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if taken {
         return Err(Error::spec(folder.display().to_string(), "is not empty; name a new folder"));

@@ -1,6 +1,7 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
 use crate::error::{Error, Fault, Result};
+use crate::twin::conceal::design::Design;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -10,6 +11,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// The format of this file.
 const FORMAT: u32 = 1;
+const HASH: &str = "SHA-256";
 /// Where what belongs to a set lies in its folder.
 pub(super) const SEAL: &str = "seal.json";
 pub(super) const RECORDINGS: &str = "recordings";
@@ -21,12 +23,20 @@ pub(super) const SEALED: &str = "sealed";
 pub(super) struct Seal {
     calib_seal: u32,
     hash: String,
+    /// Hash of the design that the set was drawn from: who goes on with a set can tell that it is the same, and nothing else.
+    #[serde(default)]
+    design: String,
     files: BTreeMap<String, String>,
 }
 
 impl Seal {
-    pub(super) fn new() -> Seal {
-        Seal { calib_seal: FORMAT, hash: "SHA-256".into(), files: BTreeMap::new() }
+    pub(super) fn new(design: &Design) -> Seal {
+        Seal { calib_seal: FORMAT, hash: HASH.into(), design: digest(format!("{design:?}").as_bytes()), files: BTreeMap::new() }
+    }
+
+    /// Whether the set was drawn from this design.
+    pub(super) fn is_of(&self, design: &Design) -> bool {
+        self.design == Seal::new(design).design
     }
 
     /// Writes a file of the set below `folder` and takes its hash in.
@@ -41,16 +51,22 @@ impl Seal {
         Ok(())
     }
 
-    /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
-    /// their paths.
-    pub(super) fn check(folder: &Path) -> Result<Vec<String>> {
+    /// Reads the seal of a set.
+    pub(super) fn read(folder: &Path) -> Result<Seal> {
         let path = folder.join(SEAL);
         let place = path.display().to_string();
         let text = fs::read_to_string(&path).map_err(|error| Error::data(&place, error.to_string()))?;
         let seal: Seal = serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
-        if seal.calib_seal != FORMAT || seal.hash != Seal::new().hash {
-            return Err(Error::data(place, format!("is no seal of format {FORMAT} with SHA-256")));
+        if seal.calib_seal != FORMAT || seal.hash != HASH {
+            return Err(Error::data(place, format!("is no seal of format {FORMAT} with {HASH}")));
         }
+        Ok(seal)
+    }
+
+    /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
+    /// their paths.
+    pub(super) fn check(folder: &Path) -> Result<Vec<String>> {
+        let seal = Seal::read(folder)?;
         let mut faults = Vec::new();
         for (name, hash) in &seal.files {
             // A seal comes from a file: it may not lead out of its folder.

@@ -1,0 +1,104 @@
+//! `calib simulate prove`: conceals, has every recording diagnosed by a process that sees nothing else, and reveals.
+
+use super::super::{emit, emit_json};
+use super::conceal::{self, ConcealArguments};
+use super::reveal;
+use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
+use crate::error::{Error, Result};
+use crate::estimate::threads::in_order;
+use clap::Args;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Prove a diagnosis: conceal effects, diagnose every recording blind, reveal the truth and mark.
+///
+/// Makes the recordings as `conceal` does, runs `calib diagnose PIPELINE --set case=DIR/recordings/CASE --json` for each in a
+/// process of its own, keeps what it says in DIR/verdicts, and prints what `reveal` prints. Given again after an interruption
+/// it goes on with what is not yet diagnosed.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate prove --out proof --seed 7 --cases 60 --nulls 0.2 --pairs 0.2 --open 0.1
+  calib simulate prove --out gears --cases 30 --family gear_cyclic,gear_motor_cyclic --json > score.json")]
+pub(super) struct ProveArguments {
+    #[command(flatten)]
+    conceal: ConcealArguments,
+    /// The pipeline with a stage `diagnose` and a variable `case`
+    #[arg(long, value_name = "PIPELINE", default_value = "pipelines/case/pipeline.yaml")]
+    pipeline: PathBuf,
+    /// Prints no progress
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+const VERDICTS: &str = "verdicts";
+
+pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
+    let (design, folder) = (conceal::design(&arguments.conceal)?, &arguments.conceal.out);
+    if !arguments.pipeline.is_file() {
+        return Err(Error::spec("--pipeline", format!("no such file: {}", arguments.pipeline.display())));
+    }
+    if folder.join(SEAL).is_file() {
+        if !Seal::read(folder)?.is_of(&design) {
+            return Err(Error::spec(folder.display().to_string(), "holds another set; name a new folder, or give its options"));
+        }
+    } else {
+        conceal::vacant(folder)?;
+        conceal::make(&arguments.conceal, &design)?;
+    }
+    // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
+    let names: Vec<String> = Seal::check(folder)?.iter().filter_map(|name| case(name)).collect();
+    let store = |error: std::io::Error| Error::store(folder.join(VERDICTS).display().to_string(), error.to_string());
+    std::fs::create_dir_all(folder.join(VERDICTS)).map_err(store)?;
+    let program = std::env::current_exe().map_err(store)?;
+    let told = in_order(arguments.conceal.threads(), names.len(), |number| -> Result<()> {
+        let name = &names[number];
+        let said = diagnose(&program, arguments, name)?;
+        if !arguments.quiet {
+            let _ = writeln!(std::io::stderr(), "{name}: {said}");
+        }
+        Ok(())
+    });
+    told.into_iter().collect::<Result<()>>()?;
+    let sealed = Seal::check(folder)?;
+    let board = reveal::board(folder, &sealed, &folder.join(VERDICTS))?;
+    if arguments.conceal.json {
+        return emit_json(&board.document());
+    }
+    emit(&format!("the seal holds: {} files are as they were\n{}", sealed.len(), board.text()))
+}
+
+/// The case that a sealed truth is of.
+fn case(name: &str) -> Option<String> {
+    let path = Path::new(name);
+    let stem = path.starts_with(SEALED).then(|| path.file_stem())??;
+    Some(stem.to_string_lossy().into_owned())
+}
+
+/// Has one recording diagnosed and keeps the verdict; gives a line about it. Fails where the process cannot be started.
+fn diagnose(program: &Path, arguments: &ProveArguments, name: &str) -> Result<String> {
+    let folder = &arguments.conceal.out;
+    let verdict = folder.join(VERDICTS).join(format!("{name}.json"));
+    if verdict.is_file() {
+        return Ok("diagnosed before".into());
+    }
+    let fault = |error: std::io::Error| Error::store(verdict.display().to_string(), error.to_string());
+    // A variable of a pipeline is relative to its file.
+    let recording = std::path::absolute(folder.join(RECORDINGS).join(name)).map_err(fault)?;
+    let tables = folder.join(VERDICTS).join(name).with_extension("store");
+    let mut command = Command::new(program);
+    command.arg("diagnose").arg(&arguments.pipeline).arg("--set").arg(format!("case={}", recording.display()));
+    command.args(["--json", "--quiet", "--jobs", "1", "--store"]).arg(&tables).stdin(Stdio::null());
+    let done = command.output().map_err(fault)?;
+    let _ = std::fs::remove_dir_all(&tables);
+    if !done.status.success() {
+        let why = String::from_utf8_lossy(&done.stderr);
+        return Ok(format!("no verdict: {}", why.lines().last().unwrap_or("the process failed")));
+    }
+    // Renamed when whole: an interruption leaves no half verdict.
+    let part = verdict.with_extension("part");
+    std::fs::write(&part, &done.stdout).and_then(|()| std::fs::rename(&part, &verdict)).map_err(fault)?;
+    let answer: Option<serde_json::Value> = serde_json::from_slice(&done.stdout).ok();
+    let said = answer.as_ref().and_then(|answer| answer.get("verdict")?.as_str()).unwrap_or("a verdict that is no JSON");
+    Ok(said.chars().filter(|c| !c.is_control()).collect())
+}
