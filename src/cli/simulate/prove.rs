@@ -93,7 +93,7 @@ fn diagnose(program: &Path, arguments: &ProveArguments, name: &str) -> Result<St
     let _ = std::fs::remove_dir_all(&tables);
     if !done.status.success() {
         let why = String::from_utf8_lossy(&done.stderr);
-        return Ok(format!("no verdict: {}", why.lines().last().unwrap_or("the process failed")));
+        return Ok(format!("no verdict: {}", why.lines().next().unwrap_or("the process failed")));
     }
     // Renamed when whole: an interruption leaves no half verdict.
     let part = verdict.with_extension("part");
