@@ -23,8 +23,13 @@ import time
 RECORDING = {"outlier", "mislabelled_point"}
 
 
+def one_wind_up(found):
+    """Hardening of a joint includes its compliance, whether or not that is named too."""
+    return frozenset(e for e in found if not (e[0] == "joint_compliance" and ("joint_hardening", e[1]) in found))
+
+
 def pairs(effects):
-    return frozenset((e["effect"], e["where"]) for e in effects)
+    return one_wind_up({(e["effect"], e["where"]) for e in effects})
 
 
 def answer(case):
@@ -41,8 +46,18 @@ def answer(case):
     others = [pairs(e) for e in told.get("accept", [])]
     # A sealed answer lists single effects that may stand for the one that nothing else tells from them.
     for other in pairs(told.get("accepted", [])):
-        others += [want - {w} | {other} for w in sorted(want) if w[0] not in {"joint_compliance", *RECORDING}]
+        others += [one_wind_up(want - {w} | {other}) for w in sorted(want) if w[0] not in {"joint_compliance", *RECORDING}]
     return [want, *others]
+
+
+def faint(case):
+    """Effects that the truth says are too small to be seen: L below 50."""
+    for file in (case / "truth.json", case.parent / "sealed" / f"{case.name}.json", case.parent.parent / "sealed" / f"{case.name}.json"):
+        if file.exists():
+            effects = json.loads(file.read_text()).get("effects", [])
+            names = [(tuple(e["want"]) if "want" in e else (e.get("effect"), e.get("where")), e.get("L")) for e in effects]
+            return {name for name, L in names if L is not None and L < 50}
+    return set()
 
 
 def grade(wants, findings):
@@ -69,6 +84,12 @@ def covered(wants, findings):
     return any(w <= near for w in wants)
 
 
+def complaint(text):
+    """What a program said before it gave up, without the frames of a backtrace."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("at ") and not line.lstrip()[:3].rstrip(":").isdigit()]
+    return "\n".join(lines[:6])[:800]
+
+
 def run(case, args):
     want = answer(case)
     out = {"case": case.name, "want": None if want is None else [sorted(w) for w in want]}
@@ -90,7 +111,7 @@ def run(case, args):
             text = done.stdout
             out["answer"] = json.loads(text[text.index("{"):]) if "{" in text else None
             if out["answer"] is None or "findings" not in out["answer"]:
-                out["error"] = (done.stderr[-600:] or text[-600:]).strip()
+                out["error"] = complaint(done.stderr or text)
         except subprocess.TimeoutExpired:
             out.update(seconds=args.timeout, code=None, error=f"longer than {args.timeout} s", answer=None)
         except ValueError as bad:
@@ -102,11 +123,13 @@ def run(case, args):
         out["grade"] = grade(want, findings)
         out["physics"] = grade([frozenset(e for e in w if e[0] not in RECORDING) for w in want], physics)
         out["covered"] = covered(want, findings)
+        small = faint(case)
+        out["fair"] = any(w - small == pairs(findings) - small for w in want)
         out["null"] = not any(e[0] not in RECORDING for e in want[0])
         out["alarm"] = out["null"] and bool(physics)
     else:
         out["grade"] = out["physics"] = "failed"
-        out["covered"], out["null"], out["alarm"] = False, bool(want is not None and not want[0]), False
+        out["covered"], out["fair"], out["null"], out["alarm"] = False, False, bool(want is not None and not want[0]), False
     return out
 
 
@@ -165,7 +188,7 @@ def main():
     print(f"== {args.cases}: {n} cases")
     print("   " + ", ".join(f"{g} {count(lambda r: r['grade'] == g)}" for g in ("exact", "rival", "extra", "missing", "wrong", "failed")))
     print(f"   exact {count(lambda r: r['grade'] == 'exact') / n:.1%}; exact without outliers and exchanged points {count(lambda r: r['physics'] == 'exact') / n:.1%}; "
-          f"wanted within findings and rivals {count(lambda r: r['covered']) / n:.1%}")
+          f"wanted within findings and rivals {count(lambda r: r['covered']) / n:.1%}; exact where effects of L < 50 need not be named {count(lambda r: r['fair']) / n:.1%}")
     if nulls:
         print(f"   false alarms on nulls {sum(r['alarm'] for r in nulls)} of {len(nulls)}")
     if real:
