@@ -53,7 +53,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
-        Verb::Simulate(verb) => simulate::main(&verb),
+        Verb::Simulate(verb) => simulate::main(&verb, &arguments),
     };
     match result {
         Ok(()) => 0,

@@ -2,13 +2,15 @@
 
 mod conceal;
 mod prove;
+mod record;
 mod reveal;
 mod seal;
 
 use crate::error::Result;
 use clap::{Args, Subcommand};
+use std::ffi::OsString;
 
-/// Make recordings of a simulated robot with hidden effects, and mark what a diagnosis made of them.
+/// Make recordings of a simulated robot with stated or hidden effects, and mark what a diagnosis made of them.
 #[derive(Args)]
 pub(super) struct SimulateArguments {
     #[command(subcommand)]
@@ -17,13 +19,15 @@ pub(super) struct SimulateArguments {
 
 #[derive(Subcommand)]
 enum SimulateVerb {
+    Record(record::RecordArguments),
     Conceal(conceal::ConcealArguments),
     Reveal(reveal::RevealArguments),
     Prove(prove::ProveArguments),
 }
 
-pub(super) fn main(arguments: &SimulateArguments) -> Result<()> {
+pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> Result<()> {
     match &arguments.verb {
+        SimulateVerb::Record(verb) => record::main(verb, command_line),
         SimulateVerb::Conceal(verb) => conceal::main(verb),
         SimulateVerb::Reveal(verb) => reveal::main(verb),
         SimulateVerb::Prove(verb) => prove::main(verb),

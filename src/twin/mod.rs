@@ -7,6 +7,7 @@
 pub mod arm;
 pub mod conceal;
 pub mod effect;
+pub mod folder;
 pub mod matrix;
 pub mod noise;
 pub mod plan;

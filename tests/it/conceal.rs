@@ -308,3 +308,67 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
     assert_eq!(other.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&other.stderr).contains("holds another set"));
 }
+
+const STATED: &str = "
+calib: 1
+name: stated
+seed: 3
+stages:
+  - uses: robot
+    with: {file: robot.yaml}
+  - uses: simulate
+    with:
+      truth: {ratio: [1, 1.0013, 1, 1, 0.9996, 1], offset_deg: [0.02, -0.01, 0.03, 0, 0.01, 0]}
+      effects: [{backlash: {joint: 2, gap_arcsec: 60}}]
+      poses: {range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]]}
+      blocks: [{usage: fit, points: 60}, {usage: validate, points: 40}]
+";
+
+/// Without its effect the estimator fits the written twin to the noise, with it to what backlash leaves: the files say what was
+/// simulated.
+#[test]
+fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
+    let root = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| root.path().join(name).to_string_lossy().into_owned();
+    let pipelines = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines");
+    std::fs::copy(format!("{pipelines}/sr210d/robot.yaml"), path("robot.yaml")).expect("a robot");
+    std::fs::write(path("stated.yaml"), STATED).expect("a pipeline");
+    let record = |out: &str, remainder: &str| {
+        let remainder = format!("simulate.remainder={remainder}");
+        calib(&[
+            "simulate",
+            "record",
+            &path("stated.yaml"),
+            "--out",
+            &path(out),
+            "--store",
+            &path("store"),
+            "--set",
+            &remainder,
+            "--quiet",
+        ])
+    };
+    let held_out = |out: &str| {
+        let (case, variable) = (format!("{pipelines}/case/pipeline.yaml"), format!("case={}", path(out)));
+        let done =
+            calib(&["run", &case, "--set", &variable, "--store", &path("store"), "--until", "validate", "--json", "--quiet"]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let document: Value = serde_json::from_slice(&done.stdout).expect("JSON");
+        let rows = document["statistics"].as_array().expect("statistics").clone();
+        let row = rows.iter().find(|row| row["step"] == "geometry" && row["set"] == "validate").expect("a row").clone();
+        row["rms_mm"].as_f64().expect("a number") / row["noise_rms_mm"].as_f64().expect("a number")
+    };
+    for (out, remainder) in [("bare", "none"), ("worn", "all")] {
+        let done = record(out, remainder);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    }
+    // 60 points leave the 34 numbers of geometry uncertain by a quarter of the noise; 30 arcsec at 2 m are 0.3 mm.
+    let (bare, worn) = (held_out("bare"), held_out("worn"));
+    assert!((0.85..1.35).contains(&bare), "{bare}");
+    assert!(worn > 5.0 * bare, "{worn} against {bare}");
+
+    let truth = std::fs::read_to_string(root.path().join("worn/truth.csv")).expect("true numbers");
+    assert!(truth.contains("\nbacklash.j2.gap,backlash,joint 2,arcsec,60\n"), "{truth}");
+    let again = record("worn", "all");
+    assert!(again.status.code() == Some(2) && String::from_utf8_lossy(&again.stderr).contains("is not empty"));
+}

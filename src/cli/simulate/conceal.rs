@@ -114,7 +114,7 @@ struct Written {
 
 fn written(design: &Design, number: usize, content: Content) -> Result<Written, String> {
     let case = Case::make(design, number, content)?;
-    Ok(Written { recording: case.recording(), sealed: case.sealed(), points: case.shots.len(), name: case.name })
+    Ok(Written { recording: case.recording()?, sealed: case.sealed(), points: case.shots.len(), name: case.name })
 }
 
 /// The design that the options state; fails with every fault of them.

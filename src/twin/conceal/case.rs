@@ -158,7 +158,16 @@ impl Case {
 
     /// What a diagnosis should name: effect and place, strongest first, tampering last.
     pub fn want(&self) -> Vec<(&'static str, String)> {
-        let mut causes: Vec<&Concealed> = self.concealed.iter().collect();
+        self.names(|one| one.cause.wanted)
+    }
+
+    /// The same with what only goes along with it.
+    pub fn want_all(&self) -> Vec<(&'static str, String)> {
+        self.names(|_| true)
+    }
+
+    fn names(&self, which: fn(&Concealed) -> bool) -> Vec<(&'static str, String)> {
+        let mut causes: Vec<&Concealed> = self.concealed.iter().filter(|one| which(one)).collect();
         causes.sort_by(|a, b| b.strength.total_cmp(&a.strength));
         let named = causes.into_iter().map(|one| (one.cause.effect, one.cause.place.clone()));
         named.chain(self.tampered.iter().map(|one| (one.effect, "recording".to_string()))).collect()
@@ -242,10 +251,12 @@ fn aim(draw: &mut Noise) -> f64 {
         u if u < 0.1 => draw.size(1.0, 5.0),
         u if u < 0.25 => draw.size(5.0, 50.0),
         u if u < 0.85 => draw.size(50.0, 1000.0),
-        _ => draw.size(1000.0, 5000.0),
+        _ => draw.size(1000.0, PLAINEST),
     }
 }
 
+/// The largest visibility of an effect whose size may be changed.
+const PLAINEST: f64 = 5000.0;
 /// Bounds of the factor on a natural size.
 const SMALLEST: f64 = 2e-3;
 const LARGEST: f64 = 4.0;
@@ -258,11 +269,13 @@ fn size(design: &Design, drafts: &[Draft], site: &Site, shadow: &Shadow, noise: 
     for index in 0..causes.len() {
         let natural = draw.chance(design.natural);
         let wanted = aim(draw);
-        if !causes[index].0.sized || natural {
+        if !causes[index].0.sized {
             continue;
         }
-        let left = shadow.outside(alone(&causes, index, site));
-        let factor = (wanted / strength(&left).max(1e-9)).sqrt().clamp(SMALLEST, LARGEST);
+        let found = strength(&shadow.outside(alone(&causes, index, site))).max(1e-9);
+        // What is of natural size stays so, but where it would be too plain to test anything.
+        let wanted = if natural { found.min(PLAINEST) } else { wanted };
+        let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
         let cause = &mut causes[index].0;
         cause.physical = cause.physical.iter().map(|effect| effect.scaled(factor)).collect();
     }

@@ -33,6 +33,8 @@ pub struct Cause {
     pub physical: Vec<Physical>,
     /// Its size may be changed to reach a visibility.
     pub sized: bool,
+    /// Must be named; what only goes along with another cause may be.
+    pub wanted: bool,
 }
 
 /// What a family has drawn.
@@ -69,12 +71,12 @@ impl Draft {
 
 /// A cause whose size may be changed.
 fn sized(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause { effect, place, physical, sized: true }
+    Cause { effect, place, physical, sized: true, wanted: true }
 }
 
 /// A cause of the size that it was drawn with.
 fn fixed(effect: &'static str, place: String, physical: Vec<Physical>) -> Cause {
-    Cause { effect, place, physical, sized: false }
+    Cause { effect, place, physical, sized: false, wanted: true }
 }
 
 fn joint(number: usize) -> String {

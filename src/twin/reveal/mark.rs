@@ -129,7 +129,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     }
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
-    let causes = truth.effects.iter().map(|cause| {
+    let causes = truth.effects.iter().filter(|cause| cause.wanted).map(|cause| {
         let own = atoms(&cause.effect, &cause.place);
         let outcome = if own.is_subset(&found) {
             Outcome::Exact

@@ -28,11 +28,18 @@ pub struct Cause {
     #[serde(rename = "where")]
     pub place: String,
     pub form: String,
+    /// False for what goes along with another cause: it may be named, or counted to that one.
+    #[serde(default = "yes")]
+    pub wanted: bool,
     /// Squared visible displacement over the noise's variance.
     #[serde(rename = "L")]
     pub strength: f64,
     pub visible_rms_mm: f64,
     pub parameters: Vec<Number>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 #[derive(Debug, Clone, PartialEq, Deserialize)]

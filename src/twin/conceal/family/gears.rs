@@ -38,6 +38,8 @@ pub(super) fn joint_hardening(bench: &Bench, form: Form, draw: &mut Noise) -> Op
     };
     let curve = Physical::JointHardening(JointHardening { joint: number, curve, amplitude_arcsec, scale_nm });
     let linear = fixed("joint_compliance", joint(number), vec![spring(bench, number, draw.size(150.0, 300.0))]);
+    // Whoever names the curve may count its slope to it.
+    let linear = Cause { wanted: false, ..linear };
     Some(Draft::new(name, vec![sized("joint_hardening", joint(number), vec![curve]), linear]))
 }
 

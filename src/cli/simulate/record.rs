@@ -1,0 +1,111 @@
+//! `calib simulate record`: a pipeline's twin as the files that a user has.
+
+use super::super::surroundings::{cores, default_store, surroundings};
+use super::super::{emit, emit_json};
+use super::conceal::vacant;
+use crate::error::{Error, Result};
+use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::progress::{Progress, Verbosity};
+use crate::stage::{STAGES, Simulate, Stage};
+use crate::store::Store;
+use crate::table::{Recording, Robot, Table, Truth};
+use crate::twin::folder::{self, Decimals, Log};
+use clap::Args;
+use serde_json::json;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Record an experiment on a robot with stated effects.
+///
+/// Runs the stage `simulate` of a pipeline and what it needs, and writes what a user of that robot would have: robot.json,
+/// controller.csv and tracker.csv, and beside them truth.csv with every true number. Joints and points keep 9 decimals.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib simulate record pipelines/sr210d/pipeline.yaml --out sr210d
+  calib simulate record twin.yaml --out monday --set seed=7 --set simulate.remainder=none")]
+pub(super) struct RecordArguments {
+    /// The pipeline's YAML file, with a stage `simulate`
+    #[arg(value_name = "PIPELINE")]
+    pipeline: PathBuf,
+    /// The folder to make; it must not exist, or be empty
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Prints no progress
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// 1e-9 deg is 0.00005 um at 3 m.
+const DECIMALS: Decimals = Decimals { angle: 9, length: 9 };
+
+pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Result<()> {
+    let place = arguments.pipeline.display().to_string();
+    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
+    let stage = plan.stages.iter().position(|stage| stage.entry.name == Simulate::NAME);
+    let Some(stage) = stage else { return Err(Error::spec(place, "has no stage `simulate`")) };
+    vacant(&arguments.out)?;
+    let plan = plan.needed_for(stage);
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
+    let options = RunOptions { selection: Selection::default(), jobs: cores() };
+    let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
+    progress.finish();
+    let outcome = result?;
+    let robot = table::<Robot>(&outcome, &store)?.to_description()?;
+    let (recording, truth): (Recording, Truth) = (table(&outcome, &store)?, table(&outcome, &store)?);
+    let rows = recording.rows();
+    let log = log(recording);
+    let description = folder::robot(&robot).map_err(|fault| Error::spec(&place, fault))?;
+    let mut numbers = "name,effect,where,unit,value\n".to_string();
+    for row in &truth.0 {
+        numbers.push_str(&format!("{},{},{},{},{}\n", row.name, row.effect, row.place, row.unit, row.value));
+    }
+    let fault = |error: std::io::Error| Error::store(arguments.out.display().to_string(), error.to_string());
+    std::fs::create_dir_all(&arguments.out).map_err(fault)?;
+    let files = [
+        ("robot.json", description),
+        ("controller.csv", log.controller(DECIMALS)),
+        ("tracker.csv", log.tracker(DECIMALS)),
+        ("truth.csv", numbers),
+    ];
+    for (name, text) in files {
+        std::fs::write(arguments.out.join(name), text).map_err(fault)?;
+    }
+    if arguments.json {
+        return emit_json(&json!({ "folder": arguments.out, "points": rows, "true_numbers": truth.0.len() }));
+    }
+    emit(&format!("{rows} points, {} true numbers: {}\n", truth.0.len(), arguments.out.display()))
+}
+
+fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {
+    let last = outcome.tables(T::KIND).last();
+    let output = last.ok_or_else(|| Error::Bug(format!("a simulation without a table {}", T::KIND)))?;
+    T::from_frame(&store.load(&output.table)?)
+}
+
+/// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.
+fn log(recording: Recording) -> Log {
+    let rows = recording.rows();
+    Log {
+        joints: recording.joints,
+        time_s: recording.time,
+        usage: recording.usage.into_iter().map(Option::unwrap_or_default).collect(),
+        payload_kg: recording.payload.unwrap_or_else(|| vec![0.0; rows]),
+        q: recording.q,
+        current: recording.current,
+        direction: recording.direction,
+        temperature_c: recording.temperature,
+        position: recording.position,
+        id: recording.point_id,
+    }
+}
