@@ -7,7 +7,7 @@ use super::known::Opinion;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
-use super::problem::{HUBER, Problem, Weight};
+use super::problem::{Evaluation, HUBER, Problem, Weight};
 use super::repeats::{Poses, Repeated};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -68,6 +68,10 @@ const MEDIAN_CHI2_3: f64 = 2.366;
 const ITERATIONS: usize = 60;
 /// Steps of the first round, which only finds out how large the residual is and what it lets one see.
 const FIRST_ITERATIONS: usize = 4;
+/// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
+const CLEARLY: f64 = 10.0;
+/// ... and where each lowers the cost by this: five sigmas, so that hundreds of robots of one kind keep one set of parameters.
+const WORTH: f64 = 12.5;
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
 const REPEATING: usize = 4;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
@@ -78,50 +82,20 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let specs = model.stack.specs().to_vec();
     let prior = |set: &[usize]| set.iter().map(|k| specs[*k].prior_sigma).collect::<Vec<_>>();
     let mut problem = Problem { data, rows: options.rows, unmodelled: 0.0 };
-    let mut course = Vec::new();
-    let mut candidates = options.candidates.to_vec();
-    let mut fates: Vec<Fate> = vec![Fate::Kept; specs.len()];
-    let mut last: Option<(Stop, Vec<usize>)> = None;
-
     for k in options.candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
-    let mut sight = problem.evaluate(model, &candidates);
+    let sight = problem.evaluate(model, options.candidates);
     problem.unmodelled = unmodelled(&problem, &sight.residuals, 0);
-    for round in 0..ROUNDS {
-        let seen = visibility(&sight.factor, &prior(&candidates));
-        for (k, verdict) in candidates.iter().zip(&seen) {
-            fates[*k] = match verdict {
-                Visibility::Seen => Fate::Free(f64::NAN),
-                Visibility::Unseen => Fate::Unseen,
-                Visibility::Redundant(with) => Fate::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect()),
-            };
-        }
-        let free: Vec<usize> = candidates.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
-        // What is dropped goes back to what was known beforehand and stays there.
-        for k in &candidates {
-            if !free.contains(k) {
-                model.x[*k] = model.rest(*k);
-            }
-        }
-        let weighted_so = round > 0 || problem.unmodelled == 0.0;
-        let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
-        let limit = if round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
-        let (steps, stop, end) = minimise(&problem, model, &free, start, limit);
-        course.extend(steps);
-        let next = unmodelled(&problem, &end.residuals, free.len());
-        let settled = (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();
-        problem.unmodelled = next;
-        candidates = free.clone();
-        last = Some((stop, free));
-        if settled {
-            break;
-        }
-        sight = problem.evaluate(model, &candidates);
+    let mut search =
+        Search { fates: vec![Fate::Kept; specs.len()], course: Vec::new(), stop: Stop::NothingFree, free: Vec::new() };
+    search.settle(&mut problem, model, options.candidates, sight, true);
+    let mut all = problem.observe(model, options.candidates);
+    if search.reconsider(&mut problem, model, options.candidates, &all) {
+        all = problem.observe(model, options.candidates);
     }
-    let (stop, free) = last.expect("at least one round");
-    let all = problem.observe(model, options.candidates);
+    let Search { mut fates, course, stop, free } = search;
     let errors = problem.errors(&all.residuals);
     let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
@@ -170,6 +144,85 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         indices: indices(&singular, options.rows.len()),
         singular,
         singular_all,
+    }
+}
+
+/// The way to a minimum in what the data see.
+struct Search {
+    fates: Vec<Fate>,
+    course: Vec<Iteration>,
+    stop: Stop,
+    /// What was estimated last.
+    free: Vec<usize>,
+}
+
+impl Search {
+    /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
+    /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
+    fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: &Evaluation) -> bool {
+        // What is estimated comes first, so that only what it cannot do counts as new.
+        let (sight, _) = model.with_priors(candidates, all.factor.clone());
+        let mut order: Vec<usize> = (0..candidates.len()).collect();
+        order.sort_by_key(|j| !self.free.contains(&candidates[*j]));
+        let wary = order.iter().map(|j| model.stack.specs()[candidates[*j]].prior_sigma / CLEARLY).collect::<Vec<_>>();
+        let seen = visibility(&sight.select(&order), &wary);
+        let known = self.free.len();
+        let new: Vec<usize> =
+            order.iter().zip(&seen).skip(known).filter(|(_, v)| **v == Visibility::Seen).map(|(j, _)| candidates[*j]).collect();
+        if new.is_empty() {
+            return false;
+        }
+        let free: Vec<usize> = candidates.iter().copied().filter(|k| self.free.contains(k) || new.contains(k)).collect();
+        let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
+        let cost = start.cost;
+        let (_, stop, end) = minimise(problem, model, &free, start, ITERATIONS);
+        if stop != Stop::Converged || cost - end.cost < WORTH * new.len() as f64 {
+            model.x = before;
+            return false;
+        }
+        self.settle(problem, model, &free, end, false);
+        true
+    }
+
+    /// Rounds of choosing what is seen of the candidates, fitting it, and learning how much stays unmodelled, from `sight`, the
+    /// problem in all candidates; far from the solution at the `first` time.
+    fn settle(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], mut sight: Evaluation, first: bool) {
+        let mut candidates = candidates.to_vec();
+        for round in 0..ROUNDS {
+            let prior: Vec<f64> = candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
+            let seen = visibility(&sight.factor, &prior);
+            for (k, verdict) in candidates.iter().zip(&seen) {
+                self.fates[*k] = match verdict {
+                    Visibility::Seen => Fate::Free(f64::NAN),
+                    Visibility::Unseen => Fate::Unseen,
+                    Visibility::Redundant(with) => {
+                        Fate::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect())
+                    }
+                };
+            }
+            let free: Vec<usize> =
+                candidates.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
+            // What is dropped goes back to what was known beforehand and stays there.
+            for k in candidates.iter().filter(|k| !free.contains(k)) {
+                model.x[*k] = model.rest(*k);
+            }
+            let weighted_so = !first || round > 0 || problem.unmodelled == 0.0;
+            let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
+            let limit = if first && round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
+            let (steps, stop, end) = minimise(problem, model, &free, start, limit);
+            self.course.extend(steps);
+            self.stop = stop;
+            let next = unmodelled(problem, &end.residuals, free.len());
+            let settled =
+                (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();
+            problem.unmodelled = next;
+            self.free.clone_from(&free);
+            candidates = free;
+            if settled {
+                break;
+            }
+            sight = problem.evaluate(model, &candidates);
+        }
     }
 }
 

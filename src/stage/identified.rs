@@ -3,6 +3,7 @@
 use crate::effect::Load;
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
 use crate::robot::{Measurements, RobotModel};
+use crate::stage::advice::advice;
 use crate::stage::{Context, repeated, screened};
 use crate::table::{Beside, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
@@ -164,13 +165,14 @@ impl Identified {
         let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
+        let advice = advice(context, model, fitting.data, fitting.rows, fitted);
         let beside = Beside {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
         };
         Self {
-            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier),
+            parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier).with_advice(&advice),
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, &beside),
             prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)

@@ -1,5 +1,6 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
+mod advice;
 mod diagnose;
 mod identified;
 mod identify;

@@ -33,6 +33,7 @@ use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
@@ -111,6 +112,16 @@ impl Parameters {
         }
         rows.sort_by(|a, b| a.name.cmp(&b.name));
         Self(rows)
+    }
+
+    /// The same with what would show a parameter (by name) added to its remark.
+    pub fn with_advice(mut self, advice: &BTreeMap<String, String>) -> Self {
+        for row in &mut self.0 {
+            if let Some(sentence) = advice.get(&row.name) {
+                row.remark = Some(row.remark.take().map_or_else(|| sentence.clone(), |remark| format!("{remark}; {sentence}")));
+            }
+        }
+        self
     }
 
     /// The effects of this model, in the registry's order.

@@ -17,6 +17,7 @@ mod parameter_sets;
 mod pipelines;
 mod poses;
 mod readme;
+mod remedies;
 mod repeats;
 mod report;
 mod resume;

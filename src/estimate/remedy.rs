@@ -1,0 +1,159 @@
+//! What would show a parameter that the data do not: each possible measurement is tried on the model, no rule is written down.
+//!
+//! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
+//! beside the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
+
+use super::factor::Factor;
+use super::fit::{Fate, Fitted};
+use super::model::Model;
+use super::observe::{Visibility, visibility};
+use super::problem::Problem;
+use crate::robot::{Measurements, RobotModel};
+use faer::Mat;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// What one would have to measure.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Remedy {
+    /// Joints (from 0) that hardly moved; all over the ranges of all where empty.
+    Move(Vec<usize>),
+    /// Poses with and without the declared payload.
+    Payload,
+    /// A second target beside the axis of the last joint.
+    SecondTarget,
+    /// Nothing of these: every measured point is the same whichever of the parameters is off.
+    Nothing,
+}
+
+/// So many poses are tried at least and at most, about as many as the recording has.
+const FEWEST: usize = 60;
+const MOST: usize = 300;
+/// A joint that used less than this share of its range hardly moved.
+const HARDLY: f64 = 0.25;
+/// A remedy has to show a parameter this many times better than its prior sigma.
+const CLEARLY: f64 = 3.0;
+/// The second target beside the last axis, m.
+const BESIDE: f64 = 0.1;
+/// Where a target sits on a tool is known to this before any measurement, m.
+const TARGET_PRIOR: f64 = 0.1;
+
+/// What would show each redundant or unseen parameter of a fit to `rows`.
+pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> BTreeMap<usize, Remedy> {
+    let estimated = |k: &usize| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_));
+    let hidden = |k: &usize| matches!(fitted.fates[*k], Fate::Redundant(_) | Fate::Unseen);
+    let count = fitted.fates.len();
+    let mut candidates: Vec<usize> = (0..count).filter(estimated).collect();
+    let known = candidates.len();
+    candidates.extend((0..count).filter(hidden));
+    if candidates.len() == known || rows.is_empty() {
+        return BTreeMap::new();
+    }
+    let at = |model: &Model, data: &Measurements| {
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        Problem { data, rows: &rows, unmodelled: fitted.unmodelled }.observe(model, &candidates).factor
+    };
+    let own = Problem { data, rows, unmodelled: fitted.unmodelled }.observe(model, &candidates).factor;
+    let declared = model.robot.description().payload_mass;
+    let usual = data.payload[rows[0]];
+    let spread = at(model, &poses(model, data, rows, &[usual]));
+    let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
+    let target = at(&beside(model), &poses(model, data, rows, &[usual]));
+    let specs = model.stack.specs();
+    let tool: Vec<bool> = candidates.iter().map(|k| specs[*k].name.starts_with("tool_offset.")).collect();
+    let prior: Vec<f64> = candidates.iter().map(|k| specs[*k].prior_sigma).collect();
+    let none = vec![false; candidates.len()];
+    let tried = [
+        (Remedy::Move(lazy(model, data, rows)), Some(shown(&own, &spread, &none, &prior, known))),
+        (Remedy::Payload, loaded.map(|loaded| shown(&own, &loaded, &none, &prior, known))),
+        (Remedy::SecondTarget, Some(shown(&own, &target, &tool, &prior, known))),
+    ];
+    let mut out = BTreeMap::new();
+    for (j, k) in candidates.iter().enumerate().skip(known) {
+        let first = tried.iter().find(|(_, shown)| shown.as_ref().is_some_and(|shown| shown[j - known]));
+        out.insert(*k, first.map_or(Remedy::Nothing, |(remedy, _)| remedy.clone()));
+    }
+    out
+}
+
+/// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
+fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
+    let p = prior.len();
+    let new: Vec<usize> = (0..p).filter(|j| apart[*j]).collect();
+    // Estimated ones, new ones, then those in question.
+    let place = |j: usize| if j < known { j } else { j + new.len() };
+    let mut rows = Mat::zeros(2 * p, p + new.len() + 1);
+    for j in 0..p {
+        let second = new.iter().position(|other| *other == j).map_or(place(j), |extra| known + extra);
+        for (i, (one, other)) in own.column(j).into_iter().zip(more.column(j)).enumerate() {
+            rows[(i, place(j))] = one;
+            rows[(p + i, second)] = other;
+        }
+    }
+    let mut sigma = vec![TARGET_PRIOR; p + new.len()];
+    for (j, prior) in prior.iter().enumerate() {
+        sigma[place(j)] = prior / CLEARLY;
+    }
+    let seen = visibility(&Factor::of(&rows), &sigma);
+    seen[known + new.len()..].iter().map(|verdict| *verdict == Visibility::Seen).collect()
+}
+
+/// Poses all over the joints' ranges (an additive recurrence: even and reproducible), under the payloads in turn.
+fn poses(model: &Model, data: &Measurements, rows: &[usize], payloads: &[f64]) -> Measurements {
+    let joints = data.joints;
+    let count = rows.len().clamp(FEWEST, MOST);
+    // The root of x^(d+1) = x + 1.
+    let mut root: f64 = 2.0;
+    for _ in 0..60 {
+        root = (1.0 + root).powf(1.0 / (joints as f64 + 1.0));
+    }
+    let ranges: Vec<[f64; 2]> = (0..joints).map(|joint| range(model, data, rows, joint)).collect();
+    let sigma = rows.iter().map(|row| data.sigma[*row]).sum::<Vector3<f64>>() / rows.len() as f64;
+    let mut q = Vec::with_capacity(count * joints);
+    for i in 0..count {
+        for (joint, [low, high]) in ranges.iter().enumerate() {
+            let share = (0.5 + (i + 1) as f64 * root.powi(-(joint as i32 + 1))).fract();
+            q.push(low + (high - low) * share);
+        }
+    }
+    Measurements {
+        joints,
+        q,
+        position: vec![Vector3::zeros(); count],
+        sigma: vec![sigma; count],
+        payload: (0..count).map(|i| payloads[i % payloads.len()]).collect(),
+        ..Measurements::default()
+    }
+}
+
+/// The limits of a joint; without any a turn of a revolute one, the range used of a prismatic one.
+fn range(model: &Model, data: &Measurements, rows: &[usize], joint: usize) -> [f64; 2] {
+    let limits = model.robot.description().joints[joint].limits;
+    limits.unwrap_or_else(|| {
+        if model.robot.is_revolute(joint) { [-std::f64::consts::PI, std::f64::consts::PI] } else { used(data, rows, joint) }
+    })
+}
+
+fn used(data: &Measurements, rows: &[usize], joint: usize) -> [f64; 2] {
+    let values = rows.iter().map(|row| data.q(*row)[joint]);
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+}
+
+fn lazy(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<usize> {
+    let hardly = |joint: &usize| {
+        let ([low, high], [from, to]) = (used(data, rows, *joint), range(model, data, rows, *joint));
+        high - low < HARDLY * (to - from)
+    };
+    (0..data.joints).filter(hardly).collect()
+}
+
+/// The same robot with its target moved beside the last axis.
+fn beside(model: &Model) -> Model {
+    let last = model.robot.joints() - 1;
+    let axis = model.robot.axis(last);
+    let across = if axis.x.abs() < 0.6 { axis.cross(&Vector3::x()) } else { axis.cross(&Vector3::y()) };
+    let mut description = model.robot.description().clone();
+    let moved = Vector3::from(description.tool) + across.normalize() * BESIDE;
+    description.tool = moved.into();
+    Model { robot: RobotModel::new(description), ..model.clone() }
+}
