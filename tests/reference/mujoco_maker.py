@@ -172,7 +172,10 @@ def make(folder, seed, robot, family, options):
     (folder / "robot.json").write_text(json.dumps({k: robot[k] for k in keys}, indent=1) + "\n")
     sets = alternatives(effects, near)
     extra = ([("outlier", "recording")] if outliers else []) + ([("mislabelled_point", "recording")] if exchanged else [])
-    (folder / "want.json").write_text(json.dumps(dict(case=folder.name, effects=named(sets[0] + extra), accept=[named(s + extra) for s in sets[1:]]), indent=1) + "\n")
+    accept = [s + extra for s in sets[1:]]
+    if "lag" in kinds and not outliers:  # nobody knows from where the arm came to the first point
+        accept += [s + [("outlier", "recording")] + extra for s in sets]
+    (folder / "want.json").write_text(json.dumps(dict(case=folder.name, effects=named(sets[0] + extra), accept=[named(s) for s in accept]), indent=1) + "\n")
     truth = dict(label=folder.name, robot=robot["name"], seed=seed, family=family, kinds=kinds, effects=[dict(e, L=round(L, 1)) for e, L in zip(effects, visible)],
                  hide=sorted(hidden), outliers=outliers, exchanged=exchanged, spoiled=[ids[i] for i in spoiled], jitter_rad=jitter, repeats=bool(repeats),
                  points=count, friction_nm=friction, true=dict(axis=arm.axes, point=1e3 * arm.points, tool=1e3 * arm.tool, off=arm.zero, red=arm.scale,
