@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Names of the list of effects that a diagnosis may use.
-const NAMES: [&str; 19] = [
+const NAMES: [&str; 20] = [
     "joint_compliance",
     "joint_hardening",
     "link_compliance",
@@ -27,6 +27,7 @@ const NAMES: [&str; 19] = [
     "tool_shift",
     "base_shift",
     "tracker_drift",
+    "tracker_scale",
     "joint_log_lag",
     "unknown",
 ];
@@ -74,6 +75,17 @@ fn an_effect_is_as_visible_as_the_seal_says() {
     // 6 joints with 4 numbers each and 3 of the tool, ratios, one coupling on the big robot; the rank does not hang on rounding.
     let joints = case.robot.joints.len();
     assert_eq!(case.geometry_rank, 4 * joints + 3 + joints + case.robot.couplings.len());
+}
+
+/// All that a wrong metre does is what a larger robot does.
+#[test]
+fn a_wrong_metre_is_there_and_cannot_be_seen() {
+    let row = FAMILIES.iter().position(|family| family.name == "tracker_scale").expect("a family");
+    for number in 0..3 {
+        let design = Design { seed: 6, points: Some(60), faulty: 0.0, ..Design::default() };
+        let case = Case::make(&design, number, Content::Single(row)).expect("a case");
+        assert!(case.concealed[0].raw_mm > 1e-3 && case.concealed[0].strength < 0.01, "{:?}", case.concealed[0]);
+    }
 }
 
 #[test]
@@ -205,7 +217,7 @@ fn who_says_the_truth_gets_full_marks_and_who_says_nothing_none() {
 #[test]
 fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
     let root = tempfile::tempdir().expect("a folder");
-    let (set, verdicts) = judged(root.path(), |_| vec![json!({ "effect": "tracker_scale", "where": "tracker" })]);
+    let (set, verdicts) = judged(root.path(), |_| vec![json!({ "effect": "joint_table", "where": "joint 9" })]);
     let board = score(&set, &verdicts);
     assert_eq!(total(&board, "wrong"), total(&board, "n"));
     assert_eq!(
@@ -216,7 +228,7 @@ fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
     let both = tempfile::tempdir().expect("a folder");
     let (set, verdicts) = judged(both.path(), |truth| {
         let mut findings = wanted(truth);
-        findings.push(json!({ "effect": "tracker_scale", "where": "tracker" }));
+        findings.push(json!({ "effect": "joint_table", "where": "joint 9" }));
         findings
     });
     let board = score(&set, &verdicts);
@@ -227,7 +239,7 @@ fn a_false_name_is_wrong_and_in_a_null_a_false_alarm() {
 fn a_rival_and_a_run_of_links_count_as_the_set() {
     let root = tempfile::tempdir().expect("a folder");
     let (set, verdicts) = judged(root.path(), |truth| {
-        let as_rival = |name: &Value| json!({ "effect": "tracker_scale", "where": "tracker", "rivals": [name] });
+        let as_rival = |name: &Value| json!({ "effect": "joint_table", "where": "joint 9", "rivals": [name] });
         wanted(truth).iter().map(as_rival).collect()
     });
     let board = score(&set, &verdicts);

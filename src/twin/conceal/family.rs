@@ -226,6 +226,7 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "base_shift", draw: mounts::base_shift, paired: true },
     Family { name: "tracker_drift", draw: mounts::tracker_drift, paired: true },
     Family { name: "joint_log_lag", draw: mounts::joint_log_lag, paired: false },
+    Family { name: "tracker_scale", draw: mounts::tracker_scale, paired: false },
     Family { name: "unknown", draw: unlisted::bump, paired: false },
     Family { name: "unknown", draw: unlisted::hinge, paired: false },
     Family { name: "unknown", draw: unlisted::product, paired: false },

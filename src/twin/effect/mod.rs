@@ -26,6 +26,7 @@ mod thermal_growth;
 mod thermal_warm_up;
 mod tool_shift;
 mod tracker_drift;
+mod tracker_scale;
 mod zero_shift;
 
 pub use axis_wobble::AxisWobble;
@@ -52,6 +53,7 @@ pub use thermal_growth::ThermalGrowth;
 pub use thermal_warm_up::ThermalWarmUp;
 pub use tool_shift::ToolShift;
 pub use tracker_drift::{Course, TrackerDrift};
+pub use tracker_scale::TrackerScale;
 pub use zero_shift::ZeroShift;
 
 use super::arm::{Arm, Posture};
@@ -193,6 +195,8 @@ physical! {
     ThermalGrowth,
     /// The tracker's frame creeps.
     TrackerDrift,
+    /// The tracker's metre is wrong.
+    TrackerScale,
     /// A joint's zero steps at some time.
     ZeroShift,
     /// The axis tilts as the joint turns.

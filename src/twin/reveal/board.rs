@@ -181,10 +181,11 @@ impl Board {
         out
     }
 
-    /// Stated 95 % intervals that hold the true number, by effect.
+    /// Stated 95 % intervals that hold the true number, by effect; of recordings in which all due causes were named and nothing
+    /// else: the numbers of a wrong model are not those of the truth.
     pub fn intervals(&self) -> BTreeMap<&str, Share> {
         let mut out: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-        for interval in self.cases.iter().flat_map(|case| &case.intervals) {
+        for interval in self.cases.iter().filter(|case| case.right(DUE)).flat_map(|case| &case.intervals) {
             out.entry(&interval.effect).or_default().push(interval.holds);
         }
         out.into_iter().map(|(effect, holds)| (effect, Share::of(holds))).collect()

@@ -1,7 +1,7 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 
-use super::paper::{Answer, Cause, Finding, Number, Truth};
-use crate::units::Unit;
+use super::interval::{Interval, intervals};
+use super::paper::{Answer, Finding, Truth};
 use std::collections::BTreeSet;
 
 /// What became of a cause.
@@ -38,14 +38,6 @@ pub struct Marked {
     pub outcome: Outcome,
     /// What was said instead, strongest first: `effect at place`.
     pub said: Option<String>,
-}
-
-/// Whether a stated 95 % interval holds the true number.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Interval {
-    pub effect: String,
-    pub name: String,
-    pub holds: bool,
 }
 
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
@@ -172,30 +164,4 @@ fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {
     let (p, n) = ((truth.geometry_rank + found) as f64, 3.0 * truth.points.fit as f64);
     let floor = 3f64.sqrt() * truth.noise.validate_rms_per_axis_mm;
     Some(HeldOut { before, after, bound: floor * (1.0 + p / (n - p - 1.0).max(1.0)).sqrt() })
-}
-
-/// Two-sided 95 % of a normal distribution.
-const NINETY_FIVE: f64 = 1.959_964;
-
-/// Stated intervals of numbers that the truth holds under the same name and in a unit that converts.
-fn intervals(cause: &Cause, findings: &[Finding]) -> Vec<Interval> {
-    let same = findings.iter().filter(|finding| finding.effect == cause.effect && finding.place == cause.place);
-    let stated: Vec<&Number> = same.flat_map(|finding| &finding.parameters).collect();
-    let judge = |truth: &Number| {
-        let number = stated.iter().find(|number| number.name == truth.name)?;
-        let sigma = number.sigma.filter(|sigma| *sigma > 0.0)?;
-        let expected = convert(truth.value, &truth.unit, &number.unit)?;
-        let holds = (number.value - expected).abs() <= NINETY_FIVE * sigma;
-        Some(Interval { effect: cause.effect.clone(), name: truth.name.clone(), holds })
-    };
-    cause.parameters.iter().filter_map(judge).collect()
-}
-
-/// A value in another unit; none where the units do not convert.
-fn convert(value: f64, from: &str, to: &str) -> Option<f64> {
-    if from == to {
-        return Some(value);
-    }
-    let (from, to) = (Unit::parse(from)?, Unit::parse(to)?);
-    (from.quantity() == to.quantity()).then(|| to.from_si(from.to_si(value)))
 }

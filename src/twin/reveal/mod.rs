@@ -3,6 +3,7 @@
 //! Nothing of the diagnosis is used: what it said is read as any reader of its JSON would.
 
 pub mod board;
+pub mod interval;
 pub mod mark;
 pub mod paper;
 mod text;

@@ -1,7 +1,9 @@
 //! What changes in time or in the log: heat, steps of mountings, the creeping tracker, logs that are behind.
 
-use super::{Bench, Column, Draft, Form, link, sized};
-use crate::twin::effect::{BaseShift, Course, JointLogLag, Physical, ThermalGrowth, ThermalWarmUp, ToolShift, TrackerDrift};
+use super::{Bench, Column, Draft, Form, fixed, link, sized};
+use crate::twin::effect::{
+    BaseShift, Course, JointLogLag, Physical, ThermalGrowth, ThermalWarmUp, ToolShift, TrackerDrift, TrackerScale,
+};
 use crate::twin::noise::Noise;
 
 pub(super) fn thermal_growth(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
@@ -62,4 +64,10 @@ pub(super) fn joint_log_lag(bench: &Bench, form: Form, draw: &mut Noise) -> Opti
     };
     let lag = Physical::JointLogLag(JointLogLag { share: draw.size(1e-4, 1e-3), joint: only });
     Some(Draft::new(name, vec![sized("joint_log_lag", "recording".into(), vec![lag])]))
+}
+
+/// Position data cannot tell a wrong metre from a larger robot: the one right answer is silence.
+pub(super) fn tracker_scale(_bench: &Bench, _form: Form, draw: &mut Noise) -> Option<Draft> {
+    let scale = Physical::TrackerScale(TrackerScale { um_per_m: draw.sign() * draw.size(1.0, 10.0) });
+    Some(Draft::new("scale", vec![fixed("tracker_scale", "tracker".into(), vec![scale])]))
 }
