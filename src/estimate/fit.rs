@@ -70,8 +70,9 @@ const ITERATIONS: usize = 60;
 const FIRST_ITERATIONS: usize = 4;
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
 const CLEARLY: f64 = 10.0;
-/// ... and where each lowers the cost by this: five sigmas, so that hundreds of robots of one kind keep one set of parameters.
-const WORTH: f64 = 12.5;
+/// ... and where they lower the cost by this and so much for each further one: chi-square as rare as five sigmas, so that
+/// hundreds of robots of one kind keep one set of parameters.
+const WORTH: [f64; 2] = [12.5, 1.75];
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
 const REPEATING: usize = 4;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
@@ -176,7 +177,7 @@ impl Search {
         let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
         let cost = start.cost;
         let (_, stop, end) = minimise(problem, model, &free, start, ITERATIONS);
-        if stop != Stop::Converged || cost - end.cost < WORTH * new.len() as f64 {
+        if stop != Stop::Converged || cost - end.cost < WORTH[0] + WORTH[1] * (new.len() - 1) as f64 {
             model.x = before;
             return false;
         }
