@@ -2,7 +2,6 @@
 
 use super::Course;
 use super::pool::Pool;
-use super::search::falls;
 use super::state::solve;
 use super::verdict::Looked;
 use crate::effect::{Effect, Form, Place, Placed};
@@ -214,11 +213,9 @@ fn size(pool: &Pool, own: &[usize], whole: &super::state::Solution, set: &[usize
 /// Other single causes that do as well in place of `own`.
 fn rivals(pool: &Pool, rest: &[usize], own: &[usize], bic: f64, named: (&str, &str)) -> Vec<Rival> {
     let state = pool.state(rest);
-    let mut scored = falls(pool, &state);
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let own_charge: f64 = own.iter().map(|k| pool.charge[*k]).sum();
     let mut out: Vec<Rival> = Vec::new();
-    for (_, h) in scored.into_iter().take(60) {
+    for (_, h) in state.falls(pool).iter().copied().take(60) {
         let form = &pool.hypotheses[h].form;
         let (effect, place) = (form.name(), form.place().to_string());
         if (effect, place.as_str()) == named || out.iter().any(|rival| rival.effect == effect && rival.place == place) {

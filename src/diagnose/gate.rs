@@ -41,27 +41,25 @@ pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, see
     let squares: Vec<f64> = drawn.chunks(lines).map(|column| super::pool::dot(column, column)).collect();
     let drawn = faer::MatRef::from_column_major_slice(&drawn, lines, draws);
     let hypotheses: Vec<usize> = (0..pool.hypotheses.len()).filter(|h| state.admits(pool, *h)).collect();
-    let best: Vec<(f64, Vec<f64>)> = hypotheses
+    let best: Vec<Vec<f64>> = hypotheses
         .par_chunks(CHUNK)
         .map(|some| {
-            let mut seen = f64::NEG_INFINITY;
             let mut most = vec![f64::NEG_INFINITY; draws];
             for h in some {
                 let (first, end) = (pool.first[*h], pool.first[*h + 1]);
                 let mut gradients = Mat::zeros(end - first, draws);
                 let columns = pool.all().subcols(first, end - first);
                 matmul(gradients.as_mut(), Accum::Replace, columns.transpose(), drawn, 1.0, Par::Seq);
-                seen = seen.max(state.fall(pool, *h));
                 state.gains(pool, *h, &gradients, |draw, gain, rank| {
                     if rank > 0 {
                         most[draw] = most[draw].max(fall(lines, squares[draw], gain, rank, pool.charge[*h]));
                     }
                 });
             }
-            (seen, most)
+            most
         })
         .collect();
-    let seen = best.iter().map(|(seen, _)| *seen).fold(f64::NEG_INFINITY, f64::max);
-    let as_good = (0..draws).filter(|draw| best.iter().any(|(_, most)| most[*draw] >= seen)).count();
+    let seen = state.falls(pool).first().map_or(f64::NEG_INFINITY, |(fall, _)| *fall);
+    let as_good = (0..draws).filter(|draw| best.iter().any(|most| most[*draw] >= seen)).count();
     (1.0 + as_good as f64) / (1.0 + draws as f64)
 }

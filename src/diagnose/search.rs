@@ -123,19 +123,14 @@ impl<'a, 'b> Search<'a, 'b> {
     /// The set with the best form of every effect that has a shape to refine: on a coarse grid the right one may look poor.
     fn shaped(&self, set: &[usize]) -> Vec<Vec<usize>> {
         let state = self.pool.state(set);
-        let mut scored: Vec<(f64, usize)> = (0..self.pool.hypotheses.len())
-            .filter(|h| self.can_refine(*h))
-            .map(|h| (state.fall(self.pool, h), h))
-            .filter(|(fall, _)| fall.is_finite())
-            .collect();
-        scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let scored = state.falls(self.pool).iter().map(|(_, h)| *h).filter(|h| self.can_refine(*h));
         let mut seen = BTreeSet::new();
         let kind = |h: usize| {
             let form = &self.pool.hypotheses[h].form;
             // Bumps, hinges and warm-ups of the unknown are shapes of their own.
             if form.name() == "unknown" { form.variant() } else { form.name().to_string() }
         };
-        let firsts: Vec<usize> = scored.into_iter().map(|(_, h)| h).filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
+        let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
         firsts.into_iter().map(|h| with(set, h)).collect()
     }
 
@@ -262,17 +257,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
 /// The hypotheses that lower the criterion most, one of a key, best first.
 pub(crate) fn best(pool: &Pool, state: &State, most: usize) -> Vec<usize> {
-    let mut scored: Vec<(f64, usize)> = falls(pool, state);
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut keys = BTreeSet::new();
-    scored.into_iter().map(|(_, h)| h).filter(|h| keys.insert(&pool.keys[*h])).take(most).collect()
-}
-
-/// The fall of the criterion by every hypothesis that can join.
-pub(crate) fn falls(pool: &Pool, state: &State) -> Vec<(f64, usize)> {
-    use rayon::prelude::*;
-    let all = (0..pool.hypotheses.len()).into_par_iter().with_min_len(64).map(|h| (state.fall(pool, h), h));
-    all.filter(|(fall, _)| fall.is_finite()).collect()
+    state.falls(pool).iter().map(|(_, h)| *h).filter(|h| keys.insert(&pool.keys[*h])).take(most).collect()
 }
 
 fn with(set: &[usize], h: usize) -> Vec<usize> {

@@ -4,6 +4,8 @@ use super::pool::{LINES_EACH, Pool, dot};
 use faer::Mat;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par};
+use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What is left of a squared column of unit length below this is rounding and second order, not sight.
 const INVISIBLE: f64 = 1e-6;
@@ -24,35 +26,51 @@ pub(crate) struct Solution {
 struct Pivoted {
     /// Kept columns in order.
     order: Vec<usize>,
-    /// Lower triangle, row `a` of length `a + 1`.
-    rows: Vec<Vec<f64>>,
+    /// Lower triangle of the kept columns, row after row: row `a` has `a + 1` entries.
+    triangle: Vec<f64>,
 }
 
 impl Pivoted {
-    /// Of a q x q matrix, row by row.
+    /// Of a q x q matrix, row by row; only its lower triangle is read.
     fn of(mut gram: Vec<f64>, q: usize) -> Self {
-        let mut order: Vec<usize> = Vec::new();
-        let mut rows: Vec<Vec<f64>> = Vec::new();
-        let mut columns: Vec<Vec<f64>> = Vec::new();
-        for _ in 0..q {
-            let left = (0..q).filter(|k| !order.contains(k));
-            let Some(pivot) = left.max_by(|a, b| gram[a * q + a].total_cmp(&gram[b * q + b])) else { break };
-            let size = gram[pivot * q + pivot];
+        let mut order: Vec<usize> = Vec::with_capacity(q);
+        let mut left: Vec<usize> = (0..q).collect();
+        // Column k of the factor is kept in the upper triangle's place: entry (pivot, other).
+        let mut columns: Vec<f64> = Vec::with_capacity(q * q);
+        let at = |i: usize, j: usize| if i >= j { i * q + j } else { j * q + i };
+        while let Some(best) = (0..left.len()).max_by(|a, b| gram[left[*a] * (q + 1)].total_cmp(&gram[left[*b] * (q + 1)])) {
+            let pivot = left[best];
+            let size = gram[pivot * (q + 1)];
             if size <= INVISIBLE {
                 break;
             }
-            let root = size.sqrt();
-            let column: Vec<f64> = (0..q).map(|k| gram[k * q + pivot] / root).collect();
-            for i in 0..q {
-                for j in 0..q {
-                    gram[i * q + j] -= column[i] * column[j];
+            left.swap_remove(best);
+            let inverse = 1.0 / size.sqrt();
+            let start = columns.len();
+            columns.resize(start + q, 0.0);
+            columns[start + pivot] = size.sqrt();
+            for other in &left {
+                columns[start + other] = gram[at(*other, pivot)] * inverse;
+            }
+            for (n, i) in left.iter().enumerate() {
+                let own = columns[start + i];
+                for j in &left[..=n] {
+                    gram[at(*i, *j)] -= own * columns[start + j];
                 }
             }
             order.push(pivot);
-            columns.push(column);
-            rows.push(columns.iter().map(|column| column[pivot]).collect());
         }
-        Self { order, rows }
+        let rank = order.len();
+        let mut triangle = Vec::with_capacity(rank * (rank + 1) / 2);
+        for (a, pivot) in order.iter().enumerate() {
+            triangle.extend((0..=a).map(|column| columns[column * q + pivot]));
+        }
+        Self { order, triangle }
+    }
+
+    fn row(&self, a: usize) -> &[f64] {
+        let start = a * (a + 1) / 2;
+        &self.triangle[start..=start + a]
     }
 
     fn rank(&self) -> usize {
@@ -62,7 +80,8 @@ impl Pivoted {
     /// L^-1 of a vector over all columns.
     fn forward(&self, vector: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut out: Vec<f64> = Vec::with_capacity(self.rank());
-        for (row, k) in self.rows.iter().zip(&self.order) {
+        for (a, k) in self.order.iter().enumerate() {
+            let row = self.row(a);
             let known: f64 = row.iter().zip(&out).map(|(a, b)| a * b).sum();
             out.push((vector(*k) - known) / row[row.len() - 1]);
         }
@@ -73,10 +92,10 @@ impl Pivoted {
     fn backward(&self, vector: &[f64]) -> Vec<f64> {
         let mut out = vector.to_vec();
         for a in (0..self.rank()).rev() {
-            out[a] /= self.rows[a][a];
-            for b in 0..a {
-                out[b] -= self.rows[a][b] * out[a];
-            }
+            let row = self.row(a);
+            out[a] /= row[a];
+            let own = out[a];
+            out.iter_mut().zip(&row[..a]).for_each(|(value, entry)| *value -= entry * own);
         }
         out
     }
@@ -108,9 +127,10 @@ pub(crate) fn solve(pool: &Pool, set: &[usize]) -> Solution {
         unit[a] = 1.0;
         // Row a of (L L^T)^-1: |L^-1 e_a|^2.
         let mut lower: Vec<f64> = Vec::with_capacity(rank);
-        for (b, row) in factor.rows.iter().enumerate() {
+        for (b, value) in unit.iter().enumerate() {
+            let row = factor.row(b);
             let known: f64 = row.iter().zip(&lower).map(|(x, y)| x * y).sum();
-            lower.push((unit[b] - known) / row[b]);
+            lower.push((value - known) / row[b]);
         }
         errors[*k] = (scatter * lower.iter().map(|value| value * value).sum::<f64>()).sqrt() / scale;
     }
@@ -130,6 +150,8 @@ pub(crate) struct State {
     pub gradient: Vec<f64>,
     /// What the set takes off every column: rank x columns.
     pub share: Mat<f64>,
+    /// [`State::falls`] once they are known.
+    falls: OnceLock<Vec<(f64, usize)>>,
 }
 
 impl State {
@@ -143,7 +165,7 @@ impl State {
         let square = pool.square - along.iter().map(|value| value * value).sum::<f64>();
         let gradient = pool.gradient.iter().enumerate();
         let gradient = gradient.map(|(c, g)| g - (0..rank).map(|k| share[(k, c)] * along[k]).sum::<f64>()).collect();
-        Self { set: set.to_vec(), rank, square, basis, gradient, share }
+        Self { set: set.to_vec(), rank, square, basis, gradient, share, falls: OnceLock::new() }
     }
 
     /// By how much hypothesis `h` would lower the squared residual with `gradient`, and how many numbers the data see of it.
@@ -156,18 +178,28 @@ impl State {
     /// The same for many residuals at once: `gradients` is the hypothesis' columns x draws.
     pub fn gains(&self, pool: &Pool, h: usize, gradients: &Mat<f64>, mut each: impl FnMut(usize, f64, usize)) {
         let factor = self.factor(pool, h);
+        let mut solved: Vec<f64> = Vec::with_capacity(factor.rank());
         for draw in 0..gradients.ncols() {
-            let gain = factor.forward(|k| gradients[(k, draw)]).iter().map(|value| value * value).sum();
-            each(draw, gain, factor.rank());
+            solved.clear();
+            for (a, k) in factor.order.iter().enumerate() {
+                let row = factor.row(a);
+                let known: f64 = row.iter().zip(&solved).map(|(x, y)| x * y).sum();
+                solved.push((gradients[(*k, draw)] - known) / row[a]);
+            }
+            each(draw, solved.iter().map(|value| value * value).sum(), factor.rank());
         }
     }
 
     fn factor(&self, pool: &Pool, h: usize) -> Pivoted {
         let (first, q) = (pool.first[h], pool.first[h + 1] - pool.first[h]);
         let mut gram = pool.gram[h].clone();
-        for i in 0..q {
-            for j in 0..q {
-                gram[i * q + j] -= (0..self.rank).map(|k| self.share[(k, first + i)] * self.share[(k, first + j)]).sum::<f64>();
+        if self.rank > 0 {
+            for i in 0..q {
+                let a = self.share.col(first + i);
+                for j in 0..=i {
+                    let b = self.share.col(first + j);
+                    gram[i * q + j] -= a.iter().zip(b.iter()).map(|(a, b)| a * b).sum::<f64>();
+                }
             }
         }
         Pivoted::of(gram, q)
@@ -178,6 +210,16 @@ impl State {
         let lines = pool.lines.saturating_sub(pool.rank() + self.rank);
         let small = LINES_EACH * (pool.first[h + 1] - pool.first[h]) <= lines;
         small && !self.set.iter().any(|k| pool.keys[*k] == pool.keys[h])
+    }
+
+    /// The fall of the criterion by every hypothesis that can join, largest first.
+    pub fn falls(&self, pool: &Pool) -> &[(f64, usize)] {
+        self.falls.get_or_init(|| {
+            let all = (0..pool.hypotheses.len()).into_par_iter().with_min_len(64).map(|h| (self.fall(pool, h), h));
+            let mut all: Vec<(f64, usize)> = all.filter(|(fall, _)| fall.is_finite()).collect();
+            all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            all
+        })
     }
 
     /// How much the criterion would fall with hypothesis `h`; minus infinity where it cannot join or is not seen.
