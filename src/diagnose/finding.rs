@@ -5,7 +5,7 @@ use super::pool::Pool;
 use super::state::solve;
 use super::verdict::Looked;
 use crate::effect::{Effect, Form, Place, Placed};
-use crate::estimate::{Fate, Kind, Screening};
+use crate::estimate::{Fate, Kind, Screening, tail};
 use crate::units::Unit;
 use std::collections::BTreeMap;
 
@@ -71,7 +71,10 @@ const ALIKE: f64 = 6.0;
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let pool = looked.pool;
-    let set = &looked.found.set;
+    // The pool's sets are ascending; the chosen causes stand in their own order.
+    let set = &looked.set;
+    let mut sorted = set.clone();
+    sorted.sort_unstable();
     let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
     for (i, k) in set.iter().enumerate() {
         let form = &pool.hypotheses[*k].form;
@@ -84,14 +87,18 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             groups.entry(("joint_hardening", place)).or_default().extend(more);
         }
     }
-    let whole = solve(pool, set);
-    let bic = pool.bic(set);
-    let ranges = last.model.stack.effects().count() - last.forms.len();
+    let whole = solve(pool, &sorted);
+    let bic = pool.bic(&sorted);
+    let ranges = last.model.stack.effects().count() - last.chosen.len();
     let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
     let mut out = Vec::new();
     for ((effect, place), members) in groups {
         let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
-        let rest: Vec<usize> = set.iter().copied().filter(|k| !own.contains(k)).collect();
+        let mut rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
+        if !pool.bic(&rest).is_finite() {
+            // Without the last joint that yields, the torque model moves nothing.
+            rest.retain(|k| !pool.borrowed[*k]);
+        }
         let without = solve(pool, &rest);
         let gain = whole.gain - without.gain;
         let rank = whole.rank.saturating_sub(without.rank).max(1);
@@ -116,16 +123,16 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
                 });
             }
         }
-        let forms: Vec<Form> = members.iter().map(|i| last.forms[*i].clone()).collect();
+        let forms: Vec<Form> = members.iter().map(|i| last.chosen[*i].form.clone()).collect();
         let mut rivals = rivals(pool, &rest, &own, bic, (effect, &place));
         exact(&forms, &place, &mut rivals);
         rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
-        let effect_rms = size(pool, &own, &whole, set);
+        let effect_rms = size(pool, &own, &whole, &sorted);
         let evidence = Evidence {
             f_statistic,
-            p_value: looked.first,
+            p_value: tail(f_statistic, rank as f64, freedom),
             delta_bic: pool.bic(&rest) - bic,
-            heldout_gain: 0.0,
+            heldout_gain: looked.worths.iter().find(|w| w.effect == effect && w.place == place).map_or(0.0, |w| w.gain),
             effect_rms,
             gain,
         };

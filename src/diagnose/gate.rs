@@ -4,7 +4,7 @@
 //! heavy tails, and destroys every dependence on angles, loads and time (Wu 1986; Cameron, Gelbach and Miller 2008).
 
 use super::pool::{Pool, project};
-use super::state::{State, fall};
+use super::state::State;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, Par};
 use rand::rngs::ChaCha8Rng;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Hypotheses that one thread tests, or draws that it projects, at once.
 const CHUNK: usize = 32;
 
-/// The probability that the best hypothesis of any kind would do as well on noise. `pose[i]` numbers the pose of row i.
+/// The probability that the best hypothesis of any kind would do as well on noise. `pose[i]` numbers the pose of fitted row i.
 pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, seed: u64) -> f64 {
     let lines = pool.lines;
     let mut residual = pool.residual.clone();
@@ -32,7 +32,7 @@ pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, see
     let mut drawn = Vec::with_capacity(lines * draws);
     for _ in 0..draws {
         let signs: Vec<f64> = (0..poses).map(|_| if dice.random::<bool>() { 1.0 } else { -1.0 }).collect();
-        drawn.extend(residual.iter().enumerate().map(|(i, value)| value * signs[pose[i / 3]]));
+        drawn.extend(residual.iter().enumerate().map(|(i, value)| value * signs[pose[pool.lens.row_of(i)]]));
     }
     drawn.par_chunks_mut(CHUNK * lines).for_each(|some| {
         project(&pool.base, some);
@@ -40,26 +40,28 @@ pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, see
     });
     let squares: Vec<f64> = drawn.chunks(lines).map(|column| super::pool::dot(column, column)).collect();
     let drawn = faer::MatRef::from_column_major_slice(&drawn, lines, draws);
+    let seen = state.falls(pool).first().map_or(f64::NEG_INFINITY, |(fall, _)| *fall);
     let hypotheses: Vec<usize> = (0..pool.hypotheses.len()).filter(|h| state.admits(pool, *h)).collect();
-    let best: Vec<Vec<f64>> = hypotheses
+    let better: Vec<Vec<bool>> = hypotheses
         .par_chunks(CHUNK)
         .map(|some| {
-            let mut most = vec![f64::NEG_INFINITY; draws];
+            let mut as_good = vec![false; draws];
             for h in some {
                 let (first, end) = (pool.first[*h], pool.first[*h + 1]);
                 let mut gradients = Mat::zeros(end - first, draws);
                 let columns = pool.all().subcols(first, end - first);
                 matmul(gradients.as_mut(), Accum::Replace, columns.transpose(), drawn, 1.0, Par::Seq);
+                // The gain that would lower the criterion by as much as what was seen.
+                let n = lines as f64;
+                let rank = state.gain(pool, *h).1;
+                let needed = 1.0 - (-(seen + n.ln() * rank as f64 + pool.charge[*h]) / n).exp();
                 state.gains(pool, *h, &gradients, |draw, gain, rank| {
-                    if rank > 0 {
-                        most[draw] = most[draw].max(fall(lines, squares[draw], gain, rank, pool.charge[*h]));
-                    }
+                    as_good[draw] |= rank > 0 && gain >= needed * squares[draw];
                 });
             }
-            most
+            as_good
         })
         .collect();
-    let seen = state.falls(pool).first().map_or(f64::NEG_INFINITY, |(fall, _)| *fall);
-    let as_good = (0..draws).filter(|draw| best.iter().any(|most| most[*draw] >= seen)).count();
+    let as_good = (0..draws).filter(|draw| better.iter().any(|as_good| as_good[*draw])).count();
     (1.0 + as_good as f64) / (1.0 + draws as f64)
 }

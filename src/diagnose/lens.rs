@@ -1,13 +1,16 @@
 //! The recording as the present model sees it: whitened residuals, and how any form of an effect would move them.
+//!
+//! Lines are in standard deviations: three a row for the measured point, then one for each motor that can be heard.
 
+use super::currents::Currents;
 use crate::effect::{Deflection, Effect, Form, Sight};
-use crate::estimate::{Model, Weight};
+use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Fitted rows through the present model. Lines: three a row, in order of rows, in standard deviations.
+/// Fitted rows through the present model.
 pub(crate) struct Lens<'a> {
     pub robot: &'a RobotModel,
     pub data: &'a Measurements,
@@ -15,12 +18,17 @@ pub(crate) struct Lens<'a> {
     pub rows: &'a [usize],
     sights: Vec<Sight>,
     weights: Vec<Weight>,
+    currents: Option<Currents>,
+    /// What a standard deviation of a current counts: that of the points as they are left by the model.
+    loudness: f64,
+    model: &'a Model,
     /// Whitened measured - predicted.
     pub residual: Vec<f64>,
 }
 
 impl<'a> Lens<'a> {
-    pub fn new(model: &'a Model, data: &'a Measurements, rows: &'a [usize]) -> Self {
+    /// Currents are heard only where `listen` says that something yields to torques.
+    pub fn new(model: &'a Model, data: &'a Measurements, rows: &'a [usize], listen: bool) -> Self {
         let sights: Vec<Sight> = rows
             .par_iter()
             .map_init(
@@ -29,15 +37,30 @@ impl<'a> Lens<'a> {
             )
             .collect();
         let weights: Vec<Weight> = rows.iter().map(|row| Weight::of(data, *row, 0.0)).collect();
-        let residual = sights.iter().zip(&weights).zip(rows);
-        let residual = residual.flat_map(|((sight, weight), row)| {
-            weight.apply(&(data.position[*row] - sight.point)).into_iter().copied().collect::<Vec<_>>()
-        });
-        Self { robot: &model.robot, data, rows, residual: residual.collect(), sights, weights }
+        let mut residual = Vec::with_capacity(3 * rows.len());
+        for ((sight, weight), row) in sights.iter().zip(&weights).zip(rows) {
+            residual.extend(weight.apply(&(data.position[*row] - sight.point)).iter());
+        }
+        let loudness = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
+        let currents = listen.then(|| Currents::new(&model.robot, data, rows, &sights)).flatten();
+        residual.extend(currents.iter().flat_map(Currents::whitened).map(|value| value * loudness));
+        Self { robot: &model.robot, data, rows, residual, sights, weights, currents, loudness, model }
+    }
+
+    fn points(&self) -> usize {
+        3 * self.rows.len()
     }
 
     pub fn lines(&self) -> usize {
-        3 * self.rows.len()
+        self.residual.len()
+    }
+
+    /// The place in `rows` of a line.
+    pub fn row_of(&self, line: usize) -> usize {
+        match &self.currents {
+            Some(currents) if line >= self.points() => (line - self.points()) / currents.joints.len(),
+            _ => line / 3,
+        }
     }
 
     /// Load torques (Nm), row-major.
@@ -64,17 +87,25 @@ impl<'a> Lens<'a> {
                     out[parameter * lines + 3 * i + axis] += derivative[axis];
                 }
             });
+            let Some(currents) = &self.currents else { continue };
+            for (parameter, joint, rate) in buffer.loads() {
+                if let Some(k) = currents.joints.iter().position(|heard| *heard == joint) {
+                    let line = i * currents.joints.len() + k;
+                    out[parameter * lines + self.points() + line] += rate * self.loudness / currents.sigma_of(line);
+                }
+            }
         }
         out
     }
 
-    /// Columns of some parameters of the model itself.
+    /// Columns of some parameters of the model itself, and what each motor has of its own.
     pub fn jacobian(&self, model: &Model, free: &[usize]) -> Mat<f64> {
         let mut column = vec![None; model.stack.specs().len()];
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
         }
-        let mut out = Mat::zeros(self.lines(), free.len());
+        let nuisances = self.currents.as_ref().map_or(0, Currents::nuisances);
+        let mut out = Mat::zeros(self.lines(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
         for (i, (row, weight)) in self.rows.iter().zip(&self.weights).enumerate() {
             model.stack.derivatives(&model.robot, self.data, *row, &model.x, &mut scratch, |parameter, derivative| {
@@ -86,6 +117,33 @@ impl<'a> Lens<'a> {
                 }
             });
         }
+        if let Some(currents) = &self.currents {
+            for line in 0..currents.lines() {
+                for k in 0..nuisances {
+                    out[(self.points() + line, free.len() + k)] = currents.nuisance(line, k) * self.loudness;
+                }
+            }
+        }
         out
+    }
+
+    /// Values of some forms in the present model, zero where it has them not.
+    pub fn present(&self, forms: &[&Form]) -> Vec<f64> {
+        let value = |name: &String| {
+            let specs = self.model.stack.specs();
+            specs.iter().position(|spec| spec.name == *name).map_or(0.0, |k| self.model.x[k])
+        };
+        let names = forms.iter().flat_map(|form| form.parameters(self.robot)).map(|spec| spec.name);
+        names.map(|name| value(&name)).collect()
+    }
+
+    /// What the currents alone say of the numbers of some forms, now at `values`; `None` where they say nothing.
+    pub fn opinion(&self, forms: &[&Form], values: &[f64]) -> Option<Vec<Prior>> {
+        let currents = self.currents.as_ref()?;
+        let lines = self.lines();
+        let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
+        let columns: Vec<Vec<f64>> =
+            all.chunks(lines).map(|c| c[self.points()..].iter().map(|value| value / self.loudness).collect()).collect();
+        currents.opinion(&columns, values)
     }
 }

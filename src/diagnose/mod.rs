@@ -4,8 +4,10 @@
 //! library and form-free signatures are projected off it and compared in one pool; what wins is refitted together with the base
 //! on the full model, and everything is looked at again from there, until nothing changes.
 
+mod currents;
 mod finding;
 mod gate;
+mod judge;
 mod lens;
 mod noise;
 mod pool;
@@ -18,7 +20,7 @@ pub use noise::Repeatability;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
 use crate::effect::{EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey};
-use crate::estimate::{Fate, FitOptions, Fitted, Model, Screening, align, fit_screened};
+use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
 use nalgebra::Matrix3;
@@ -53,7 +55,15 @@ struct Course {
     model: Model,
     fitted: Fitted,
     screening: Screening,
-    forms: Vec<Form>,
+    chosen: Vec<Chosen>,
+}
+
+/// A cause with its coefficients, and what the motor currents say of them.
+#[derive(Clone)]
+struct Chosen {
+    form: Form,
+    coefficients: Vec<f64>,
+    known: Vec<Prior>,
 }
 
 /// Diagnoses a recording. `tell` hears what is going on.
@@ -78,14 +88,14 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     loop {
         round += 1;
         let pose = poses(&data, &now.screening.kept);
-        let lens = Lens::new(&now.model, &data, &now.screening.kept);
-        let torque = lens.torques();
         let yielding = yielding(&now, robot.joints());
+        let lens = Lens::new(&now.model, &data, &now.screening.kept, yielding.iter().any(|compliance| *compliance > 0.0));
+        let torque = lens.torques();
         let survey = Survey::new(robot, &data, &now.screening.kept, &torque, &yielding);
         let mut pool = pool_of(&lens, &now, &free, &survey);
         let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
         let mut search = Search::new(&mut pool, &survey, &pose, options);
-        let start: Vec<usize> = now.forms.iter().map(|form| search.position(Hypothesis::new(form.clone(), 1))).collect();
+        let start: Vec<usize> = now.chosen.iter().map(|cause| search.position(Hypothesis::new(cause.form.clone(), 1))).collect();
         let mut start: Vec<usize> = start;
         start.sort_unstable();
         start.dedup();
@@ -100,8 +110,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             forms.iter().map(|form| format!("; {}", form.key())).collect::<String>(),
             found.last
         ));
-        let same = same_forms(&forms, &now.forms);
-        let start: Vec<(Form, Vec<f64>)> = forms.into_iter().zip(coefficients).collect();
+        let same = same_forms(&forms, &now.chosen);
+        let start = chosen(&lens, forms, coefficients);
         let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
         let kept_same = next.screening.kept == now.screening.kept;
         let last_round = round >= ROUNDS;
@@ -120,23 +130,48 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             }
         }
         if (same && kept_same) || last_round {
-            let looked = verdict::Looked { pool: search.pool, found, first: first.unwrap_or(1.0), survey: &survey };
-            return verdict::conclude(question, &data, &before, &next, repeatability, looked);
+            let mut set = found.set;
+            let (last, worths) = judge::judge(next, &mut set, search.pool, &free, rigid, &data, question);
+            let first = first.unwrap_or(1.0);
+            let looked = verdict::Looked { pool: search.pool, set, first, last: found.last, survey: &survey, worths };
+            return verdict::conclude(question, &data, &before, &last, repeatability, looked);
         }
         drop(pool);
         now = next;
     }
 }
 
-fn same_forms(a: &[Form], b: &[Form]) -> bool {
-    a.len() == b.len() && a.iter().all(|form| b.contains(form))
+fn same_forms(a: &[Form], b: &[Chosen]) -> bool {
+    a.len() == b.len() && a.iter().all(|form| b.iter().any(|cause| cause.form == *form))
 }
 
-/// Forms of a model with their coefficients.
-fn start_of(now: &Course) -> Vec<(Form, Vec<f64>)> {
+/// Causes with their coefficients; what belongs to the torque model also with what the motor currents say of it.
+fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Chosen> {
+    let borrowed: Vec<usize> = (0..forms.len()).filter(|i| is_torque_model(&forms[*i])).collect();
+    let own: Vec<&Form> = borrowed.iter().map(|i| &forms[*i]).collect();
+    // The residual is that of the present model; what is asked is the whole number, hence at zero where it is new.
+    let opinion = if own.is_empty() { None } else { lens.opinion(&own, &lens.present(&own)) };
+    let mut opinion = opinion.unwrap_or_default().into_iter();
+    let mut out = Vec::with_capacity(forms.len());
+    for (i, (form, coefficients)) in forms.iter().zip(coefficients).enumerate() {
+        let known = if borrowed.contains(&i) { opinion.by_ref().take(coefficients.len()).collect() } else { Vec::new() };
+        out.push(Chosen { form: form.clone(), coefficients, known });
+    }
+    out
+}
+
+/// Whether a form is a number of the torque model, seen only through what yields.
+fn is_torque_model(form: &Form) -> bool {
+    matches!(form, Form::Counterbalance(_) | Form::LinkMass(_) | Form::PayloadError(_))
+}
+
+/// Causes of a model with their fitted coefficients.
+fn start_of(now: &Course) -> Vec<Chosen> {
     let ranges = now.model.stack.effects().map(|(_, range)| range);
-    let own = ranges.skip(now.model.stack.effects().count() - now.forms.len());
-    now.forms.iter().cloned().zip(own.map(|range| now.model.x[range].to_vec())).collect()
+    let own = ranges.skip(now.model.stack.effects().count() - now.chosen.len());
+    let fitted =
+        |(cause, range): (&Chosen, std::ops::Range<usize>)| Chosen { coefficients: now.model.x[range].to_vec(), ..cause.clone() };
+    now.chosen.iter().zip(own).map(fitted).collect()
 }
 
 /// The base model at its start: the nominal robot, aligned.
@@ -157,7 +192,7 @@ fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Model 
 fn fitted(
     (from, base): (&Model, usize),
     free: Option<&[usize]>,
-    causes: &[(Form, Vec<f64>)],
+    causes: &[Chosen],
     data: &Measurements,
     question: &Question,
 ) -> Course {
@@ -171,24 +206,32 @@ fn fitted(
         .map(|entry| (entry.make)(&setting))
         .collect();
     let count = rigid.iter().map(|effect| effect.parameters(robot).len()).sum::<usize>();
-    let own = causes.iter().map(|(form, _)| Box::new(form.clone()) as Box<dyn Effect>);
+    let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
     let stack = EffectStack::new(robot, setting.base, rigid.into_iter().chain(own).collect());
     let mut model = Model::nominal(robot.clone(), stack);
     model.x[..count].copy_from_slice(&from.x[..count]);
-    let coefficients: Vec<f64> = causes.iter().flat_map(|(_, coefficients)| coefficients.iter().copied()).collect();
-    model.x[count..].copy_from_slice(&coefficients);
+    let mut at = count;
+    for cause in causes {
+        for (k, value) in cause.coefficients.iter().enumerate() {
+            model.x[at] = *value;
+            if let Some(prior) = cause.known.get(k) {
+                model.known.insert(at, Known { prior: Some(*prior), bounds: None });
+            }
+            at += 1;
+        }
+    }
     let all: Vec<usize> = (0..count).collect();
     let candidates: Vec<usize> = free.unwrap_or(&all).iter().copied().chain(count..model.x.len()).collect();
     let options = FitOptions { rows: question.fit, candidates: &candidates };
     let (fitted, screening) = fit_screened(&mut model, data, &options, question.set);
-    Course { model, fitted, screening, forms: causes.iter().map(|(form, _)| form.clone()).collect() }
+    Course { model, fitted, screening, chosen: causes.to_vec() }
 }
 
 /// The pool of all causes around the present model: the residual is that without them.
 fn pool_of<'a>(lens: &'a Lens<'a>, now: &Course, free: &[usize], survey: &Survey) -> Pool<'a> {
     let jacobian = lens.jacobian(&now.model, free);
     let mut residual = lens.residual.clone();
-    for (form, coefficients) in start_of(now) {
+    for Chosen { form, coefficients, .. } in start_of(now) {
         let columns = lens.columns(&form);
         for (column, coefficient) in columns.chunks(lens.lines()).zip(coefficients) {
             residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
@@ -201,7 +244,7 @@ fn pool_of<'a>(lens: &'a Lens<'a>, now: &Course, free: &[usize], survey: &Survey
 /// How far each joint yields in the present model, rad/Nm.
 fn yielding(now: &Course, joints: usize) -> Vec<f64> {
     let mut out = vec![0.0; joints];
-    for (form, coefficients) in start_of(now) {
+    for Chosen { form, coefficients, .. } in start_of(now) {
         if let (Form::JointCompliance(_) | Form::JointHardening(_), crate::effect::Place::Joint(joint)) =
             (&form, crate::effect::Placed::place(&form))
         {
@@ -227,7 +270,7 @@ fn poses(data: &Measurements, rows: &[usize]) -> Vec<usize> {
 /// Covariance of every row's point per squared joint deviation.
 fn spreads(model: &Model, data: &Measurements) -> Vec<Matrix3<f64>> {
     let all: Vec<usize> = (0..data.rows()).collect();
-    let lens = Lens::new(model, data, &all);
+    let lens = Lens::new(model, data, &all, false);
     all.iter().map(|row| noise::by_all(lens.by_joint(*row))).collect()
 }
 

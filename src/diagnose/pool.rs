@@ -113,7 +113,7 @@ impl<'a> Pool<'a> {
             self.gram.push(own.iter().flat_map(|a| own.iter().map(|b| dot(a, b))).collect());
             let places = hypothesis.form.place().count(joints) as f64;
             self.charge.push(2.0 * hypothesis.tried.ln() + hypothesis.charge + 2.0 * places.ln());
-            self.borrowed.push(matches!(hypothesis.form.name(), "counterbalance" | "link_mass" | "payload_error"));
+            self.borrowed.push(super::is_torque_model(&hypothesis.form));
             self.keys.push(hypothesis.form.key());
             self.hypotheses.push(hypothesis);
         }
@@ -178,7 +178,7 @@ impl<'a> Pool<'a> {
         score
     }
 
-    /// Charge for every coefficient that should be positive and is not, by more than two standard errors.
+    /// Charge for every coefficient that has the wrong sign or is too large, by more than two standard errors.
     fn sign_charge(&self, set: &[usize], solution: &super::state::Solution) -> f64 {
         let columns = set.iter().flat_map(|k| (self.first[*k]..self.first[*k + 1]).map(move |_| *k));
         let wrong = columns

@@ -25,8 +25,10 @@ impl Default for SearchOptions {
     }
 }
 
-/// A cause more must lower the criterion by this much: strong evidence (Kass and Raftery, 1995).
-pub(crate) const DECISIVE: f64 = 6.0;
+/// The first cause must lower the criterion by this much: strong evidence (Kass and Raftery, 1995); the gate judges it too.
+const DECISIVE: f64 = 6.0;
+/// A further one by more: the shape of the first is never quite the true one, and what is left of it imitates others.
+const FURTHER: f64 = 12.0;
 /// Levels of refinement, and how many may bring nothing.
 const LEVELS: i32 = 10;
 const IDLE: usize = 3;
@@ -78,7 +80,7 @@ impl<'a, 'b> Search<'a, 'b> {
                 break;
             }
             let Some(order) = self.step(&states) else { break };
-            if self.pool.bic(&order[0]) > self.pool.bic(&best) - DECISIVE {
+            if self.pool.bic(&order[0]) > self.pool.bic(&best) - decisive(best.len() + 1) {
                 break;
             }
             best = self.refine(order[0].clone(), false);
@@ -132,6 +134,11 @@ impl<'a, 'b> Search<'a, 'b> {
         };
         let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
         firsts.into_iter().map(|h| with(set, h)).collect()
+    }
+
+    /// Whether a hypothesis is a free curve.
+    fn is_free(&self, h: usize) -> bool {
+        matches!(self.pool.hypotheses[h].form, Form::Unknown(_) | Form::JointTable(_))
     }
 
     fn can_refine(&self, h: usize) -> bool {
@@ -214,7 +221,17 @@ impl<'a, 'b> Search<'a, 'b> {
                 let rest: Vec<usize> = set.iter().copied().filter(|k| !gone.contains(k)).collect();
                 let state = self.pool.state(&rest);
                 let candidates = best(self.pool, &state, 3 + gone.len()).into_iter().filter(|h| !gone.contains(h));
-                others.extend(candidates.map(|h| with(&rest, h)));
+                let candidates: Vec<Vec<usize>> = candidates.map(|h| with(&rest, h)).collect();
+                // One free curve may stand for two named causes.
+                if gone.len() == 1 && self.is_free(gone[0]) {
+                    for one in candidates.iter().filter(|set| !set.iter().any(|k| !rest.contains(k) && self.is_free(*k))).take(2)
+                    {
+                        let state = self.pool.state(one);
+                        let second = best(self.pool, &state, 4).into_iter().filter(|h| !self.is_free(*h));
+                        others.extend(second.map(|h| with(one, h)));
+                    }
+                }
+                others.extend(candidates);
                 if gone.len() > 1 || set.len() == 1 {
                     let shaped = self.shaped(&rest);
                     others.extend(shaped.into_iter().map(|set| self.refine(set, true)).collect::<Vec<_>>());
@@ -239,7 +256,7 @@ impl<'a, 'b> Search<'a, 'b> {
                 rest
             });
             let Some(rest) = without.min_by(|a, b| self.pool.bic(a).total_cmp(&self.pool.bic(b))) else { break };
-            if self.pool.bic(&rest) >= self.pool.bic(&set) + DECISIVE {
+            if self.pool.bic(&rest) >= self.pool.bic(&set) + decisive(set.len()) {
                 break;
             }
             set = rest;
@@ -259,6 +276,11 @@ impl<'a, 'b> Search<'a, 'b> {
 pub(crate) fn best(pool: &Pool, state: &State, most: usize) -> Vec<usize> {
     let mut keys = BTreeSet::new();
     state.falls(pool).iter().map(|(_, h)| *h).filter(|h| keys.insert(&pool.keys[*h])).take(most).collect()
+}
+
+/// What the last of so many causes must be worth.
+fn decisive(causes: usize) -> f64 {
+    if causes > 1 { FURTHER } else { DECISIVE }
 }
 
 fn with(set: &[usize], h: usize) -> Vec<usize> {

@@ -1,9 +1,9 @@
 //! The verdict: findings with their evidence, before and after on held-out rows, and what is left.
 
 use super::finding::{Finding, findings};
+use super::judge::Worth;
 use super::noise::Repeatability;
 use super::pool::Pool;
-use super::search::Found;
 use super::{Course, Question};
 use crate::effect::Survey;
 use crate::estimate::{Fitted, Model, Screening, Weight};
@@ -84,8 +84,12 @@ pub struct Diagnosis {
 /// What the last round looked at.
 pub(crate) struct Looked<'a, 'b> {
     pub pool: &'b Pool<'a>,
-    pub found: Found,
+    /// The chosen causes' positions in the pool, in their order.
+    pub set: Vec<usize>,
+    /// The gate's probability at the start and at the end.
     pub first: f64,
+    pub last: f64,
+    pub worths: Vec<Worth>,
     pub survey: &'b Survey<'a>,
 }
 
@@ -125,7 +129,7 @@ pub(crate) fn conclude(
     let chi_square = whitened / freedom;
     let physics: Vec<&Finding> = findings.iter().filter(|finding| finding.is_physics()).collect();
     let blind = repeatability.repeats < REPEATS && noise_floor > NOT_NOISE * instrument;
-    let left = (looked.found.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD;
+    let left = (looked.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD;
     let only_unknown = !physics.is_empty() && physics.iter().all(|finding| finding.effect == "unknown");
     let verdict = if blind || left || only_unknown {
         Verdict::Unexplained
@@ -148,7 +152,7 @@ pub(crate) fn conclude(
         leftover_rms: square(kept, &|row| (data.position[row] - predicted[row]).norm()),
         chi_square,
         gate_first: looked.first,
-        gate_last: looked.found.last,
+        gate_last: looked.last,
         repeatability,
         model: last.model.clone(),
         fitted: last.fitted.clone(),

@@ -13,10 +13,15 @@ pub struct AxisWobble {
     order: u32,
 }
 
+/// No bearing lets an axis tilt further, rad (100 arcsec).
+const LARGEST: f64 = 5e-4;
+
 impl AxisWobble {
+    /// Every joint but the last, whose tilt one measured point cannot tell from its angle.
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let forms = survey.revolute().flat_map(|joint| [1, 2].map(|order| Self { joint, order }));
-        forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()
+        let last = survey.joints() - 1;
+        let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| [1, 2].map(|order| Self { joint, order }));
+        forms.map(|form| Hypothesis::new(form, 2).charged(4.0).within(LARGEST)).collect()
     }
 }
 

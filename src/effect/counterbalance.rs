@@ -1,6 +1,6 @@
-//! `counterbalance`: a spring or gas balancer missing from the torque model; its torque is of first order in the joint's angle.
+//! `counterbalance` (and `cable_drag`): a spring missing from the torque model; its torque is of first order in the joint's angle.
 //!
-//! It is seen through the joint's compliance: without one it moves nothing.
+//! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable. It is seen through the joint's compliance: without one it moves nothing.
 
 use super::form::parameters;
 use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
@@ -27,7 +27,7 @@ impl Counterbalance {
 
 impl Effect for Counterbalance {
     fn name(&self) -> &'static str {
-        "counterbalance"
+        if (1..=2).contains(&self.joint) { "counterbalance" } else { "cable_drag" }
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {

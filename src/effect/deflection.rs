@@ -86,6 +86,14 @@ impl Deflection {
         self.partials.push((self.first + parameter, Direction::Station(station, rate)));
     }
 
+    /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).
+    pub(crate) fn loads(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        self.partials.iter().filter_map(|(parameter, direction)| match direction {
+            Direction::Torque(joint, rate) => Some((*parameter, *joint, *rate)),
+            _ => None,
+        })
+    }
+
     /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is the effect's burden.
     pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
         self.partials.push((self.first + parameter, Direction::Torque(joint, rate)));

@@ -30,20 +30,15 @@ impl JointCompliance {
         (0..robot.joints()).filter(move |j| one.is_none_or(|joint| joint == *j)).filter(|j| robot.is_revolute(*j))
     }
 
-    /// Every loaded joint, by gravity and, where currents were recorded, by those.
+    /// Every joint that gravity loads; by motor currents where the robot file has no masses to make a torque from.
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let loads: &[Load] =
-            if survey.data.current.is_some() { &[Load::GravityTorque, Load::MotorCurrent] } else { &[Load::GravityTorque] };
-        let loaded = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        loaded
-            .flat_map(|joint| {
-                loads.iter().map(move |load| {
-                    let hypothesis = Hypothesis::new(Self::of(joint, *load), loads.len());
-                    // The sign of a current is the controller's.
-                    if *load == Load::GravityTorque { hypothesis.positive() } else { hypothesis.charged(2.0) }
-                })
-            })
-            .collect()
+        let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Self::of(joint, Load::GravityTorque), 1).positive());
+        let deaf = survey.robot.has_masses() || survey.data.current.is_none();
+        let by_current = survey.revolute().filter(|_| !deaf);
+        // The sign of a current is the controller's.
+        let by_current = by_current.map(|joint| Hypothesis::new(Self::of(joint, Load::MotorCurrent), 2));
+        by_gravity.chain(by_current).collect()
     }
 }
 

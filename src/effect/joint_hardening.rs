@@ -14,6 +14,8 @@ pub enum Law {
     Saturating { at_nm: f64 },
     /// at tanh(tau / at): a soft zone around no load.
     SoftZone { at_nm: f64 },
+    /// tau up to `at`, nothing more beyond: two stiffnesses.
+    Knee { at_nm: f64 },
     /// at (|tau| / at)^exponent with the sign of tau.
     Power { exponent: f64, at_nm: f64 },
     /// A curve over the torques seen.
@@ -42,8 +44,9 @@ impl JointHardening {
             let (low, high) = survey.torques(joint).fold((0.0_f64, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
             let laws = [0.05, 0.15, 0.5, 1.5].map(|share| Law::Saturating { at_nm: share * most }).into_iter();
             let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
+            let laws = laws.chain([0.1, 0.3, 0.6].map(|share| Law::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(Self { joint, law }, 7).charged(4.0)));
+            out.extend(laws.map(|law| Hypothesis::new(Self { joint, law }, 10).charged(4.0)));
             out.push(Hypothesis::new(Self { joint, law: Law::Curve { low_nm: low, high_nm: high } }, 1).charged(4.0));
         }
         out
@@ -60,6 +63,7 @@ impl JointHardening {
                 let t = libm::tanh(torque / at_nm);
                 (at_nm * t, 1.0 - t * t)
             }
+            Law::Knee { at_nm } => (torque.clamp(-at_nm, at_nm), f64::from(torque.abs() < at_nm)),
             Law::Power { exponent, at_nm } => {
                 let share = torque.abs() / at_nm;
                 (at_nm * libm::pow(share, exponent) * torque.signum(), exponent * libm::pow(share, exponent - 1.0))
@@ -116,6 +120,7 @@ impl Placed for JointHardening {
         let scaled = |factor: f64| match self.law {
             Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: at_nm * factor }),
             Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: at_nm * factor }),
+            Law::Knee { at_nm } => Some(Law::Knee { at_nm: at_nm * factor }),
             Law::Power { exponent, at_nm } => Some(Law::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm }),
             Law::Curve { .. } => None,
         };

@@ -115,15 +115,21 @@ pub struct Hypothesis {
     pub charge: f64,
     /// True where only positive coefficients make sense.
     pub positive: bool,
+    /// The largest coefficient that makes sense, SI.
+    pub largest: f64,
 }
 
 impl Hypothesis {
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self { form: form.into(), tried: tried.max(1) as f64, charge: 0.0, positive: false }
+        Self { form: form.into(), tried: tried.max(1) as f64, charge: 0.0, positive: false, largest: f64::INFINITY }
     }
 
     pub fn positive(self) -> Self {
         Self { positive: true, ..self }
+    }
+
+    pub fn within(self, largest: f64) -> Self {
+        Self { largest, ..self }
     }
 
     pub fn charged(self, charge: f64) -> Self {

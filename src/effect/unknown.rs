@@ -25,6 +25,8 @@ pub enum Signature {
     Product { a: usize, b: usize },
     /// A smooth function of two joint positions.
     Surface { a: usize, b: usize, a_range: [f64; 2], b_range: [f64; 2] },
+    /// A slow sine in time.
+    Sway { period_s: f64 },
     /// A smooth function of time.
     Time { start_s: f64, end_s: f64 },
     /// With temperature or warm-up.
@@ -47,6 +49,7 @@ impl fmt::Display for Signature {
             Self::Periodic { by, order } => write!(f, "periodic in q{}, {order} a turn", by + 1),
             Self::Product { a, b } => write!(f, "product of functions of q{} and q{}", a + 1, b + 1),
             Self::Surface { a, b, .. } => write!(f, "function of q{} and q{}", a + 1, b + 1),
+            Self::Sway { period_s } => write!(f, "sways with a period of {period_s:.0} s"),
             Self::Time { .. } => f.write_str("function of time"),
             Self::Warming(_) => f.write_str("goes with the warm-up"),
             Self::Payload { .. } => f.write_str("differs with the payload"),
@@ -65,10 +68,12 @@ const CURVE: usize = 8;
 const EACH: usize = 3;
 /// Widths (rad) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
+/// Periods of a sway as shares of the recording.
+const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
 /// -2 ln of the odds of things outside the library.
-const OPEN: f64 = 4.0;
+const OPEN: f64 = 8.0;
 
 impl Unknown {
     pub fn signature(&self) -> Signature {
@@ -83,6 +88,8 @@ impl Unknown {
         let [start_s, end_s] = survey.time;
         if end_s > start_s {
             add(Place::Base, Signature::Time { start_s, end_s }, 1, 0.0);
+            let periods = SWAYS.map(|share| share * (end_s - start_s));
+            periods.into_iter().for_each(|period_s| add(Place::Base, Signature::Sway { period_s }, SWAYS.len(), 0.0));
         }
         if survey.payload_changes() {
             let signature = Signature::Payload { above_kg: survey.heavy_payload() };
@@ -163,6 +170,11 @@ impl Unknown {
                     cosines(at(b), b_range, EACH).enumerate().for_each(|(k, y)| each(EACH * i + k, x * y));
                 }
             }
+            Signature::Sway { period_s } => {
+                let (sine, cosine) = libm::sincos(std::f64::consts::TAU * state.time() / period_s);
+                each(0, sine);
+                each(1, cosine);
+            }
             Signature::Time { start_s, end_s } => {
                 let count = if self.is_joint() { CURVE } else { EACH };
                 cosines(state.time(), [start_s, end_s], count).enumerate().for_each(|(k, value)| each(k, value));
@@ -179,7 +191,7 @@ impl Unknown {
     fn count(&self) -> usize {
         match self.signature {
             Signature::Angle { .. } => CURVE,
-            Signature::Periodic { .. } => 2,
+            Signature::Periodic { .. } | Signature::Sway { .. } => 2,
             Signature::Product { .. } => 4,
             Signature::Surface { .. } => EACH * EACH,
             Signature::Time { .. } if self.is_joint() => CURVE,
@@ -188,9 +200,9 @@ impl Unknown {
         }
     }
 
-    /// Directions at a frame: displacement of a tool, all of a base.
+    /// Directions at a frame: displacement of a tool or a swaying base, all of a base else.
     fn axes(&self) -> usize {
-        if self.place == Place::Tool { 3 } else { 6 }
+        if self.place == Place::Tool || matches!(self.signature, Signature::Sway { .. }) { 3 } else { 6 }
     }
 }
 
@@ -246,6 +258,10 @@ impl Placed for Unknown {
                 let places = [from_rad - step, from_rad + step].into_iter().filter(|at| *at > low && *at < high);
                 places.map(|from_rad| with(Signature::Hinge { by, from_rad, upwards })).collect()
             }
+            Signature::Sway { period_s } => {
+                let step = libm::pow(1.15, libm::exp2(-0.7 * f64::from(level)));
+                [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor })).to_vec()
+            }
             Signature::Warming(by) => by.near(level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
             _ => Vec::new(),
         }
@@ -257,6 +273,7 @@ impl Placed for Unknown {
             Signature::Hinge { .. } => "hinge".into(),
             Signature::Bump { .. } => "bump".into(),
             Signature::Product { a, b } | Signature::Surface { a, b, .. } => format!("q{}_q{}", a + 1, b + 1),
+            Signature::Sway { .. } => "sway".into(),
             Signature::Time { .. } => "time".into(),
             Signature::Warming(_) => "warm".into(),
             Signature::Payload { .. } => "payload".into(),

@@ -22,6 +22,7 @@ pub mod threads;
 
 pub use align::align;
 pub use covariance::Covariance;
+pub(crate) use fisher::tail;
 pub use fit::{Fate, FitOptions, Fitted, fit};
 pub use folds::{Folds, cross_validate};
 pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};

@@ -1,0 +1,125 @@
+//! Held-out rows judge: what each finding is worth there, and which of two explanations that fit alike carries over.
+
+use super::pool::Pool;
+use super::{Chosen, Course, Question, fitted, start_of};
+use crate::effect::{Effect, Form, Placed};
+use crate::robot::Measurements;
+
+/// Causes of one effect and place, as positions among the chosen; what the held-out rms (m) falls by with them.
+#[derive(Debug, Clone)]
+pub(crate) struct Worth {
+    pub effect: &'static str,
+    pub place: String,
+    pub gain: f64,
+}
+
+/// A model that is worse on held-out rows by this share is worse.
+const WORSE: f64 = 0.03;
+/// Explanations whose criterion is this close fit alike.
+const ALIKE: f64 = 6.0;
+/// Rivals that are tried in place of a cause.
+const RIVALS: usize = 4;
+
+/// Rms error (m) of held-out rows that belong.
+fn held_out(now: &Course, data: &Measurements, question: &Question) -> Option<f64> {
+    let aside = |row: &usize| now.screening.suspects.iter().any(|s| s.row == *row && !s.used());
+    let rows: Vec<usize> = question.validate.iter().copied().filter(|row| !aside(row)).collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let predicted = now.model.predict(data);
+    let squares: f64 = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm_squared()).sum();
+    Some((squares / rows.len() as f64).sqrt())
+}
+
+/// Exchanges or drops causes that make held-out rows worse; `set` holds the chosen causes' positions in the pool, in their order.
+pub(crate) fn judge(
+    mut now: Course,
+    set: &mut Vec<usize>,
+    pool: &Pool,
+    free: &[usize],
+    rigid: usize,
+    data: &Measurements,
+    question: &Question,
+) -> (Course, Vec<Worth>) {
+    let Some(mut rms) = held_out(&now, data, question) else { return (now, Vec::new()) };
+    let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(free), chosen, data, question);
+    let mut worths = Vec::new();
+    let mut at = 0;
+    let mut done: Vec<(&'static str, String)> = Vec::new();
+    while at < set.len() {
+        let form = &pool.hypotheses[set[at]].form;
+        let group = (form.name(), form.place().to_string());
+        if done.contains(&group) {
+            at += 1;
+            continue;
+        }
+        done.push(group.clone());
+        let all = start_of(&now);
+        let is_own = |k: &usize| {
+            let form = &pool.hypotheses[*k].form;
+            form.name() == group.0 && form.place().to_string() == group.1
+        };
+        let rest: Vec<usize> = set.iter().copied().filter(|k| !is_own(k)).collect();
+        let others: Vec<Chosen> = set.iter().zip(&all).filter(|(k, _)| !is_own(k)).map(|(_, cause)| cause.clone()).collect();
+        let without = refit(&now, &others);
+        let bare = held_out(&without, data, question).unwrap_or(rms);
+        let mut best = (rms * (1.0 - WORSE), None);
+        let bic = pool.bic(set);
+        let mut sorted = rest.clone();
+        sorted.sort_unstable();
+        let state = pool.state(&sorted);
+        let mut tried: Vec<(&str, String)> = vec![group.clone()];
+        for (_, h) in state.falls(pool).iter().take(60) {
+            let rival = &pool.hypotheses[*h].form;
+            let name = (rival.name(), rival.place().to_string());
+            let mut other = sorted.clone();
+            other.push(*h);
+            other.sort_unstable();
+            if tried.len() > RIVALS || tried.contains(&name) || pool.bic(&other) - bic > ALIKE {
+                continue;
+            }
+            tried.push(name);
+            let mut chosen = others.clone();
+            chosen.push(start(pool, &other, *h, rival));
+            let course = refit(&now, &chosen);
+            if let Some(other) = held_out(&course, data, question).filter(|other| *other < best.0) {
+                best = (other, Some((*h, course)));
+            }
+        }
+        match best {
+            (other, Some((h, course))) => {
+                *set = rest;
+                set.push(h);
+                worths.push(worth(&pool.hypotheses[h].form, bare - other));
+                (now, rms) = (course, other);
+                at = 0;
+            }
+            _ if bare < rms * (1.0 - WORSE) => {
+                *set = rest;
+                (now, rms) = (without, bare);
+                at = 0;
+            }
+            _ => {
+                worths.push(Worth { effect: group.0, place: group.1, gain: bare - rms });
+                at += 1;
+            }
+        }
+    }
+    (now, worths)
+}
+
+fn worth(form: &Form, gain: f64) -> Worth {
+    Worth { effect: form.name(), place: form.place().to_string(), gain }
+}
+
+/// A hypothesis with its coefficients in a set.
+fn start(pool: &Pool, set: &[usize], h: usize, form: &Form) -> Chosen {
+    let solution = super::state::solve(pool, set);
+    let mut at = 0;
+    for k in set.iter().take_while(|k| **k != h) {
+        at += pool.first[k + 1] - pool.first[*k];
+    }
+    let count = pool.first[h + 1] - pool.first[h];
+    Chosen { form: form.clone(), coefficients: solution.coefficients[at..at + count].to_vec(), known: Vec::new() }
+}
