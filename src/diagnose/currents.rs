@@ -22,8 +22,8 @@ pub(crate) struct Currents {
 
 /// A motor follows the model if its torque per modelled torque is within these.
 const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
-/// No current says more than this share of the joint's largest torque.
-const FINEST: f64 = 1e-3;
+/// No current says more than this share of the joint's largest torque: motor constants and friction are no better known.
+const FINEST: f64 = 5e-3;
 
 impl Currents {
     /// Of `rows` seen as `sights`; `None` where no motor can be heard.

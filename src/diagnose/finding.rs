@@ -3,6 +3,7 @@
 use super::Course;
 use super::pool::Pool;
 use super::state::solve;
+use super::statement::sentence;
 use super::verdict::Looked;
 use crate::effect::{Effect, Form, Place, Placed};
 use crate::estimate::{Fate, Kind, Screening, tail};
@@ -80,6 +81,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         let form = &pool.hypotheses[*k].form;
         groups.entry((form.name(), form.place().to_string())).or_default().push(i);
     }
+    refine(pool, &mut groups, set);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
     let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
     for place in hard {
@@ -140,7 +142,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             Place::Joint(joint) => Some((joint, looked.survey.range[joint])),
             _ => None,
         };
-        let statement = format!("{effect} at {place}");
+        let statement = sentence(effect, &place, &forms, &numbers, effect_rms);
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
     out.extend(faults(&last.screening));
@@ -148,6 +150,45 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
 }
+
+/// What else an effect's own shape may leave at the same joint where it is not quite that of the library.
+fn leaves(main: &str) -> &'static [&'static str] {
+    match main {
+        "counterbalance" | "cable_drag" => &["gear_cyclic", "unknown", "joint_table", "backlash"],
+        "joint_hardening" => &["backlash", "unknown"],
+        "joint_compliance" => &["unknown"],
+        "backlash" => &["joint_hardening", "unknown"],
+        "gear_cyclic" | "joint_table" => &["unknown"],
+        "unknown" => &["gear_cyclic", "joint_table"],
+        _ => &[],
+    }
+}
+
+/// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
+fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
+    let mut sorted = set.to_vec();
+    sorted.sort_unstable();
+    let whole = solve(pool, &sorted).gain;
+    let gain = |members: &[usize]| {
+        let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
+        let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
+        whole - solve(pool, &rest).gain
+    };
+    let gains: BTreeMap<(&'static str, String), f64> = groups.iter().map(|(key, members)| (key.clone(), gain(members))).collect();
+    for (small, own) in &gains {
+        let main = gains
+            .iter()
+            .filter(|(main, gain)| main.1 == small.1 && *own < REFINEMENT * **gain && leaves(main.0).contains(&small.0))
+            .max_by(|a, b| a.1.total_cmp(b.1));
+        if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
+            let members = groups.remove(small).unwrap_or_default();
+            groups.entry(main.clone()).or_default().extend(members);
+        }
+    }
+}
+
+/// Less than this share of a finding's gain at its own joint is its finer shape.
+const REFINEMENT: f64 = 0.1;
 
 /// Rows of the recording that no model can follow, as findings.
 fn faults(screening: &Screening) -> Vec<Finding> {

@@ -73,6 +73,12 @@ impl<'a> Lens<'a> {
         &self.sights[row].by_joint
     }
 
+    /// The largest motion of the point by each joint, m/rad.
+    pub fn reach(&self) -> Vec<f64> {
+        let joints = 0..self.robot.joints();
+        joints.map(|j| self.sights.iter().map(|sight| sight.by_joint[j].norm()).fold(0.0, f64::max)).collect()
+    }
+
     /// Columns of a form, `lines` each, one after another.
     pub fn columns(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();

@@ -13,6 +13,7 @@ mod noise;
 mod pool;
 mod search;
 mod state;
+mod statement;
 mod verdict;
 
 pub use finding::{Evidence, Finding, Number, Rival};
@@ -115,7 +116,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
         let kept_same = next.screening.kept == now.screening.kept;
         let last_round = round >= ROUNDS;
-        if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > 0.01 {
+        if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > options.alpha {
             asked_residual = true;
             let rows = &next.screening.kept;
             let predicted = next.model.predict(&data);

@@ -21,14 +21,14 @@ pub(crate) struct SearchOptions {
 
 impl Default for SearchOptions {
     fn default() -> Self {
-        Self { most: 12, beam: 3, draws: 199, alpha: 0.01, seed: 1 }
+        Self { most: 12, beam: 3, draws: 299, alpha: 0.004, seed: 1 }
     }
 }
 
-/// The first cause must lower the criterion by this much: strong evidence (Kass and Raftery, 1995); the gate judges it too.
-const DECISIVE: f64 = 6.0;
+/// The first cause must lower the criterion by this much: strong evidence (Kass and Raftery, 1995), and the gate judges it too.
+const DECISIVE: f64 = 8.0;
 /// A further one by more: the shape of the first is never quite the true one, and what is left of it imitates others.
-const FURTHER: f64 = 12.0;
+const FURTHER: f64 = 16.0;
 /// Levels of refinement, and how many may bring nothing.
 const LEVELS: i32 = 10;
 const IDLE: usize = 3;
@@ -136,9 +136,9 @@ impl<'a, 'b> Search<'a, 'b> {
         firsts.into_iter().map(|h| with(set, h)).collect()
     }
 
-    /// Whether a hypothesis is a free curve.
-    fn is_free(&self, h: usize) -> bool {
-        matches!(self.pool.hypotheses[h].form, Form::Unknown(_) | Form::JointTable(_))
+    /// Whether a hypothesis may stand in for two others: a free curve, or the bending of a link for two joints' wind-up.
+    fn stands_in(&self, h: usize) -> bool {
+        matches!(self.pool.hypotheses[h].form, Form::Unknown(_) | Form::JointTable(_) | Form::LinkCompliance(_))
     }
 
     fn can_refine(&self, h: usize) -> bool {
@@ -222,12 +222,13 @@ impl<'a, 'b> Search<'a, 'b> {
                 let state = self.pool.state(&rest);
                 let candidates = best(self.pool, &state, 3 + gone.len()).into_iter().filter(|h| !gone.contains(h));
                 let candidates: Vec<Vec<usize>> = candidates.map(|h| with(&rest, h)).collect();
-                // One free curve may stand for two named causes.
-                if gone.len() == 1 && self.is_free(gone[0]) {
-                    for one in candidates.iter().filter(|set| !set.iter().any(|k| !rest.contains(k) && self.is_free(*k))).take(2)
+                // One may stand in for two.
+                if gone.len() == 1 && self.stands_in(gone[0]) {
+                    for one in
+                        candidates.iter().filter(|set| !set.iter().any(|k| !rest.contains(k) && self.stands_in(*k))).take(2)
                     {
                         let state = self.pool.state(one);
-                        let second = best(self.pool, &state, 4).into_iter().filter(|h| !self.is_free(*h));
+                        let second = best(self.pool, &state, 4).into_iter().filter(|h| !self.stands_in(*h));
                         others.extend(second.map(|h| with(one, h)));
                     }
                 }

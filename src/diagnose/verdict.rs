@@ -4,8 +4,9 @@ use super::finding::{Finding, findings};
 use super::judge::Worth;
 use super::noise::Repeatability;
 use super::pool::Pool;
+use super::statement::{next, not_observable};
 use super::{Course, Question};
-use crate::effect::Survey;
+use crate::effect::{Effect, Placed, Survey};
 use crate::estimate::{Fitted, Model, Screening, Weight};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -94,13 +95,28 @@ pub(crate) struct Looked<'a, 'b> {
 }
 
 /// A gate above this holds nothing.
-const SIGNIFICANT: f64 = 0.01;
+const SIGNIFICANT: f64 = 0.004;
 /// With structure left, a residual this much larger than the noise is not explained; without, this much.
 const LOUD: f64 = 1.25;
 const TOO_LOUD: f64 = 2.5;
 /// Without repeats a residual is not called noise where it is this many times the instrument's.
 const NOT_NOISE: f64 = 4.0;
 const REPEATS: usize = 10;
+
+/// An unnamed finding of less than this share of the strongest one's gain is its rest.
+const REST: f64 = 0.03;
+
+impl Looked<'_, '_> {
+    /// What the best hypothesis beside the chosen ones would be.
+    fn best(&self) -> Option<String> {
+        let mut set = self.set.clone();
+        set.sort_unstable();
+        let state = self.pool.state(&set);
+        let (_, best) = *state.falls(self.pool).first()?;
+        let form = &self.pool.hypotheses[best].form;
+        Some(format!("most like {} at {}", form.name(), form.place()))
+    }
+}
 
 /// Draws the conclusions of the last round.
 pub(crate) fn conclude(
@@ -122,6 +138,14 @@ pub(crate) fn conclude(
     let noise_floor = square(rows, &|row| data.noise(row));
     let instrument = square(rows, &|row| data.sigma[row].norm());
     let findings = findings(last, &looked);
+    // A small rest that has no name beside strong findings is what their shapes leave: no cause of its own.
+    let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
+    let small = |finding: &Finding| {
+        finding.effect == "unknown" && finding.evidence.is_some_and(|evidence| evidence.gain < REST * strongest)
+    };
+    let (rest, findings): (Vec<Finding>, Vec<Finding>) = findings.into_iter().partition(small);
+    let mut signature =
+        (!rest.is_empty()).then(|| rest.iter().map(|finding| finding.statement.clone()).collect::<Vec<_>>().join(" "));
     let kept = &last.screening.kept;
     let whitened: f64 =
         kept.iter().map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared()).sum();
@@ -130,6 +154,9 @@ pub(crate) fn conclude(
     let physics: Vec<&Finding> = findings.iter().filter(|finding| finding.is_physics()).collect();
     let blind = repeatability.repeats < REPEATS && noise_floor > NOT_NOISE * instrument;
     let left = (looked.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD;
+    if left && signature.is_none() {
+        signature = looked.best();
+    }
     let only_unknown = !physics.is_empty() && physics.iter().all(|finding| finding.effect == "unknown");
     let verdict = if blind || left || only_unknown {
         Verdict::Unexplained
@@ -138,6 +165,7 @@ pub(crate) fn conclude(
     } else {
         Verdict::Explained
     };
+    let next_measurements = next(&findings);
     Diagnosis {
         verdict,
         noise_floor,
@@ -146,9 +174,9 @@ pub(crate) fn conclude(
         held_out,
         findings,
         screening: last.screening.clone(),
-        not_observable: Vec::new(),
-        signature: None,
-        next_measurements: Vec::new(),
+        not_observable: not_observable(looked.survey, &looked.pool.lens.reach()),
+        signature,
+        next_measurements,
         leftover_rms: square(kept, &|row| (data.position[row] - predicted[row]).norm()),
         chi_square,
         gate_first: looked.first,

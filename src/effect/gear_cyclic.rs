@@ -16,8 +16,8 @@ pub struct GearCyclic {
 const ORDERS: u32 = 48;
 /// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
 const PHASE: f64 = 2.2;
-/// Eccentricity makes these orders on any joint; they are tried as a few, all others as many.
-const LOW: u32 = 2;
+/// Eccentricity makes the lowest orders on any joint; they are tried as a few, all others as many.
+const LOW: u32 = 4;
 
 impl GearCyclic {
     pub fn new(joint: usize, order: u32) -> Self {

@@ -36,8 +36,8 @@ pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
 /// Shorter links (m) neither bend nor grow visibly.
 pub(super) const SHORT: f64 = 1e-6;
 
-/// Links shorter than this share of the longest hardly bend: -2 ln of the odds.
-const STUBBY: f64 = 0.2;
+/// The last links are a stubby wrist, and hardly bend: -2 ln of the odds.
+const WRIST: usize = 2;
 const UNLIKELY: f64 = 10.0;
 
 impl LinkCompliance {
@@ -47,9 +47,8 @@ impl LinkCompliance {
         let loaded = (0..n).any(|joint| survey.is_loaded(joint));
         let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
         let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
-        let longest = (0..n).map(|link| extent(survey.robot, link).norm()).fold(0.0, f64::max);
         let forms = links.flat_map(|link| bendings.map(|bending| Self { link, bending }));
-        let odds = |form: &Self| if extent(survey.robot, form.link).norm() < STUBBY * longest { UNLIKELY } else { 0.0 };
+        let odds = |form: &Self| if form.link + WRIST >= n { UNLIKELY } else { 0.0 };
         forms
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().charged(odds))

@@ -1,0 +1,193 @@
+//! Findings in a sentence that a mechanic understands, and what the recording cannot show.
+
+use super::finding::Number;
+use crate::effect::{Course, Form, GearCyclic, Law, Side, Survey, Warmth};
+
+/// The sentence of a finding from its forms and numbers; `rms` is the size of the whole effect at the measured points, m.
+pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Number], rms: f64) -> String {
+    let first = numbers.first();
+    let value = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit));
+    let arcsec = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{:.0} {}", n.value.abs(), n.unit));
+    let text = match effect {
+        "joint_compliance" => format!("{place} winds up under its load by {}", value(first)),
+        "joint_hardening" => {
+            let shape = match forms.iter().find_map(|form| if let Form::JointHardening(h) = form { Some(h.law()) } else { None })
+            {
+                Some(Law::Saturating { at_nm }) => format!("it stiffens above about {at_nm:.0} Nm"),
+                Some(Law::SoftZone { at_nm }) => format!("it is soft below about {at_nm:.0} Nm"),
+                Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {at_nm:.0} Nm"),
+                Some(Law::Power { exponent, .. }) => format!("it goes with the load to the power of {exponent:.1}"),
+                _ => "its shape is a free curve of the load".to_string(),
+            };
+            format!("{place} winds up under its load, but not in proportion: {shape}")
+        }
+        "link_compliance" => format!("{place} bends under what it carries by {}", value(first)),
+        "base_compliance" => format!("the base tilts under the arm's weight by {}", value(first)),
+        "gear_cyclic" => {
+            format!("the transmission or encoder of {place} errs periodically with its angle: {}", orders(forms, numbers))
+        }
+        "gear_motor_cyclic" => {
+            format!("{place} errs periodically with its motor's angle, amplitude {}", amplitude(numbers.get(0..2)))
+        }
+        "joint_table" => format!("{place} has a repeatable error of no simple form, kept as a table"),
+        "backlash" => {
+            let side = forms.iter().find_map(|form| if let Form::Backlash(b) = form { Some(b.side()) } else { None });
+            let by = match side {
+                Some(Side::Load { .. }) => "to the side that the load pushes it".to_string(),
+                Some(Side::Mixed { threshold_nm }) => {
+                    format!("to the side of approach under loads below about {threshold_nm:.0} Nm, above to that of the load")
+                }
+                _ => "by the direction from which it came".to_string(),
+            };
+            format!("{place} has lost motion: half a gap of {} {by}", arcsec(first))
+        }
+        "thermal_growth" => {
+            let by = forms.iter().find_map(|form| if let Form::ThermalGrowth(t) = form { Some(t.by()) } else { None });
+            match (by, first) {
+                (Some(Warmth::Temperature { .. }), Some(n)) => {
+                    format!("{place} grows by {:.1} um/m for each kelvin", n.value * 1e6)
+                }
+                (Some(Warmth::Time { constant_s, .. }), Some(n)) => {
+                    format!(
+                        "{place} grows as the robot warms up, {:.0} um/m in the end with a time constant of {constant_s:.0} s",
+                        n.value * 1e6
+                    )
+                }
+                _ => format!("{place} grows with warmth"),
+            }
+        }
+        "counterbalance" => format!("a balancer (spring or gas) acts on {place} and is missing from the torque model"),
+        "cable_drag" => {
+            format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model")
+        }
+        "link_mass" => format!("the mass or centre of {place} in the torque model is wrong"),
+        "payload_error" => match first {
+            Some(n) => format!("the payload is {:+.1} % of what was declared off", n.value * 100.0),
+            None => "the payload is not what was declared".to_string(),
+        },
+        "axis_wobble" => format!("the axis of {place} tilts as the joint turns"),
+        "zero_shift" => format!("the zero of {place} steps by {}{}", arcsec(first), when(forms)),
+        "tool_shift" => format!("the target on the tool has moved{}", when(forms)),
+        "base_shift" => format!("the base (or the tracker) has moved{}", when(forms)),
+        "tracker_drift" => {
+            let course = forms.iter().find_map(|form| if let Form::TrackerDrift(d) = form { Some(d.course()) } else { None });
+            let how = match course {
+                Some(Course::Steady { .. }) => "steadily",
+                Some(Course::Warming(_)) => "with the warm-up",
+                _ => "slowly",
+            };
+            format!("the tracker's frame drifts {how}")
+        }
+        "coupling_ratio" => format!("{place}: the second moves with the first by {} of its angle", value(first)),
+        "joint_log_lag" => match first {
+            Some(n) => format!(
+                "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
+                n.value * 100.0
+            ),
+            None => "joints and points do not belong to the same moment".to_string(),
+        },
+        _ => {
+            let signature =
+                forms.iter().find_map(|form| if let Form::Unknown(u) = form { Some(u.signature().to_string()) } else { None });
+            format!("{place} has an error that no entry of the library explains: {}", signature.unwrap_or_default())
+        }
+    };
+    format!("{text} ({:.0} um rms at the tool).", rms * 1e6)
+}
+
+fn when(forms: &[Form]) -> String {
+    let time = forms.iter().find_map(|form| match form {
+        Form::ZeroShift(shift) => Some(shift.time_s()),
+        Form::FrameShift(shift) => Some(shift.time_s()),
+        _ => None,
+    });
+    time.map_or_else(String::new, |time| format!(" at {time:.0} s"))
+}
+
+fn amplitude(pair: Option<&[Number]>) -> String {
+    match pair {
+        Some([a, b]) => format!("{:.0} {}", a.value.hypot(b.value), a.unit),
+        _ => String::new(),
+    }
+}
+
+fn orders(forms: &[Form], numbers: &[Number]) -> String {
+    let gears = forms.iter().filter_map(|form| if let Form::GearCyclic(gear) = form { Some(gear) } else { None });
+    let one = |gear: &GearCyclic| {
+        let tag = format!("order{}.", gear.order());
+        let own: Vec<Number> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
+        format!("{} times a turn by {}", gear.order(), amplitude(own.get(0..2)))
+    };
+    gears.map(one).collect::<Vec<_>>().join(", ")
+}
+
+/// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
+const STILL: f64 = 1e-3;
+
+/// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
+pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
+    let mut out = Vec::new();
+    for (joint, reach) in reach.iter().enumerate() {
+        let name = joint + 1;
+        if *reach < STILL {
+            out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
+        } else if survey.travel(joint) < 0.02 {
+            out.push(format!("joint {name}: it hardly moves; vary it over its range"));
+        } else if !survey.both_directions(joint) {
+            out.push(format!(
+                "joint {name}, backlash: it was approached from one side only; approach half of the poses from the other"
+            ));
+        }
+    }
+    if !survey.payload_changes() {
+        let payload =
+            if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
+        out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
+    }
+    if !survey.robot.has_masses() {
+        out.push("gravity effects: the robot file gives no link masses".into());
+    }
+    if survey.data.temperature.is_none() {
+        out.push("temperature: none was recorded; growth is told from drift by time alone".into());
+    }
+    if survey.data.current.is_none() {
+        out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
+    }
+    if survey.data.direction.is_none() {
+        out.push("direction of approach: taken from the order of the rows".into());
+    }
+    out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+    out
+}
+
+/// What would tell findings from their rivals, a sentence each.
+pub(crate) fn next(findings: &[super::Finding]) -> Vec<String> {
+    let mut out = Vec::new();
+    for finding in findings {
+        for rival in finding.rivals.iter().take(2) {
+            let how = advice(finding.effect, rival.effect);
+            out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
+        }
+    }
+    out
+}
+
+fn advice(a: &str, b: &str) -> &'static str {
+    let pair = |x: &str, y: &str| (a == x && b == y) || (a == y && b == x);
+    let either = |x: &str| a == x || b == x;
+    if pair("joint_compliance", "joint_hardening") {
+        "measure with a third payload between none and full, and with joints near their largest load"
+    } else if either("counterbalance") || either("link_mass") || either("payload_error") || either("cable_drag") {
+        "log motor currents at rest, or measure with two payloads over the joint's full range (for a balancer also disconnected)"
+    } else if either("base_shift") || either("zero_shift") || either("tool_shift") {
+        "return to a few anchor poses with different first joints every half hour"
+    } else if either("thermal_growth") || either("tracker_drift") {
+        "log the arm's temperature from a cold start and watch a fixed target on the floor"
+    } else if either("backlash") {
+        "repeat poses from both sides under loads of both signs"
+    } else if either("axis_wobble") {
+        "measure a second target off the first"
+    } else {
+        "more poses over the full range of these joints (`calib poses --separate`)"
+    }
+}
