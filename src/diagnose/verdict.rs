@@ -103,8 +103,10 @@ const TOO_LOUD: f64 = 2.5;
 const NOT_NOISE: f64 = 4.0;
 const REPEATS: usize = 10;
 
-/// An unnamed finding of less than this share of the strongest one's gain is its rest.
+/// A weak unnamed finding of less than this share of the strongest one's gain is its rest.
 const REST: f64 = 0.03;
+/// A criterion that is worse by more than this without it makes it a finding all the same.
+const WEAK: f64 = 60.0;
 
 impl Looked<'_, '_> {
     /// What the best hypothesis beside the chosen ones would be.
@@ -141,7 +143,7 @@ pub(crate) fn conclude(
     // A small rest that has no name beside strong findings is what their shapes leave: no cause of its own.
     let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
     let small = |finding: &Finding| {
-        finding.effect == "unknown" && finding.evidence.is_some_and(|evidence| evidence.gain < REST * strongest)
+        finding.effect == "unknown" && finding.evidence.is_some_and(|e| e.gain < REST * strongest && e.delta_bic < WEAK)
     };
     let (rest, findings): (Vec<Finding>, Vec<Finding>) = findings.into_iter().partition(small);
     let mut signature =
