@@ -46,10 +46,9 @@ impl Currents {
                 [torque[i], 1.0, data.direction(rows[i], joint), sine, cosine, torque[i] * f64::from(data.payload[rows[i]] > 0.0)]
                     [k]
             });
-            let Some(slope) = solve(&features.columns(0, 3).into_owned(), &held).map(|x| x[0]) else { continue };
-            if !FOLLOWS.contains(&slope.abs()) {
-                continue;
-            }
+            // A balancer takes its share off the slope, unless torques by the joint's own angle are left to it.
+            let slopes = [3, 5].into_iter().filter_map(|count| solve(&features.columns(0, count).into_owned(), &held));
+            let Some(slope) = slopes.map(|x| x[0]).find(|slope| FOLLOWS.contains(&slope.abs())) else { continue };
             let Some(all) = solve(&features, &held) else { continue };
             let left = DVector::from_vec(held.clone()) - &features * all;
             let sigma = median_deviation(left.as_slice()).max(FINEST * most);

@@ -14,10 +14,6 @@ pub struct Counterbalance {
 }
 
 impl Counterbalance {
-    pub fn new(joint: usize) -> Self {
-        Self { joint }
-    }
-
     /// Every joint that yields in the present model.
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.yielding[*joint] > 0.0);

@@ -1,4 +1,4 @@
-//! `link_mass`: mass or centre of a link in the torque model is wrong, as its first moments (kg m); seen through compliance.
+//! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
 use super::form::parameters;
 use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
@@ -11,17 +11,18 @@ use serde::{Deserialize, Serialize};
 pub struct LinkMass {
     /// From 0.
     link: usize,
+    /// Whether the centre is wrong too.
+    centre: bool,
 }
 
 impl LinkMass {
-    pub fn new(link: usize) -> Self {
-        Self { link }
-    }
-
     /// Every link carried by a joint that yields in the present model.
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let carried = |link: &usize| (0..=*link).any(|joint| survey.yielding[joint] > 0.0);
-        (1..survey.joints()).filter(carried).map(|link| Hypothesis::new(Self { link }, 1).charged(4.0)).collect()
+        let known = |link: &usize| survey.robot.description().joints[*link].centre.is_some();
+        let links = (1..survey.joints()).filter(carried).filter(known);
+        let forms = links.flat_map(|link| [false, true].map(|centre| Self { link, centre }));
+        forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()
     }
 }
 
@@ -31,14 +32,19 @@ impl Effect for LinkMass {
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        parameters(self, ["x", "y", "z"].map(|axis| (axis, Unit::KilogramMetre, 1e4)))
+        let mass = ("mass", Unit::Kilogram, 1e4);
+        let moments = ["x", "y", "z"].map(|axis| (axis, Unit::KilogramMetre, 1e4));
+        if self.centre { parameters(self, std::iter::once(mass).chain(moments)) } else { parameters(self, [mass]) }
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         for joint in 0..=self.link {
-            let torque = state.posture.torque_of_moment(robot, joint, self.link);
-            for axis in 0..3 {
-                out.load(axis, joint, torque[axis]);
+            out.load(0, joint, state.posture.torque_of_mass(robot, joint, self.link));
+            if self.centre {
+                let torque = state.posture.torque_of_moment(robot, joint, self.link);
+                for axis in 0..3 {
+                    out.load(axis + 1, joint, torque[axis]);
+                }
             }
         }
     }
@@ -48,7 +54,10 @@ impl Effect for LinkMass {
     }
 
     fn burden(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
-        out.body_moment[self.link] += Vector3::new(p[0], p[1], p[2]);
+        out.body[self.link] += p[0];
+        if self.centre {
+            out.body_moment[self.link] += Vector3::new(p[1], p[2], p[3]);
+        }
     }
 }
 

@@ -14,10 +14,6 @@ pub struct PayloadError {
 }
 
 impl PayloadError {
-    pub fn new(centre: bool) -> Self {
-        Self { centre }
-    }
-
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let yields = survey.yielding.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);

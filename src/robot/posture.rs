@@ -18,7 +18,9 @@ pub struct Burden {
     pub payload: f64,
     /// Its first moment beyond the declared, kg m, zero-pose base axes of the last body.
     pub payload_moment: Vector3<f64>,
-    /// First moment of each body beyond the file's, kg m, zero-pose base axes.
+    /// Mass of each body beyond the file's, at the file's centre, kg.
+    pub body: Vec<f64>,
+    /// First moment of each body beyond that, kg m, zero-pose base axes.
     pub body_moment: Vec<Vector3<f64>>,
     /// Torque on each joint that masses do not make, e.g. of a balancer, Nm.
     pub torque: Vec<f64>,
@@ -26,13 +28,15 @@ pub struct Burden {
 
 impl Burden {
     pub fn new(joints: usize) -> Self {
+        let none = vec![0.0; joints];
         let body_moment = vec![Vector3::zeros(); joints];
-        Self { payload: 0.0, payload_moment: Vector3::zeros(), body_moment, torque: vec![0.0; joints] }
+        Self { payload: 0.0, payload_moment: Vector3::zeros(), body: none.clone(), body_moment, torque: none }
     }
 
     pub fn clear(&mut self) {
         self.payload = 0.0;
         self.payload_moment = Vector3::zeros();
+        self.body.fill(0.0);
         self.body_moment.fill(Vector3::zeros());
         self.torque.fill(0.0);
     }
@@ -88,8 +92,9 @@ impl Posture {
         self.carried[n] = carried;
         for j in (0..n).rev() {
             if let (Some(own), Some(centre)) = (description.joints[j].mass, description.joints[j].centre) {
-                carried.mass += own;
-                carried.moment += self.body[j].point(&Vector3::from(centre)) * own;
+                let mass = own + burden.body[j];
+                carried.mass += mass;
+                carried.moment += self.body[j].point(&Vector3::from(centre)) * mass;
             }
             carried.moment += self.body[j].rotation * burden.body_moment[j];
             self.carried[j] = carried;
@@ -126,11 +131,21 @@ impl Posture {
 
     /// Torque about joint `joint` per kg at the payload's centre.
     pub fn torque_of_payload(&self, robot: &RobotModel, joint: usize) -> f64 {
+        self.torque_of_weight(robot, joint, robot.joints() - 1, &Vector3::from(robot.description().payload_centre))
+    }
+
+    /// Torque about joint `joint` per kg at the centre of body `body`; zero if it does not carry it or the file gives no centre.
+    pub fn torque_of_mass(&self, robot: &RobotModel, joint: usize, body: usize) -> f64 {
+        let centre = robot.description().joints[body].centre.filter(|_| body >= joint);
+        centre.map_or(0.0, |centre| self.torque_of_weight(robot, joint, body, &Vector3::from(centre)))
+    }
+
+    /// Torque about a joint per kg at a point (m, zero pose) of a body.
+    fn torque_of_weight(&self, robot: &RobotModel, joint: usize, body: usize, point: &Vector3<f64>) -> f64 {
         if !robot.is_revolute(joint) {
             return self.axis(robot, joint).dot(&self.gravity);
         }
-        let last = self.body[robot.joints() - 1];
-        let arm = last.point(&Vector3::from(robot.description().payload_centre)) - self.behind[joint].point(robot.point(joint));
+        let arm = self.body[body].point(point) - self.behind[joint].point(robot.point(joint));
         self.axis(robot, joint).dot(&arm.cross(&self.gravity))
     }
 }

@@ -4,6 +4,7 @@ mod arms;
 mod cmd;
 mod conceal;
 mod desk;
+mod diagnose;
 mod disk;
 mod effects;
 mod fixture;

@@ -10,14 +10,14 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::Path;
 
-struct Inputs {
-    robot: Robot,
-    recording: Recording,
-    split: Split,
+pub struct Inputs {
+    pub robot: Robot,
+    pub recording: Recording,
+    pub split: Split,
 }
 
 /// Robot, recording and split of a pipeline of ours on recordings beside the repository, and the settings of one stage.
-fn pipeline<T: DeserializeOwned>(name: &str, variables: &[(&str, &str)], stage: &str) -> (Inputs, T) {
+pub fn pipeline<T: DeserializeOwned>(name: &str, variables: &[(&str, &str)], stage: &str) -> (Inputs, T) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines").join(name);
     let text = std::fs::read_to_string(folder.join("pipeline.yaml")).expect("the pipeline");
     let text = variables.iter().fold(text, |text, (key, value)| text.replace(&format!("${{{key}}}"), value));
