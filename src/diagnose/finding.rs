@@ -292,7 +292,14 @@ fn exact(forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
         match form {
             Form::ZeroShift(_) if place == "joint 1" => add("base_shift", "base"),
             Form::GearCyclic(gear) if gear.order() == 1 => add("counterbalance", place),
-            Form::Counterbalance(_) => add("gear_cyclic", place),
+            // The torque of a link about its own joint is of first order in that joint's angle, as a balancer's.
+            Form::Counterbalance(_) => {
+                add("gear_cyclic", place);
+                add("link_mass", &place.replace("joint", "link"));
+            }
+            Form::LinkMass(_) if matches!(form.place(), Place::Links(1 | 2, _)) => {
+                add("counterbalance", &place.replace("link", "joint"));
+            }
             _ => (),
         }
     }
