@@ -5,7 +5,7 @@ use super::pool::Pool;
 use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
-use crate::effect::{Effect, Form, Place, Placed};
+use crate::effect::{Effect, Form, Place, Placed, Signature};
 use crate::estimate::{Fate, Kind, Screening, tail};
 use crate::units::Unit;
 use std::collections::BTreeMap;
@@ -292,6 +292,11 @@ fn exact(forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
         match form {
             Form::ZeroShift(_) if place == "joint 1" => add("base_shift", "base"),
             Form::GearCyclic(gear) if gear.order() == 1 => add("counterbalance", place),
+            Form::Unknown(unknown) => {
+                if let Signature::Periodic { by, .. } = unknown.signature() {
+                    add("axis_wobble", &Place::Joint(by).to_string());
+                }
+            }
             // The torque of a link about its own joint is of first order in that joint's angle, as a balancer's.
             Form::Counterbalance(_) => {
                 add("gear_cyclic", place);

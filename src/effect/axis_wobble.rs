@@ -1,4 +1,4 @@
-//! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in two directions.
+//! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two.
 
 use super::form::parameters;
 use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct AxisWobble {
     joint: usize,
     order: u32,
+    /// The direction across the axis (0 or 1) about which it tilts; both if none.
+    about: Option<usize>,
 }
 
 /// No bearing lets an axis tilt further, rad (100 arcsec).
@@ -20,8 +22,10 @@ impl AxisWobble {
     /// Every joint but the last, whose tilt one measured point cannot tell from its angle.
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let last = survey.joints() - 1;
-        let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| [1, 2].map(|order| Self { joint, order }));
-        forms.map(|form| Hypothesis::new(form, 2).charged(4.0).within(LARGEST)).collect()
+        let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| {
+            [1, 2].into_iter().flat_map(move |order| [None, Some(0), Some(1)].map(|about| Self { joint, order, about }))
+        });
+        forms.map(|form| Hypothesis::new(form, 6).charged(4.0).within(LARGEST)).collect()
     }
 }
 
@@ -31,12 +35,16 @@ impl Effect for AxisWobble {
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        parameters(self, ["a_sin", "a_cos", "b_sin", "b_cos"].map(|name| (name, Unit::Radian, 0.01)))
+        let names = [["a_sin", "a_cos"], ["b_sin", "b_cos"]];
+        let chosen = (0..2).filter(|k| self.about.is_none_or(|about| about == *k)).flat_map(|k| names[k]);
+        parameters(self, chosen.map(|name| (name, Unit::Radian, 0.01)))
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let (sine, cosine) = libm::sincos(f64::from(self.order) * state.q[self.joint]);
-        for (k, (_, normal)) in robot.normals(self.joint).iter().enumerate() {
+        let normals = robot.normals(self.joint).iter().enumerate();
+        let chosen = normals.filter(|(k, _)| self.about.is_none_or(|about| about == *k)).map(|(_, normal)| normal);
+        for (k, (_, normal)) in chosen.enumerate() {
             let tilt = screw(normal, robot.point(self.joint));
             out.shift(2 * k, p, self.joint + 1, tilt * sine);
             out.shift(2 * k + 1, p, self.joint + 1, tilt * cosine);

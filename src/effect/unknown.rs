@@ -72,6 +72,8 @@ const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
+/// What goes with another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
+const WOBBLE: f64 = 12.0;
 /// -2 ln of the odds of things outside the library.
 const OPEN: f64 = 8.0;
 
@@ -124,7 +126,7 @@ impl Unknown {
             let [low, high] = survey.range[by];
             add(Signature::Angle { by, low, high }, 1, 0.0);
             if by != joint {
-                (1..=ORDERS).for_each(|order| add(Signature::Periodic { by, order }, 6, 0.0));
+                (1..=ORDERS).for_each(|order| add(Signature::Periodic { by, order }, 6, WOBBLE));
             }
             for b in by + 1..n {
                 add(Signature::Product { a: by, b }, 3, 0.0);
