@@ -76,10 +76,14 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let set = &looked.set;
     let mut sorted = set.clone();
     sorted.sort_unstable();
+    let ranges = last.model.stack.effects().count() - last.chosen.len();
+    let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
     let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
     for (i, k) in set.iter().enumerate() {
         let form = &pool.hypotheses[*k].form;
-        groups.entry((form.name(), form.place().to_string())).or_default().push(i);
+        let waves = matches!(form, Form::JointTable(_)) && is_wavy(&last.model.x[ranges[i].clone()]);
+        let name = if waves { "gear_cyclic" } else { form.name() };
+        groups.entry((name, form.place().to_string())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
@@ -91,8 +95,6 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     }
     let whole = solve(pool, &sorted);
     let bic = pool.bic(&sorted);
-    let ranges = last.model.stack.effects().count() - last.chosen.len();
-    let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
     let mut out = Vec::new();
     for ((effect, place), members) in groups {
         let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
@@ -149,6 +151,15 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
+}
+
+/// Cosines of a curve up to this one make at most two periods over its range.
+const SMOOTH: usize = 4;
+
+/// Whether a curve has most of its variance in waves of more than two periods over its range: a gear or an encoder.
+fn is_wavy(coefficients: &[f64]) -> bool {
+    let square = |some: &[f64]| some.iter().map(|c| c * c).sum::<f64>();
+    2.0 * square(&coefficients[SMOOTH.min(coefficients.len())..]) > square(coefficients)
 }
 
 /// What else an effect's own shape may leave at the same joint where it is not quite that of the library.

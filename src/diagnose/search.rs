@@ -29,6 +29,8 @@ impl Default for SearchOptions {
 const DECISIVE: f64 = 8.0;
 /// A further one by more: the shape of the first is never quite the true one, and what is left of it imitates others.
 const FURTHER: f64 = 16.0;
+/// Sets with more numbers than this are wide.
+const WIDE: usize = 60;
 /// Levels of refinement, and how many may bring nothing.
 const LEVELS: i32 = 10;
 const IDLE: usize = 3;
@@ -206,7 +208,9 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Exchanges members, one, two or all of a place at a time, while the criterion falls: greedy choices are undone.
     fn exchange(&mut self, mut set: Vec<usize>) -> Vec<usize> {
-        for _ in 0..4 {
+        // Free curves have dozens of numbers: with several of them a second look costs minutes and changes little.
+        let looks = if self.pool.columns_of(&set).len() > WIDE { 1 } else { 4 };
+        for _ in 0..looks {
             let mut others: BTreeSet<Vec<usize>> = BTreeSet::new();
             let mut gone: BTreeSet<Vec<usize>> = BTreeSet::new();
             for (a, h) in set.iter().enumerate() {

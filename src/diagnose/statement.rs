@@ -118,7 +118,20 @@ fn orders(forms: &[Form], numbers: &[Number]) -> String {
         let own: Vec<Number> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
         format!("{} times a turn by {}", gear.order(), amplitude(own.get(0..2)))
     };
-    gears.map(one).collect::<Vec<_>>().join(", ")
+    let mut said: Vec<String> = gears.map(one).collect();
+    for form in forms {
+        if let Form::JointTable(table) = form {
+            let span = table.range()[1] - table.range()[0];
+            let curve: Vec<&Number> = numbers.iter().filter(|n| n.name.contains("cos")).collect();
+            let wave = |n: &&&Number| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
+            let mut waves: Vec<(f64, f64)> = curve.iter().filter_map(|n| wave(&n)).collect();
+            waves.sort_by(|a, b| b.1.total_cmp(&a.1));
+            // A cosine of k half periods over the range makes k pi / range periods a turn.
+            let orders = waves.iter().take(4).map(|(k, _)| format!("{:.0}", k * std::f64::consts::PI / span));
+            said.push(format!("a curve, strongest about {} times a turn", orders.collect::<Vec<_>>().join(", ")));
+        }
+    }
+    said.join(", ")
 }
 
 /// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
