@@ -158,7 +158,15 @@ fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Cho
     let mut opinion = opinion.unwrap_or_default().into_iter();
     let mut out = Vec::with_capacity(forms.len());
     for (i, (form, coefficients)) in forms.iter().zip(coefficients).enumerate() {
-        let known = if borrowed.contains(&i) { opinion.by_ref().take(coefficients.len()).collect() } else { Vec::new() };
+        let known: Vec<Prior> = match form {
+            _ if borrowed.contains(&i) => opinion.by_ref().take(coefficients.len()).collect(),
+            // The slow part of a curve is nearly geometry: where the data cannot tell, it stays small.
+            Form::JointTable(_) => {
+                let sigmas = form.parameters(lens.robot).into_iter().map(|spec| spec.prior_sigma);
+                sigmas.map(|sigma| Prior { mean: 0.0, sigma }).collect()
+            }
+            _ => Vec::new(),
+        };
         out.push(Chosen { form: form.clone(), coefficients, known });
     }
     out
