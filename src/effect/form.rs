@@ -83,6 +83,9 @@ impl Effect for Form {
     fn burden(&self, q: &[f64], payload: f64, p: &[f64], out: &mut Burden) {
         self.inner().burden(q, payload, p, out);
     }
+    fn form(&self) -> Option<&Form> {
+        Some(self)
+    }
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
         self.inner().missing(robot, data)
     }

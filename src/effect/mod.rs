@@ -136,6 +136,10 @@ pub trait Effect: Send + Sync {
     /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared
     /// `payload` (kg); its partials belong into `deflect`.
     fn burden(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut Burden) {}
+    /// Its place and shape, for effects that have one; none for effects of the whole arm.
+    fn form(&self) -> Option<&Form> {
+        None
+    }
     /// What the recording or the robot lacks for this effect, if anything, as a sentence.
     fn missing(&self, _robot: &RobotModel, _data: &Measurements) -> Option<String> {
         None

@@ -5,7 +5,7 @@ use crate::error::{Fault, Result};
 use crate::estimate::Suspect;
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
-use crate::table::{FindingNumbers, Findings, Prediction, Recording, Rivals, Robot, Split, Suspects, Verdict};
+use crate::table::{FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Split, Suspects, Verdict};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,7 @@ crate::stage::writes! {
         findings: Findings,
         finding_numbers: FindingNumbers,
         rivals: Rivals,
+        parameters: Parameters,
         prediction: Prediction,
         suspects: Suspects,
     }
@@ -49,7 +50,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -82,6 +83,7 @@ impl Stage for Diagnose {
             findings: Findings::of(&diagnosis),
             finding_numbers: FindingNumbers::of(&diagnosis),
             rivals: Rivals::of(&diagnosis),
+            parameters: Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside),
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),

@@ -23,17 +23,19 @@ crate::table::rows! { "parameters",
         step: String,
         /// Why it was not estimated, or what it is confounded with.
         remark: Option<String>,
+        /// The effect's place and shape as JSON, for effects that a diagnosis added; null for effects of the whole arm.
+        form: Option<String>,
     }
 }
 
-use crate::effect::{BaseFrame, EFFECTS, EffectStack, Load, Setting, entry};
+use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, entry};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
@@ -49,6 +51,7 @@ impl Parameters {
         let start = model.stack.base();
         let mut rows = Vec::with_capacity(specs.len());
         for (effect, range) in model.stack.effects() {
+            let form = effect.form().map(|form| serde_json::to_string(form).expect("numbers and names serialise"));
             for k in range.clone() {
                 let spec = &specs[k];
                 let before = earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
@@ -107,6 +110,7 @@ impl Parameters {
                     status: status.into(),
                     step: step.into(),
                     remark,
+                    form: form.clone(),
                 });
             }
         }
@@ -124,25 +128,39 @@ impl Parameters {
         self
     }
 
-    /// The effects of this model, in the registry's order.
+    /// The effects of the whole arm in this model, in the registry's order.
     pub fn effects(&self) -> Vec<&'static str> {
-        EFFECTS.iter().map(|entry| entry.name).filter(|name| self.0.iter().any(|row| row.effect == *name)).collect()
+        let has = |name: &&str| self.0.iter().any(|row| row.effect == *name && row.form.is_none());
+        EFFECTS.iter().map(|entry| entry.name).filter(has).collect()
     }
 
-    /// The model that these parameters make of `robot`, with `more` effects at zero. Fails where a row names an unknown
-    /// effect or parameter.
+    /// Effects at a place, in the order of their parameters. Fails where a form cannot be read.
+    fn forms(&self) -> Result<Vec<Form>> {
+        let texts: BTreeSet<&str> = self.0.iter().filter_map(|row| row.form.as_deref()).collect();
+        let read = |text: &str| {
+            serde_json::from_str(text)
+                .map_err(|error| Error::data("table parameters", format!("`{text}` is no form of an effect: {error}")))
+        };
+        texts.into_iter().map(read).collect()
+    }
+
+    /// The model that these parameters make of `robot`, with all effects that a diagnosis added, and `more` effects of the whole arm
+    /// at zero. Fails where a row names an unknown effect or parameter.
     pub fn model(&self, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         let base = self.base_pose();
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let load = match self.0.iter().find(|row| row.effect == "joint_compliance").map(|row| row.unit.as_str()) {
-            Some("rad/A") => Load::MotorCurrent,
-            Some(_) => Load::GravityTorque,
-            None => load,
-        };
+        let load =
+            match self.0.iter().find(|row| row.effect == "joint_compliance" && row.form.is_none()).map(|row| row.unit.as_str()) {
+                Some("rad/A") => Load::MotorCurrent,
+                Some(_) => Load::GravityTorque,
+                None => load,
+            };
         let setting = Setting { base, load };
         let names = EFFECTS.iter().map(|entry| entry.name);
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
-        let effects = chosen.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting)).collect();
+        let whole = chosen.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting));
+        let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
+        let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
         for row in self.0.iter().filter(|row| row.effect != BaseFrame::NAME) {
             let position = model.stack.specs().iter().position(|spec| spec.name == row.name);

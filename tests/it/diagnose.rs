@@ -2,8 +2,11 @@
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
+use calib::effect::Load;
+use calib::robot::RobotModel;
 use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{Findings, Prediction, Verdict};
+use calib::table::{Findings, Parameters, Prediction, Verdict};
+use nalgebra::Vector3;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,6 +27,8 @@ fn the_practice_cases_are_solved() {
         let Ok(want) = std::fs::read_to_string(case.join("want.json")) else { continue };
         let want: Value = serde_json::from_str(&want).expect("JSON");
         let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
+        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let data = inputs.recording.measurements(&stage.tracker);
         let reads = DiagnoseReads { robot: inputs.robot, recording: inputs.recording, split: inputs.split };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
         let findings: Findings = table(&tables).remove(0);
@@ -37,6 +42,13 @@ fn the_practice_cases_are_solved() {
         }
         let predictions: Prediction = table(&tables).remove(0);
         assert_eq!(predictions.0.len(), 240);
+        // The table of parameters alone is the corrected model, but for products of small motions of the base.
+        let parameters: Parameters = table(&tables).remove(0);
+        let model = parameters.model(robot, &[], Load::GravityTorque).expect("a model");
+        for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
+            let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
+            assert!(apart < 1e-5, "{}: {apart} mm at row {}", case.display(), row.sequence);
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

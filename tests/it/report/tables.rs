@@ -79,6 +79,7 @@ fn parameter(
         status: status.into(),
         step: if effect == "joint_compliance" { "stiffness" } else { "geometry" }.into(),
         remark: remark.map(str::to_owned),
+        form: None,
     }
 }
 
