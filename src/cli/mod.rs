@@ -5,6 +5,7 @@ mod diagnose;
 mod poses;
 mod run;
 mod schema;
+mod searches;
 mod simulate;
 mod surroundings;
 mod tables;

@@ -1,7 +1,7 @@
 //! `calib run`: runs what is not already done.
 
 use super::surroundings::{cores, default_store, surroundings};
-use super::{emit, emit_json, tables};
+use super::{emit, emit_json, searches, tables};
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{Forecast, Outcome, Override, Plan, Prospect, RunOptions, Selection, StageStatus, preview, run};
 use crate::progress::{Progress, Verbosity};
@@ -97,6 +97,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
         return emit_json(&document(&outcome, &store)?);
     }
     let mut text = tables::statistics(&outcome, &store)?;
+    text.push_str(&searches::searches(&outcome, &store)?);
     text.push_str(&tables::rejected(&outcome));
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
@@ -157,6 +158,7 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "seed": manifest.seed,
         "stages": stages,
         "statistics": tables::statistics_json(outcome, store)?,
+        "searches": searches::searches_json(outcome, store)?,
         "rejected_rows": tables::rejected_rows(outcome),
         "report": outcome.documents.first(),
         "documents": outcome.documents,

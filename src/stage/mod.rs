@@ -6,6 +6,7 @@ mod identified;
 mod identify;
 pub mod ingest;
 pub mod learn;
+mod optimise;
 mod parameter_set;
 mod registry;
 mod repeated;
@@ -20,6 +21,7 @@ mod validate;
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
+pub use optimise::{Optimise, OptimiseReads, Problem};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
@@ -259,6 +261,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<Learn>(),
+    StageEntry::of::<Optimise>(),
     StageEntry::of::<Validate>(),
     StageEntry::of::<Report>(),
 ];

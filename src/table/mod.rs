@@ -54,6 +54,7 @@ mod recording;
 mod rejected;
 mod robot;
 mod scoreboard;
+mod searches;
 mod split;
 mod statistics;
 mod suspects;
@@ -73,6 +74,7 @@ pub use recording::Recording;
 pub use rejected::{Rejected, RejectedRow};
 pub use robot::{Robot, RobotRow};
 pub use scoreboard::{Scoreboard, ScoreboardRow};
+pub use searches::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 pub use split::{Split, SplitRow};
 pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
@@ -97,6 +99,8 @@ pub const TABLES: &[&str] = &[
     Rivals::KIND,
     Robot::KIND,
     Scoreboard::KIND,
+    SearchCourse::KIND,
+    Searches::KIND,
     Split::KIND,
     Statistics::KIND,
     Suspects::KIND,

@@ -1,8 +1,9 @@
-//! Benches of the fit. `cargo bench` runs the criterion groups; three further forms print figures instead:
+//! Benches of the fit. `cargo bench` runs the criterion groups; further forms print figures instead:
 //!
 //! - `cargo bench -- solve FILE` fits a problem that `compare.py` wrote and prints its time and held-out error as JSON;
 //! - `cargo bench -- curve [ROWS ...]` prints time and peak memory over the number of points;
-//! - `cargo bench -- fleet [ROBOTS]` prints CPU time of many robots, Parquet in and out, against that of their fits.
+//! - `cargo bench -- fleet [ROBOTS]` prints CPU time of many robots, Parquet in and out, against that of their fits;
+//! - `cargo bench -- swarm` prints how often and how fast each swarm optimiser finds a known minimum.
 
 use std::hint::black_box;
 
@@ -12,6 +13,7 @@ mod fixture;
 mod fleet;
 mod problem;
 mod solve;
+mod swarm;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use nalgebra::Vector3;
@@ -26,6 +28,7 @@ fn main() {
             let robots = count.first().and_then(|text| text.parse().ok()).unwrap_or(1_000);
             fleet::fleet(robots).unwrap_or_else(|error| panic!("{error}"));
         }
+        Some((verb, _)) if verb == "swarm" => swarm::table(),
         _ => criterion(),
     }
 }

@@ -1,14 +1,16 @@
 //! Swarm optimisers on landscapes with known minima.
 
-use calib::estimate::swarm::{BeetleAntennae, BeetleSwarm, Bounds, Budget, Method, Outcome, Stop, minimise};
+use crate::desk::Desk;
+use calib::estimate::swarm::{
+    Algorithm, BeetleAntennae, BeetleSwarm, Bounds, Budget, Landscape, Method, Outcome, Stop, minimise,
+};
+use calib::stage::{Context, Optimise, OptimiseReads, Stage};
+use serde_json::json;
 use std::f64::consts::PI;
 
-/// Eq. 35 with its sign: minimum -1.8013 at (2.20, 1.57).
 fn michalewicz(x: &[f64]) -> f64 {
-    -x.iter().zip(1..).map(|(x, i)| x.sin() * (f64::from(i) * x * x / PI).sin().powi(20)).sum::<f64>()
+    Landscape::Michalewicz.value(x)
 }
-/// The minimum to more digits than the paper prints (any textbook: -1.80130341).
-const MINIMUM: f64 = -1.801_303_41;
 
 fn sphere(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
@@ -19,33 +21,75 @@ fn search<M: Method>(method: &M, f: fn(&[f64]) -> f64, bounds: &Bounds, seed: u6
     minimise(method, &f, bounds, &budget, |_, _| {})
 }
 
-/// How many of `seeds` searches come within 1e-4 of the minimum, and how many evaluations the successful ones took (median).
-fn successes<M: Method>(method: &M, generations: usize, seeds: u64) -> (usize, u64) {
-    let mut spent: Vec<u64> = (0..seeds)
-        .filter_map(|seed| {
-            let budget = Budget { generations, evaluations: None, target: Some(MINIMUM + 1e-4), seed, jobs: 1 };
-            let outcome = minimise(method, &michalewicz, &Bounds::cube(2, 0.0, PI), &budget, |_, _| {});
-            (outcome.stop == Stop::Target).then_some(outcome.evaluations)
-        })
-        .collect();
-    spent.sort_unstable();
-    (spent.len(), spent.get(spent.len() / 2).copied().unwrap_or(0))
+#[test]
+fn the_paper_s_table_2_over_seeds_shows_who_gets_there_and_who_gets_stuck() {
+    let stage: Optimise = serde_json::from_value(json!({"seeds": 200})).unwrap();
+    let of = |jobs: usize| {
+        let desk = Desk::default();
+        let context = Context { id: "table2", seed: 3, jobs, services: &desk };
+        stage.run(OptimiseReads {}, &context).unwrap()
+    };
+    let tables = of(2);
+    let row = |method: &str| tables.searches.0.iter().find(|row| row.method == method).unwrap();
+    for method in ["bso", "pso", "ga", "abc"] {
+        let row = row(method);
+        assert!(row.found >= 198, "{row:?}");
+        assert!((150.0..15_000.0).contains(&row.evaluations_median.unwrap()), "{row:?}");
+    }
+    // A lone beetle gets there from about one seed in six: the paper's table shows the time of a run that did.
+    let lone = row("bas");
+    assert!((15..60).contains(&lone.found) && lone.found + lone.stuck == 200, "{lone:?}");
+    let one = of(1);
+    assert_eq!((&one.searches, &one.search_course), (&tables.searches, &tables.search_course));
 }
 
 #[test]
-fn beetle_swarm_finds_the_michalewicz_minimum_from_nearly_every_seed() {
-    let (found, evaluations) = successes(&BeetleSwarm::default(), 200, 200);
-    println!("BSO: {found} of 200 seeds, median {evaluations} evaluations");
-    assert!(found >= 198, "{found} of 200");
-    assert!((150..15_000).contains(&evaluations), "{evaluations} evaluations");
+fn settings_of_a_comparison_that_make_no_sense_are_named() {
+    let stage: Optimise = serde_json::from_value(json!({
+        "population": 3, "evaluations": 0, "seeds": 0,
+        "problems": [{"function": "michalewicz", "dimensions": 3, "tolerance": 0.0}, {"function": "ackley", "dimensions": 2, "tolerance": 1.0},
+            {"function": "ackley", "dimensions": 2, "tolerance": 0.1}],
+    }))
+    .unwrap();
+    let places: Vec<String> = stage.check().into_iter().map(|fault| fault.place).collect();
+    assert_eq!(places, ["population", "seeds", "evaluations", "problems[0].dimensions", "problems[0].tolerance", "problems[2]"]);
+    assert!(Optimise::default().check().is_empty());
 }
 
 #[test]
-fn a_lone_beetle_gets_stuck_from_many_seeds() {
-    let (found, evaluations) = successes(&BeetleAntennae::default(), 200, 200);
-    println!("BAS: {found} of 200 seeds, median {evaluations} evaluations");
-    // About one in six succeeds: the paper's Table 2 shows the time of a run that did.
-    assert!((15..60).contains(&found), "{found} of 200");
+fn every_optimiser_keeps_within_its_budget_and_on_any_number_of_threads() {
+    let bounds = Bounds::cube(6, -1.0, 1.5);
+    for method in Algorithm::ALL {
+        let generations = method.generations(20, 3000);
+        assert!(method.evaluations(20, generations) <= 3000 && method.evaluations(20, generations + 1) > 3000, "{method:?}");
+        let run = |jobs: usize| {
+            let budget = Budget { generations, evaluations: None, target: None, seed: 4, jobs };
+            method.minimise(20, &sphere, &bounds, &budget, |_, _| {})
+        };
+        let one = run(1);
+        assert_eq!(one, run(3), "{method:?}");
+        // A colony's scouts come on top, at most one a generation.
+        let most = 3000 + if method == Algorithm::Abc { generations as u64 } else { 0 };
+        assert!(one.evaluations <= most, "{method:?} {}", one.evaluations);
+        assert!(one.value < if method == Algorithm::Bas { 2.0 } else { 0.02 }, "{method:?} {}", one.value);
+        assert!(one.elite[0].0 == one.value && one.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0), "{method:?}");
+        assert!(one.history.windows(2).all(|pair| pair[1].best <= pair[0].best));
+    }
+}
+
+#[test]
+fn the_landscapes_have_their_minima_where_the_literature_says() {
+    for (function, x) in [
+        (Landscape::Michalewicz, vec![2.202_906, 1.570_796]),
+        (Landscape::Rastrigin, vec![0.0; 4]),
+        (Landscape::Rosenbrock, vec![1.0; 4]),
+        (Landscape::Ackley, vec![0.0; 4]),
+    ] {
+        let minimum = function.minimum(x.len()).unwrap();
+        assert!((function.value(&x) - minimum).abs() < 1e-8, "{function:?} {}", function.value(&x));
+        let beside: Vec<f64> = x.iter().map(|x| x + 0.01).collect();
+        assert!(function.value(&beside) > minimum);
+    }
 }
 
 #[test]

@@ -36,6 +36,14 @@ pub struct Beetle {
 impl Method for BeetleAntennae {
     type State = Beetle;
 
+    fn first(&self) -> usize {
+        1
+    }
+
+    fn further(&self) -> usize {
+        3
+    }
+
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Beetle {
         let position = search.bounds.random(&mut search.rng);
         let value = search.visit(std::slice::from_ref(&position))[0];

@@ -62,6 +62,14 @@ pub struct Swarm {
 impl Method for BeetleSwarm {
     type State = Swarm;
 
+    fn first(&self) -> usize {
+        self.beetles
+    }
+
+    fn further(&self) -> usize {
+        3 * self.beetles
+    }
+
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Swarm {
         let bounds = search.bounds;
         let positions: Vec<Vec<f64>> = (0..self.beetles).map(|_| bounds.random(&mut search.rng)).collect();
@@ -73,8 +81,7 @@ impl Method for BeetleSwarm {
     }
 
     fn step<O: Objective>(&self, swarm: &mut Swarm, search: &mut Search<O>) {
-        let [most, least] = self.inertia;
-        let inertia = most - (most - least) * search.generation as f64 / search.generations as f64;
+        let inertia = search.falling(self.inertia);
         for (i, velocity) in swarm.velocities.iter_mut().enumerate() {
             for (s, v) in velocity.iter_mut().enumerate() {
                 let x = swarm.positions[i][s];
@@ -102,11 +109,7 @@ impl Method for BeetleSwarm {
             search.bounds.clamp(position);
         }
         let values = search.visit(&swarm.positions);
-        for (i, value) in values.into_iter().enumerate() {
-            if value < swarm.best[i].0 {
-                swarm.best[i] = (value, swarm.positions[i].clone());
-            }
-        }
+        super::remember(&mut swarm.best, &swarm.positions, &values);
         swarm.antenna = self.decay * swarm.antenna + self.antenna_floor;
         swarm.step *= self.decay;
     }

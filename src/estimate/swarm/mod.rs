@@ -3,11 +3,21 @@
 //! A [`Method`] says how its first generation starts and how it goes on; [`minimise`] counts, records and stops. Random numbers
 //! are drawn on one thread and only evaluations are spread, so the result is the same for any number of threads.
 
+mod algorithm;
+mod bee_colony;
 mod beetle_antennae;
 mod beetle_swarm;
+mod genetic;
+mod landscape;
+mod particle_swarm;
 
+pub use algorithm::Algorithm;
+pub use bee_colony::BeeColony;
 pub use beetle_antennae::BeetleAntennae;
 pub use beetle_swarm::BeetleSwarm;
+pub use genetic::Genetic;
+pub use landscape::Landscape;
+pub use particle_swarm::ParticleSwarm;
 
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
@@ -111,6 +121,10 @@ pub struct Outcome {
 /// A swarm optimiser: plain parameters, with the state of a search apart from them.
 pub trait Method {
     type State;
+    /// Evaluations of the first generation.
+    fn first(&self) -> usize;
+    /// Evaluations of each further generation.
+    fn further(&self) -> usize;
     /// The first generation, visited.
     fn start<O: Objective>(&self, search: &mut Search<O>) -> Self::State;
     /// One generation further.
@@ -156,6 +170,19 @@ impl<O: Objective> Search<'_, O> {
         }
         self.mean = values.iter().sum::<f64>() / values.len() as f64;
         values
+    }
+    /// What falls linearly from `most` in the first generation to `least` in the last (Eq. 38).
+    fn falling(&self, [most, least]: [f64; 2]) -> f64 {
+        most - (most - least) * self.generation as f64 / self.generations as f64
+    }
+}
+
+/// Keeps what each individual found better than before.
+fn remember(best: &mut [(f64, Vec<f64>)], positions: &[Vec<f64>], values: &[f64]) {
+    for ((best, position), value) in best.iter_mut().zip(positions).zip(values) {
+        if *value < best.0 {
+            *best = (*value, position.clone());
+        }
     }
 }
 

@@ -1,0 +1,220 @@
+//! `optimise`: the swarm optimisers on functions with known minima, many seeds each (Table 2 of Wang et al. 2020).
+//!
+//! A search that found the target quickly once says little: what counts is from how many seeds it gets there, and how often it
+//! gets stuck. Times are no part of a table, which is the same whenever it is made; `cargo bench -- swarm` prints them.
+
+use crate::error::{Fault, Result};
+use crate::estimate::swarm::{Algorithm, Budget, Landscape, Outcome, Stop};
+use crate::estimate::threads::in_order;
+use crate::stage::{Context, Stage, reads, writes};
+use crate::table::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Mutex;
+
+/// Settings of `optimise`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Optimise {
+    /// What is minimised.
+    pub problems: Vec<Problem>,
+    /// The optimisers to compare.
+    pub methods: Vec<Algorithm>,
+    /// Individuals of a swarm; half of a bee colony is employed.
+    pub population: usize,
+    /// Evaluations that each search may spend.
+    pub evaluations: u64,
+    /// Searches of every method on every problem.
+    pub seeds: usize,
+    /// Of so many searches each the whole course is kept.
+    pub courses: usize,
+    /// Published times to stand beside ours.
+    pub reference: Vec<Reference>,
+}
+
+/// A function, and how near to its minimum counts as found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Problem {
+    pub function: Landscape,
+    pub dimensions: usize,
+    /// The search ends where the value is nearer to the minimum than this.
+    pub tolerance: f64,
+}
+
+/// A published time to the target.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Where it stands, e.g. `Table 2`.
+    pub label: String,
+    pub function: Landscape,
+    pub dimensions: usize,
+    pub method: Algorithm,
+    /// s.
+    pub seconds: f64,
+}
+
+impl Default for Optimise {
+    fn default() -> Self {
+        Self {
+            problems: vec![Problem { function: Landscape::Michalewicz, dimensions: 2, tolerance: 1e-4 }],
+            methods: Algorithm::ALL.to_vec(),
+            population: 50,
+            evaluations: 30_000,
+            seeds: 200,
+            courses: 1,
+            reference: Vec::new(),
+        }
+    }
+}
+
+reads! {
+    /// `optimise` reads nothing.
+    pub struct OptimiseReads {
+    }
+}
+
+writes! {
+    /// Output ports of [`Optimise`].
+    pub struct OptimiseWrites {
+        searches: Searches,
+        search_course: SearchCourse,
+    }
+}
+
+impl Stage for Optimise {
+    const NAME: &'static str = "optimise";
+    const SUMMARY: &'static str = "compares swarm optimisers on functions with known minima, over many seeds";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = OptimiseReads;
+    type Writes = OptimiseWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (name, value, least, most) in
+            [("population", self.population, 4, 10_000), ("seeds", self.seeds, 1, 100_000), ("courses", self.courses, 0, 1000)]
+        {
+            if !(least..=most).contains(&value) {
+                faults.push(Fault::new(name, format!("expected a whole number from {least} to {most}, not {value}")));
+            }
+        }
+        if !(1..=100_000_000).contains(&self.evaluations) {
+            faults.push(Fault::new("evaluations", format!("expected 1 to 1e8, not {}", self.evaluations)));
+        }
+        for (i, problem) in self.problems.iter().enumerate() {
+            if problem.function.minimum(problem.dimensions).is_none() || !(1..=1000).contains(&problem.dimensions) {
+                let message =
+                    "the minimum is not known there: 2, 5 or 10 for michalewicz, 2 to 1000 for rosenbrock, else 1 to 1000";
+                faults.push(Fault::new(format!("problems[{i}].dimensions"), message));
+            }
+            if !(problem.tolerance > 0.0 && problem.tolerance.is_finite()) {
+                faults.push(Fault::new(format!("problems[{i}].tolerance"), "expected a number above zero, e.g. 1e-4"));
+            }
+        }
+        let twice = |i: usize| {
+            let same = |j: &Problem| j.function == self.problems[i].function && j.dimensions == self.problems[i].dimensions;
+            self.problems[..i].iter().any(same)
+        };
+        faults.extend(
+            (0..self.problems.len())
+                .filter(|i| twice(*i))
+                .map(|i| Fault::new(format!("problems[{i}]"), "the same function in as many dimensions stands above")),
+        );
+        faults
+    }
+
+    fn run(&self, _reads: OptimiseReads, context: &Context) -> Result<OptimiseWrites> {
+        let mut methods = self.methods.clone();
+        methods.sort_unstable();
+        methods.dedup();
+        let total = self.problems.len() * methods.len() * self.seeds;
+        context.services.begin("searching", Some(total as u64), "searches");
+        let done = Mutex::new((0_u64, f64::INFINITY));
+        let (mut searches, mut course) = (Searches::default(), SearchCourse::default());
+        for problem in &self.problems {
+            for method in &methods {
+                done.lock().expect("no search panics").1 = f64::INFINITY;
+                let outcomes = in_order(context.jobs, self.seeds, |seed| {
+                    let outcome = self.search(problem, *method, context.seed.wrapping_add(seed as u64));
+                    let mut done = done.lock().expect("no search panics");
+                    *done = (done.0 + 1, done.1.min(outcome.value));
+                    let what = format!("{} on {}-D {}", method.name(), problem.dimensions, problem.function.name());
+                    context.services.advance(done.0, &format!("{what}, best {:.6}", done.1));
+                    outcome
+                });
+                searches.0.push(self.row(context.id, problem, *method, &outcomes));
+                for (seed, outcome) in outcomes.iter().enumerate().take(self.courses) {
+                    course.0.extend(outcome.history.iter().map(|generation| SearchCourseRow {
+                        step: context.id.into(),
+                        function: problem.function.name().into(),
+                        dimensions: problem.dimensions as i64,
+                        method: method.name().into(),
+                        seed: seed as i64,
+                        generation: generation.index as i64,
+                        best: generation.best,
+                        mean: Some(generation.mean).filter(|mean| mean.is_finite()),
+                        evaluations: generation.evaluations as i64,
+                    }));
+                }
+            }
+        }
+        Ok(OptimiseWrites { searches, search_course: course })
+    }
+}
+
+impl Optimise {
+    /// One search on one thread.
+    pub fn search(&self, problem: &Problem, method: Algorithm, seed: u64) -> Outcome {
+        let minimum = problem.function.minimum(problem.dimensions).unwrap_or(f64::NEG_INFINITY);
+        let budget = Budget {
+            generations: method.generations(self.population, self.evaluations),
+            evaluations: Some(self.evaluations),
+            target: Some(minimum + problem.tolerance),
+            seed,
+            jobs: 1,
+        };
+        let function = |x: &[f64]| problem.function.value(x);
+        method.minimise(self.population, &function, &problem.function.bounds(problem.dimensions), &budget, |_, _| {})
+    }
+
+    fn row(&self, step: &str, problem: &Problem, method: Algorithm, outcomes: &[Outcome]) -> SearchesRow {
+        let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
+        let reached: Vec<f64> = outcomes.iter().filter(|o| o.stop == Stop::Target).map(|o| o.evaluations as f64).collect();
+        let errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
+        let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();
+        let beside = |r: &&Reference| (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method);
+        let reference = self.reference.iter().find(beside);
+        SearchesRow {
+            step: step.into(),
+            function: problem.function.name().into(),
+            dimensions: problem.dimensions as i64,
+            method: method.name().into(),
+            tolerance: problem.tolerance,
+            searches: outcomes.len() as i64,
+            found: reached.len() as i64,
+            stuck: stuck as i64,
+            evaluations_median: quantile(&reached, 0.5),
+            evaluations_p90: quantile(&reached, 0.9),
+            error_median: quantile(&errors, 0.5),
+            error_p90: quantile(&errors, 0.9),
+            reference: reference.map(|reference| reference.label.clone()),
+            reference_s: reference.map(|reference| reference.seconds),
+        }
+    }
+}
+
+/// Whether a search missed the target and found nothing better in the second half of its generations.
+fn stuck(outcome: &Outcome) -> bool {
+    let half = outcome.history.get(outcome.history.len() / 2);
+    outcome.stop != Stop::Target && half.is_some_and(|half| half.best <= outcome.value)
+}
+
+/// Linear between order statistics; none without values.
+pub fn quantile(values: &[f64], fraction: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = fraction * sorted.len().checked_sub(1)? as f64;
+    let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
+    Some(below + (above - below) * place.fract())
+}
