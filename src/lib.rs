@@ -17,6 +17,7 @@
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
+//! | [`diff`] | two tables or two runs compared | store |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
@@ -58,6 +59,8 @@ pub mod diagnose;
 pub mod twin;
 
 pub mod store;
+
+pub mod diff;
 
 pub mod table;
 

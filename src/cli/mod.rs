@@ -2,6 +2,7 @@
 
 mod check;
 mod diagnose;
+mod diff;
 mod poses;
 mod run;
 mod schema;
@@ -29,12 +30,13 @@ enum Verb {
     Run(run::RunArguments),
     Check(check::CheckArguments),
     Diagnose(diagnose::DiagnoseArguments),
+    Diff(diff::DiffArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
     Simulate(simulate::SimulateArguments),
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
 
 /// Runs a command line, prints what comes of it and gives the exit code.
@@ -52,17 +54,21 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Run(verb) => run::main(&verb, &arguments),
         Verb::Check(verb) => check::main(&verb),
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
+        Verb::Diff(verb) => return diff::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb, &arguments),
     };
     match result {
         Ok(()) => 0,
-        Err(error) => {
-            let _ = writeln!(std::io::stderr(), "{}", message(&error));
-            error.exit_code()
-        }
+        Err(error) => complain(&error),
     }
+}
+
+/// Says what went wrong, and with which exit code.
+fn complain(error: &Error) -> u8 {
+    let _ = writeln!(std::io::stderr(), "{}", message(error));
+    error.exit_code()
 }
 
 /// One fault a line, and how many there are where there are several.

@@ -117,14 +117,17 @@ pub struct Constraints {
     pub values: Vec<String>,
 }
 
-/// Differences that a comparison of two tables overlooks, in the unit of the column.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
+/// Differences that a comparison of two tables overlooks, in the unit of the column, and what it measures them by.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerance {
     #[serde(default)]
     pub atol: f64,
     #[serde(default)]
     pub rtol: f64,
+    /// The column that holds one standard deviation of this one.
+    #[serde(default)]
+    pub sigma: Option<String>,
 }
 
 /// `major.minor.patch`: a new nullable column is a minor step, any other change of columns a major one.

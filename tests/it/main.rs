@@ -5,6 +5,7 @@ mod cmd;
 mod conceal;
 mod desk;
 mod diagnose;
+mod diff;
 mod disk;
 mod effects;
 mod fixture;

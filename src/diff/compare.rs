@@ -1,0 +1,260 @@
+//! Two tables compared from end to end: hashes, keys, columns side by side, the worst rows.
+
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::cells::CellWriter;
+use super::columns::{self, Comparison};
+use super::key::{self, Keys, Pairing};
+use super::measure::{self, CHANGED, Cell, SAME, Value, WITHIN};
+use super::source::Source;
+use super::{ColumnDiff, Examples, Finding, Options, Rows, Side, TableDiff, WorstCell, WorstRow};
+use crate::error::{Error, Result};
+
+/// Keys shown of rows without a partner.
+const EXAMPLES: usize = 5;
+
+/// Compares the Parquet files `a` and `b`.
+pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
+    let (a, b) = (Source::open(a)?, Source::open(b)?);
+    if let Some(out) = options.out.as_deref()
+        && [&a, &b].iter().any(|source| same_file(&source.path, out))
+    {
+        return Err(Error::spec("--out", format!("{} is one of the tables that are compared", out.display())));
+    }
+    let mut diff = TableDiff {
+        a: side(&a),
+        b: side(&b),
+        key: Vec::new(),
+        equal_hashes: false,
+        findings: schema_findings(&a, &b, options)?,
+        rows: Rows::default(),
+        columns: Vec::new(),
+        worst: Vec::new(),
+        examples: Examples::default(),
+    };
+    diff.key = key_columns(&a, &b, options, &mut diff.findings)?;
+    let comparisons = columns::plan(&a, &b, &diff.key, options, &mut diff.findings)?;
+    let equal = (a.table_hash.is_some() && a.table_hash == b.table_hash) || same_file(&a.path, &b.path);
+    if equal && !options.reread && diff.findings.is_empty() {
+        diff.equal_hashes = true;
+        diff.rows.same = a.rows as u64;
+        if let Some(path) = &options.out {
+            CellWriter::create(path, &a, &diff.key)?.close()?;
+        }
+        return Ok(diff);
+    }
+    let (keys, keys_b) = key::read(&a, &b, &diff.key)?;
+    let pairing = key::pair(&keys, &keys_b, options.by_occurrence);
+    diff.examples = examples(&keys, &keys_b, &pairing);
+    // Only A's keys are needed from here on, and they are large.
+    let only_b = pairing.only_b.iter().chain(&pairing.twice_b).map(|&row| keys_b.cells(row as usize).collect::<Vec<_>>());
+    let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() { only_b.collect() } else { Vec::new() };
+    drop(keys_b);
+    let rows: Vec<AtomicU8> = (0..a.rows).map(|_| AtomicU8::new(SAME)).collect();
+    let measured = match &options.out {
+        None => {
+            let one = |comparison: &Comparison| judge(&a, &b, comparison, &pairing, &rows, options, None);
+            comparisons.par_iter().map(one).collect::<Result<Vec<_>>>()?
+        }
+        Some(path) => {
+            let mut writer = CellWriter::create(path, &a, &diff.key)?;
+            writer.unpaired(&keys, &pairing, &only_b)?;
+            let one = |comparison: &Comparison| judge(&a, &b, comparison, &pairing, &rows, options, Some((&mut writer, &keys)));
+            let measured = comparisons.iter().map(one).collect::<Result<Vec<_>>>()?;
+            writer.close()?;
+            measured
+        }
+    };
+    diff.rows = count(&rows, &pairing);
+    drop(rows);
+    let mut cells: Vec<(usize, Cell)> = Vec::new();
+    for (at, (column, worst)) in measured.into_iter().enumerate() {
+        let worst_key = column.worst_row.map(|row| keys.text(row as usize));
+        diff.columns.push(ColumnDiff { worst_key, ..column });
+        cells.extend(worst.into_iter().map(|cell| (at, cell)));
+    }
+    diff.worst = worst_rows(&a, &keys, &comparisons, cells, options.limit)?;
+    Ok(diff)
+}
+
+fn side(source: &Source) -> Side {
+    Side {
+        path: source.path.display().to_string(),
+        schema: source.table.as_ref().map(|(kind, version)| format!("{kind}/{version}")),
+        table_hash: source.table_hash.clone(),
+        rows: source.rows as u64,
+    }
+}
+
+/// Two names of one file.
+fn same_file(a: &Path, b: &Path) -> bool {
+    let found = |path: &Path| path.canonicalize().ok();
+    found(a).is_some() && found(a) == found(b)
+}
+
+fn schema_findings(a: &Source, b: &Source, options: &Options) -> Result<Vec<Finding>> {
+    let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else { return Ok(Vec::new()) };
+    if kind_a != kind_b && options.key.is_empty() {
+        let message =
+            format!("A is a table of {kind_a}, B of {kind_b}: not to be compared, unless you say by which columns (--key)");
+        return Err(Error::spec(b.path.display().to_string(), message));
+    }
+    if kind_a != kind_b {
+        return Ok(vec![Finding::new("schema", "", format!("{kind_a} in A, {kind_b} in B"))]);
+    }
+    if version_a == version_b {
+        return Ok(Vec::new());
+    }
+    let step = match (version_a.major == version_b.major, version_a.minor == version_b.minor) {
+        (false, _) => "major: columns changed their meaning",
+        (true, false) => "minor: columns were added",
+        (true, true) => "patch: descriptions changed",
+    };
+    Ok(vec![Finding::new("schema", "", format!("{kind_a} {version_a} in A, {version_b} in B ({step})"))])
+}
+
+fn key_columns(a: &Source, b: &Source, options: &Options, findings: &mut Vec<Finding>) -> Result<Vec<String>> {
+    if !options.key.is_empty() {
+        options.key.iter().try_for_each(|name| a.key_column(name).and(b.key_column(name)).map(|_| ()))?;
+        return Ok(options.key.clone());
+    }
+    if !a.key.is_empty() && !b.key.is_empty() && a.key != b.key {
+        findings.push(Finding::new("key", "", format!("{} in A, {} in B", a.key.join(", "), b.key.join(", "))));
+    }
+    let key = if a.key.is_empty() { &b.key } else { &a.key };
+    if key.is_empty() {
+        let columns: Vec<&str> = a.columns.iter().map(|column| column.name.as_str()).collect();
+        let message = format!("says not which columns tell its rows apart; name them with --key, of: {}", columns.join(", "));
+        return Err(Error::spec(a.path.display().to_string(), message));
+    }
+    Ok(key.clone())
+}
+
+fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
+    let some = |keys: &Keys, rows: &[u32]| -> Vec<String> {
+        let mut texts: Vec<String> = Vec::new();
+        for &row in rows {
+            let text = keys.text(row as usize);
+            if texts.last() != Some(&text) {
+                texts.push(text);
+            }
+            if texts.len() == EXAMPLES {
+                break;
+            }
+        }
+        texts
+    };
+    let mut duplicate = some(a, &pairing.twice_a);
+    duplicate.extend(some(b, &pairing.twice_b));
+    duplicate.sort();
+    duplicate.dedup();
+    duplicate.truncate(EXAMPLES);
+    Examples { only_a: some(a, &pairing.only_a), only_b: some(b, &pairing.only_b), duplicate }
+}
+
+/// Measures a column and keeps its worst cells.
+fn judge(
+    a: &Source,
+    b: &Source,
+    comparison: &Comparison,
+    pairing: &Pairing,
+    rows: &[AtomicU8],
+    options: &Options,
+    mut out: Option<(&mut CellWriter, &Keys)>,
+) -> Result<(ColumnDiff, Vec<Cell>)> {
+    let mut worst: Vec<Cell> = Vec::new();
+    let mut sees = |cell: &Cell| -> Result<()> {
+        if let Some((writer, keys)) = &mut out {
+            writer.cell(keys, comparison, cell)?;
+        }
+        if cell.changed && (worst.len() < options.limit || worst.last().is_some_and(|least| cell.score > least.score)) {
+            let at = worst.partition_point(|other| other.score >= cell.score);
+            worst.insert(at, cell.clone());
+            worst.truncate(options.limit);
+        }
+        Ok(())
+    };
+    let column = measure::measure((a, b), comparison, pairing, rows, &mut sees)?;
+    Ok((column, worst))
+}
+
+fn count(rows: &[AtomicU8], pairing: &Pairing) -> Rows {
+    let of = |class: u8| rows.iter().filter(|row| row.load(Ordering::Relaxed) == class).count() as u64;
+    let (within, changed) = (of(WITHIN), of(CHANGED));
+    Rows {
+        same: pairing.paired as u64 - within - changed,
+        within_tolerance: within,
+        changed,
+        only_a: pairing.only_a.len() as u64,
+        only_b: pairing.only_b.len() as u64,
+        duplicate_a: pairing.twice_a.len() as u64,
+        duplicate_b: pairing.twice_b.len() as u64,
+        duplicate_keys: pairing.keys_twice as u64,
+    }
+}
+
+/// The rows with the worst cells; of equal ones the earlier row first.
+fn worst_rows(
+    a: &Source,
+    keys: &Keys,
+    comparisons: &[Comparison],
+    mut cells: Vec<(usize, Cell)>,
+    limit: usize,
+) -> Result<Vec<WorstRow>> {
+    cells.sort_by(|(column, l), (other, r)| r.score.total_cmp(&l.score).then(l.row.cmp(&r.row)).then(column.cmp(other)));
+    let mut order: Vec<u32> = Vec::new();
+    for (_, cell) in &cells {
+        if !order.contains(&cell.row) {
+            order.push(cell.row);
+        }
+    }
+    order.truncate(limit);
+    let units = row_units(a, comparisons, &order)?;
+    let rows = order.into_iter().map(|row| {
+        let own = cells.iter().filter(|(_, cell)| cell.row == row);
+        let cells = own.map(|(at, cell)| {
+            let comparison = &comparisons[*at];
+            let unit =
+                if comparison.unit == "row" { units.get(&row).cloned().unwrap_or_default() } else { comparison.unit.clone() };
+            WorstCell {
+                column: comparison.name.clone(),
+                a: json(&cell.a),
+                b: json(&cell.b),
+                difference: cell.difference,
+                unit: if unit == "1" { String::new() } else { unit },
+                sigmas: cell.sigmas,
+            }
+        });
+        WorstRow { key: keys.text(row as usize), cells: cells.collect() }
+    });
+    Ok(rows.collect())
+}
+
+fn json(value: &Value) -> serde_json::Value {
+    match value {
+        Value::Null => serde_json::Value::Null,
+        Value::Number(number) => (*number).into(),
+        Value::Text(text) => text.clone().into(),
+    }
+}
+
+/// The units that the given rows name in the table's column of units.
+fn row_units(a: &Source, comparisons: &[Comparison], rows: &[u32]) -> Result<BTreeMap<u32, String>> {
+    let mut units = BTreeMap::new();
+    let column = a.columns.iter().position(|column| column.semantic.as_deref() == Some("unit"));
+    let Some(column) = column.filter(|_| comparisons.iter().any(|comparison| comparison.unit == "row")) else { return Ok(units) };
+    let mut start = 0;
+    for batch in a.stream(&[column])? {
+        let array = &batch?[0];
+        let end = start + arrow::array::Array::len(array) as u32;
+        for &row in rows.iter().filter(|row| (start..end).contains(row)) {
+            let texts = arrow::array::AsArray::as_string::<i32>(array);
+            units.insert(row, texts.value((row - start) as usize).to_string());
+        }
+        start = end;
+    }
+    Ok(units)
+}

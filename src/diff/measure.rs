@@ -1,0 +1,352 @@
+//! One comparison carried through: every pair of cells judged, the statistics of the differences, the worst rows.
+
+use arrow::array::{Array, ArrayRef, AsArray};
+use arrow::datatypes::Int64Type;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::columns::{Comparison, How};
+use super::key::{NONE, Pairing};
+use super::source::{Kind, Source, push_numbers};
+use super::{ColumnDiff, Statistics};
+use crate::error::Result;
+
+/// What became of a row of A; the greatest of its cells counts.
+pub(super) const SAME: u8 = 0;
+pub(super) const WITHIN: u8 = 1;
+pub(super) const CHANGED: u8 = 2;
+
+/// A pair of cells that are not the same.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    /// Of A.
+    pub row: u32,
+    pub changed: bool,
+    pub a: Value,
+    pub b: Value,
+    /// B minus A in A's unit; null where one of them has no finite number.
+    pub difference: Option<f64>,
+    pub sigmas: Option<f64>,
+    /// Differences over tolerance, or sigmas: what the worst are ranked by.
+    pub score: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    Null,
+    Number(f64),
+    Text(String),
+}
+
+/// Judges a comparison; `sees` is told of every pair of cells that are not the same, in the order of A.
+pub(super) fn measure(
+    (a, b): (&Source, &Source),
+    comparison: &Comparison,
+    pairing: &Pairing,
+    rows: &[AtomicU8],
+    sees: &mut dyn FnMut(&Cell) -> Result<()>,
+) -> Result<ColumnDiff> {
+    let mut tally = Tally::new(comparison);
+    if comparison.how == How::Text {
+        texts(a, b, comparison, pairing, rows, &mut tally, sees)?;
+    } else {
+        numbers(a, b, comparison, pairing, rows, &mut tally, sees)?;
+    }
+    Ok(tally.finish(comparison))
+}
+
+fn numbers(
+    a: &Source,
+    b: &Source,
+    comparison: &Comparison,
+    pairing: &Pairing,
+    rows: &[AtomicU8],
+    tally: &mut Tally,
+    sees: &mut dyn FnMut(&Cell) -> Result<()>,
+) -> Result<()> {
+    let size = comparison.a.len();
+    let mut theirs = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
+    let (scale, shift) = comparison.conversion;
+    if comparison.conversion != (1.0, 0.0) {
+        theirs.iter_mut().flat_map(|(values, _)| values).for_each(|value| *value = *value * scale + shift);
+    }
+    // Whole numbers beyond 2^53 differ where their nearest f64 does not.
+    let whole = size == 1 && a.columns[comparison.a[0]].kind == Kind::Int && b.columns[comparison.b[0]].kind == Kind::Int;
+    let their_whole = if whole { b.integers(comparison.b[0])? } else { Vec::new() };
+    let their_sigma = comparison.sigma.map(|(_, column)| b.numbers(column)).transpose()?;
+    let mut wanted = comparison.a.clone();
+    wanted.extend(comparison.sigma.map(|(column, _)| column));
+    let mut start = 0;
+    let mut ours: Vec<Vec<f64>> = vec![Vec::new(); wanted.len()];
+    for batch in a.stream(&wanted)? {
+        let batch = batch?;
+        for (values, array) in ours.iter_mut().zip(&batch) {
+            values.clear();
+            push_numbers(array, values);
+        }
+        for at in 0..batch[0].len() {
+            let row = start + at;
+            let partner = pairing.partner(row);
+            if partner == NONE {
+                continue;
+            }
+            let partner = partner as usize;
+            let null_a = batch[..size].iter().any(|array| array.is_null(at));
+            let null_b = theirs.iter().any(|(_, nulls)| nulls.get(partner).copied().unwrap_or(false));
+            let difference = match (null_a, null_b) {
+                (true, true) => continue,
+                (false, false) if size == 1 => {
+                    let (left, right) = (ours[0][at], theirs[0].0[partner]);
+                    tally.pairs += 1;
+                    let apart = if whole { apart(&batch[0], at, their_whole[partner]) } else { 0.0 };
+                    if (left == right && apart == 0.0) || (left.is_nan() && right.is_nan()) {
+                        continue;
+                    }
+                    if whole && comparison.conversion == (1.0, 0.0) { apart } else { one(comparison.how, right - left) }
+                }
+                (false, false) => {
+                    tally.pairs += 1;
+                    let left: Vec<f64> = ours[..size].iter().map(|values| values[at]).collect();
+                    let right: Vec<f64> = theirs.iter().map(|(values, _)| values[partner]).collect();
+                    if left == right {
+                        continue;
+                    }
+                    rotation(comparison.how, &left, &right)
+                }
+                _ => f64::NAN,
+            };
+            let (left, right) = (ours[0][at], theirs[0].0[partner]);
+            let value = |null: bool, value: f64| if null { Value::Null } else { Value::Number(value) };
+            let sigma = their_sigma.as_ref().and_then(|(values, nulls)| {
+                let (l, r) = (ours[size][at], values[partner]);
+                let null = batch[size].is_null(at) || nulls.get(partner).copied().unwrap_or(false);
+                let both = ((l * l + r * r) / 2.0).sqrt();
+                (!null && both > 0.0).then_some(both)
+            });
+            let largest = if size == 1 { left.abs().max(right.abs()) } else { 0.0 };
+            let allowed = comparison.atol + comparison.rtol * largest;
+            // A rotation whose quaternion has another sign is the same rotation.
+            if difference == 0.0 {
+                continue;
+            }
+            let finite = difference.is_finite();
+            let sigmas = sigma.filter(|_| finite).map(|sigma| difference.abs() / sigma);
+            let cell = Cell {
+                row: row as u32,
+                changed: !(finite && difference.abs() <= allowed),
+                a: value(null_a, left),
+                b: value(null_b, right),
+                difference: finite.then_some(difference),
+                sigmas,
+                score: score(difference, allowed, sigmas, largest),
+            };
+            judge(&cell, rows, tally);
+            sees(&cell)?;
+        }
+        start += batch[0].len();
+    }
+    Ok(())
+}
+
+/// What a difference is worth: sigmas where they are known, else times the tolerance, else relative to what is representable.
+fn score(difference: f64, allowed: f64, sigmas: Option<f64>, largest: f64) -> f64 {
+    match sigmas {
+        _ if !difference.is_finite() => f64::MAX,
+        Some(sigmas) => sigmas,
+        None if allowed > 0.0 => difference.abs() / allowed,
+        None => difference.abs() / (1e-9 * largest).max(f64::MIN_POSITIVE),
+    }
+}
+
+/// Theirs minus ours, of whole numbers.
+fn apart(ours: &ArrayRef, at: usize, theirs: i64) -> f64 {
+    (i128::from(theirs) - i128::from(ours.as_primitive::<Int64Type>().value(at))) as f64
+}
+
+fn one(how: How, difference: f64) -> f64 {
+    match how {
+        How::Angle(turn) => difference - turn * (difference / turn).round(),
+        _ => difference,
+    }
+}
+
+/// The angle of the rotation from `left` to `right`, rad.
+fn rotation(how: How, left: &[f64], right: &[f64]) -> f64 {
+    let quaternion = |cells: &[f64]| match how {
+        How::RotationVector(factor) => {
+            let v = [cells[0] * factor, cells[1] * factor, cells[2] * factor];
+            let angle = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            // sin(x/2)/x is 1/2 within f64 below this.
+            let ratio = if angle < 1e-9 { 0.5 } else { (angle / 2.0).sin() / angle };
+            [(angle / 2.0).cos(), v[0] * ratio, v[1] * ratio, v[2] * ratio]
+        }
+        _ => [cells[0], cells[1], cells[2], cells[3]],
+    };
+    let (l, r) = (quaternion(left), quaternion(right));
+    let dot: f64 = l.iter().zip(&r).map(|(l, r)| l * r).sum();
+    // conj(l) * r: its vector part is exact for small rotations, where the cosine is not.
+    let vector = [
+        l[0] * r[1] - l[1] * r[0] - l[2] * r[3] + l[3] * r[2],
+        l[0] * r[2] - l[2] * r[0] - l[3] * r[1] + l[1] * r[3],
+        l[0] * r[3] - l[3] * r[0] - l[1] * r[2] + l[2] * r[1],
+    ];
+    let sine = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if sine == 0.0 && dot == 0.0 { f64::NAN } else { 2.0 * sine.atan2(dot.abs()) }
+}
+
+fn texts(
+    a: &Source,
+    b: &Source,
+    comparison: &Comparison,
+    pairing: &Pairing,
+    rows: &[AtomicU8],
+    tally: &mut Tally,
+    sees: &mut dyn FnMut(&Cell) -> Result<()>,
+) -> Result<()> {
+    let (column_a, column_b) = (comparison.a[0], comparison.b[0]);
+    let mut bytes = String::new();
+    let mut ends: Vec<(usize, bool)> = Vec::with_capacity(b.rows);
+    for batch in b.stream(&[column_b])? {
+        let array = batch?.swap_remove(0);
+        for row in 0..array.len() {
+            text(&array, b.columns[column_b].kind, row).inspect(|text| bytes.push_str(text));
+            ends.push((bytes.len(), array.is_null(row)));
+        }
+    }
+    let mut start = 0;
+    for batch in a.stream(&[column_a])? {
+        let array = batch?.swap_remove(0);
+        for at in 0..array.len() {
+            let partner = pairing.partner(start + at);
+            if partner == NONE {
+                continue;
+            }
+            let partner = partner as usize;
+            let (end, null) = ends[partner];
+            let begin = if partner == 0 { 0 } else { ends[partner - 1].0 };
+            let left = text(&array, a.columns[column_a].kind, at);
+            let right = (!null).then(|| &bytes[begin..end]);
+            tally.pairs += u64::from(left.is_some() && right.is_some());
+            if left.as_deref() == right {
+                continue;
+            }
+            let value = |text: Option<&str>| text.map_or(Value::Null, |text| Value::Text(text.into()));
+            let cell = Cell {
+                row: (start + at) as u32,
+                changed: true,
+                a: value(left.as_deref()),
+                b: value(right),
+                difference: None,
+                sigmas: None,
+                // Below every number beyond its tolerance: those say by how much.
+                score: 1.0,
+            };
+            judge(&cell, rows, tally);
+            sees(&cell)?;
+        }
+        start += array.len();
+    }
+    Ok(())
+}
+
+fn text(array: &ArrayRef, kind: Kind, row: usize) -> Option<std::borrow::Cow<'_, str>> {
+    if array.is_null(row) {
+        return None;
+    }
+    if kind == Kind::Text {
+        return Some(array.as_string::<i32>().value(row).into());
+    }
+    let mut numbers = Vec::with_capacity(1);
+    push_numbers(&array.slice(row, 1), &mut numbers);
+    Some(numbers.first().map(f64::to_string).unwrap_or_default().into())
+}
+
+fn judge(cell: &Cell, rows: &[AtomicU8], tally: &mut Tally) {
+    rows[cell.row as usize].fetch_max(if cell.changed { CHANGED } else { WITHIN }, Ordering::Relaxed);
+    tally.add(cell);
+}
+
+/// Sums over the pairs of a column.
+struct Tally {
+    pairs: u64,
+    within: u64,
+    changed: u64,
+    sum: f64,
+    squares: f64,
+    sigma_squares: f64,
+    sigma_count: u64,
+    /// Sizes of the differences that are not nought.
+    sizes: Vec<f64>,
+    worst: Option<(f64, u32)>,
+    worst_sigmas: Option<f64>,
+    mixed: bool,
+}
+
+impl Tally {
+    fn new(comparison: &Comparison) -> Self {
+        Self {
+            pairs: 0,
+            within: 0,
+            changed: 0,
+            sum: 0.0,
+            squares: 0.0,
+            sigma_squares: 0.0,
+            sigma_count: 0,
+            sizes: Vec::new(),
+            worst: None,
+            worst_sigmas: None,
+            mixed: comparison.unit == "row",
+        }
+    }
+
+    fn add(&mut self, cell: &Cell) {
+        *(if cell.changed { &mut self.changed } else { &mut self.within }) += 1;
+        if let Some(sigmas) = cell.sigmas {
+            self.sigma_squares += sigmas * sigmas;
+            self.sigma_count += 1;
+            self.worst_sigmas = Some(self.worst_sigmas.map_or(sigmas, |worst| worst.max(sigmas)));
+        }
+        let Some(difference) = cell.difference else { return };
+        self.sum += difference;
+        self.squares += difference * difference;
+        self.sizes.push(difference.abs());
+        let rank = if self.mixed { cell.score } else { difference.abs() };
+        if self.worst.is_none_or(|(worst, _)| rank > worst) {
+            self.worst = Some((rank, cell.row));
+        }
+    }
+
+    fn finish(mut self, comparison: &Comparison) -> ColumnDiff {
+        let pairs = self.pairs as f64;
+        let statistics = (self.pairs > 0 && comparison.how != How::Text && !self.mixed).then(|| Statistics {
+            max: self.sizes.iter().copied().fold(0.0, f64::max),
+            rms: (self.squares / pairs).sqrt(),
+            bias: self.sum / pairs,
+            p95: percentile(&mut self.sizes, self.pairs, 0.95),
+        });
+        ColumnDiff {
+            name: comparison.name.clone(),
+            unit: comparison.unit.clone(),
+            pairs: self.pairs,
+            within: self.within,
+            changed: self.changed,
+            atol: comparison.atol,
+            rtol: comparison.rtol,
+            statistics,
+            max_sigmas: self.worst_sigmas,
+            rms_sigmas: (self.sigma_count > 0).then(|| (self.sigma_squares / pairs.max(1.0)).sqrt()),
+            worst_row: self.worst.map(|(_, row)| row),
+            worst_key: None,
+        }
+    }
+}
+
+/// The smallest size that at least this part of all pairs does not exceed; pairs beyond the sizes given have none.
+fn percentile(sizes: &mut [f64], pairs: u64, part: f64) -> f64 {
+    let rank = (part * pairs as f64).ceil() as u64;
+    let noughts = pairs - sizes.len() as u64;
+    if rank <= noughts {
+        return 0.0;
+    }
+    let at = usize::try_from(rank - noughts - 1).unwrap_or(usize::MAX).min(sizes.len().saturating_sub(1));
+    *sizes.select_nth_unstable_by(at, f64::total_cmp).1
+}

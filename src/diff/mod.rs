@@ -1,0 +1,209 @@
+//! Two tables, or two runs, compared: which rows changed, by how much, in the column's unit and in sigmas.
+//!
+//! One column at a time over rows paired by key, so that memory is a few columns whatever the table; tolerances and semantics come
+//! from the schema. Equal content hashes answer at once.
+
+mod cells;
+mod columns;
+mod compare;
+mod html;
+mod key;
+mod measure;
+mod source;
+mod text;
+
+pub use compare::compare;
+pub use html::html;
+pub use text::{Detail, text};
+
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::units::Unit;
+
+/// What a comparison is to overlook, and how much it is to show.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Instead of the key that the files name.
+    pub key: Vec<String>,
+    pub atol: Tolerances,
+    pub rtol: Tolerances,
+    pub ignore: BTreeSet<String>,
+    /// Columns w, x, y, z that are one rotation together.
+    pub quaternions: Vec<Vec<String>>,
+    /// Pairs rows of equal keys in their order instead of reporting them.
+    pub by_occurrence: bool,
+    /// Reads everything, also where the files say that they have equal content.
+    pub reread: bool,
+    /// Worst rows that are kept.
+    pub limit: usize,
+    /// Where every cell that differs is written as a row.
+    pub out: Option<PathBuf>,
+}
+
+/// A tolerance for all columns, and for some.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tolerances {
+    pub all: Option<f64>,
+    pub columns: BTreeMap<String, (f64, Option<Unit>)>,
+}
+
+impl Tolerances {
+    /// Takes in `0.1`, `x_mm=0.1` or `x_mm=100um`.
+    pub fn add(&mut self, flag: &str, text: &str) -> Result<()> {
+        let fault =
+            || Error::spec(flag, format!("`{text}`: expected a number not below 0, or COLUMN=NUMBER with or without a unit"));
+        let (column, value) = match text.rsplit_once('=') {
+            Some((column, value)) => (Some(column), value),
+            None => (None, text),
+        };
+        let digits = value.trim_end_matches(|c: char| c.is_alphabetic() || c == '/').len();
+        // An exponent's letter is followed by digits, a unit's is not.
+        let (number, symbol) = value.split_at(digits);
+        let number: f64 = number.trim().parse().map_err(|_| fault())?;
+        let unit = if symbol.is_empty() { None } else { Some(Unit::parse(symbol).ok_or_else(fault)?) };
+        if !number.is_finite() || number < 0.0 || (column.is_none() && unit.is_some()) {
+            return Err(fault());
+        }
+        match column {
+            Some(column) => drop(self.columns.insert(column.into(), (number, unit))),
+            None => self.all = Some(number),
+        }
+        Ok(())
+    }
+
+    /// The tolerance wished for a column that is in `unit`.
+    fn of(&self, column: &str, unit: Unit) -> Option<f64> {
+        let (number, given) = match self.columns.get(column) {
+            Some(wish) => *wish,
+            None => (self.all?, None),
+        };
+        let convert = |given: Unit| unit.from_si(given.to_si(number)) - unit.from_si(given.to_si(0.0));
+        Some(given.filter(|given| given.quantity() == unit.quantity()).map_or(number, convert))
+    }
+}
+
+/// Two tables compared.
+#[derive(Debug, Clone, Serialize)]
+pub struct TableDiff {
+    pub a: Side,
+    pub b: Side,
+    pub key: Vec<String>,
+    /// Equal by the hash of their content, without reading them.
+    pub equal_hashes: bool,
+    /// What differs beside the values: columns, units, types, the schema's version.
+    pub findings: Vec<Finding>,
+    pub rows: Rows,
+    /// Compared columns, in the order of A.
+    pub columns: Vec<ColumnDiff>,
+    /// The worst first.
+    pub worst: Vec<WorstRow>,
+    /// Keys that occur in one table only or more than once, some of them.
+    pub examples: Examples,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Side {
+    pub path: String,
+    /// `prediction/1.0.0`.
+    pub schema: Option<String>,
+    pub table_hash: Option<String>,
+    pub rows: u64,
+}
+
+/// A difference of the tables' make.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// `column`, `unit`, `type`, `semantic`, `schema`, `key`.
+    pub what: String,
+    pub column: String,
+    pub says: String,
+}
+
+impl Finding {
+    fn new(what: &str, column: &str, says: impl Into<String>) -> Self {
+        Self { what: what.into(), column: column.into(), says: says.into() }
+    }
+}
+
+/// How many rows of each class.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Rows {
+    pub same: u64,
+    pub within_tolerance: u64,
+    pub changed: u64,
+    pub only_a: u64,
+    pub only_b: u64,
+    /// Rows whose key occurs more than once in a table.
+    pub duplicate_a: u64,
+    pub duplicate_b: u64,
+    pub duplicate_keys: u64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct ColumnDiff {
+    pub name: String,
+    /// Of tolerance and statistics, A's; `row` where every row has its own.
+    pub unit: String,
+    /// Rows with a value in both.
+    pub pairs: u64,
+    pub within: u64,
+    pub changed: u64,
+    pub atol: f64,
+    pub rtol: f64,
+    /// Of B minus A over all pairs; null for texts and where rows have units of their own.
+    pub statistics: Option<Statistics>,
+    pub max_sigmas: Option<f64>,
+    pub rms_sigmas: Option<f64>,
+    #[serde(skip)]
+    worst_row: Option<u32>,
+    /// Where the difference is largest.
+    pub worst_key: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Statistics {
+    pub max: f64,
+    pub rms: f64,
+    pub bias: f64,
+    pub p95: f64,
+}
+
+/// A row that changed, with its cells that changed.
+#[derive(Debug, Clone, Serialize)]
+pub struct WorstRow {
+    pub key: String,
+    pub cells: Vec<WorstCell>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct WorstCell {
+    pub column: String,
+    pub a: serde_json::Value,
+    pub b: serde_json::Value,
+    pub difference: Option<f64>,
+    pub unit: String,
+    pub sigmas: Option<f64>,
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Examples {
+    pub only_a: Vec<String>,
+    pub only_b: Vec<String>,
+    pub duplicate: Vec<String>,
+}
+
+impl TableDiff {
+    /// True where nothing differs beyond tolerance.
+    pub fn is_same(&self) -> bool {
+        let rows = &self.rows;
+        self.findings.is_empty() && rows.changed + rows.only_a + rows.only_b + self.duplicates() == 0
+    }
+
+    /// Rows that could not be paired because their key is not theirs alone.
+    pub fn duplicates(&self) -> u64 {
+        self.rows.duplicate_a + self.rows.duplicate_b
+    }
+}

@@ -1,0 +1,213 @@
+//! One side of a comparison: a Parquet file opened by its footer, whose columns are read one at a time.
+
+use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float64Type, Int64Type, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
+use parquet::errors::ParquetError;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::store::schema::{self, TableSchema, Version};
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 1 << 16;
+
+/// What the cells of a column are to a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Float,
+    Int,
+    Flag,
+    Text,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    pub name: String,
+    pub kind: Kind,
+    /// As the file has it, for findings.
+    pub stored: String,
+    pub unit: Option<String>,
+    pub semantic: Option<String>,
+}
+
+/// A Parquet file, by its footer.
+pub(super) struct Source {
+    pub path: PathBuf,
+    pub rows: usize,
+    pub columns: Vec<Column>,
+    /// Kind and version, where the file says so.
+    pub table: Option<(String, Version)>,
+    pub table_hash: Option<String>,
+    /// Columns that tell every row from every other, where the file says so.
+    pub key: Vec<String>,
+    metadata: ArrowReaderMetadata,
+}
+
+impl Source {
+    pub fn open(path: &Path) -> Result<Self> {
+        let place = path.display().to_string();
+        let unreadable = |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));
+        let file = File::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+        // Arrow's own types (dictionaries, views) are left aside, so that every writer's text is plain text.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let metadata = ArrowReaderMetadata::load(&file, options).map_err(unreadable)?;
+        let footer = metadata.metadata().file_metadata();
+        let rows = usize::try_from(footer.num_rows()).unwrap_or(0);
+        if u32::try_from(rows).is_err() {
+            return Err(Error::spec(place, format!("{rows} rows; a comparison takes up to {}", u32::MAX)));
+        }
+        let said: BTreeMap<String, String> = footer
+            .key_value_metadata()
+            .into_iter()
+            .flatten()
+            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
+            .collect();
+        let units: BTreeMap<String, String> =
+            said.get("calib.units").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+        let rich = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()).ok();
+        let columns = metadata.schema().fields().iter().map(|field| {
+            let about = |key: &str| metadata_of(rich.as_ref(), field.name(), key);
+            Column {
+                name: field.name().clone(),
+                kind: kind(field.data_type()).unwrap_or(Kind::Text),
+                stored: if kind(field.data_type()).is_some() { field.data_type().to_string() } else { String::new() },
+                unit: about("unit").or_else(|| units.get(field.name()).cloned()),
+                semantic: about("semantic"),
+            }
+        });
+        let columns = columns.collect();
+        let table = said.get("calib.schema").and_then(|id| {
+            let (kind, version) = id.split_once('/')?;
+            Some((kind.to_string(), Version::parse(version)?))
+        });
+        let key = said.get("calib.primary_key").map(|key| key.split(',').map(String::from).collect()).unwrap_or_default();
+        let table_hash = said.get("calib.table_hash").cloned();
+        Ok(Self { path: path.into(), rows, columns, table, table_hash, key, metadata })
+    }
+
+    /// The schema that this calib knows of the table, whatever the version.
+    pub fn schema(&self) -> Option<&'static TableSchema> {
+        let (kind, _) = self.table.as_ref()?;
+        schema::all().find(|schema| &schema.name == kind)
+    }
+
+    pub fn position(&self, column: &str) -> Option<usize> {
+        self.columns.iter().position(|known| known.name == column)
+    }
+
+    /// The place of a column that a key needs.
+    pub fn key_column(&self, name: &str) -> Result<usize> {
+        self.position(name).ok_or_else(|| {
+            let known: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+            let message = format!("no key column `{name}`; its columns: {}", known.join(", "));
+            Error::spec(self.path.display().to_string(), message)
+        })
+    }
+
+    /// Batches of the given columns, in the given order, each cast to the type of its kind.
+    pub fn stream(&self, columns: &[usize]) -> Result<impl Iterator<Item = Result<Vec<ArrayRef>>> + use<>> {
+        let place = self.path.display().to_string();
+        for &column in columns {
+            let column = &self.columns[column];
+            if column.stored.is_empty() {
+                let message =
+                    format!("column {} is nested or binary, which is not compared: leave it out with --ignore", column.name);
+                return Err(Error::spec(place, message));
+            }
+        }
+        let file = File::open(&self.path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
+        let reader = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build();
+        let reader = reader.map_err(|e| Error::spec(&place, format!("not a readable Parquet file: {e}")))?;
+        // The reader gives columns in the file's order.
+        let mut ascending: Vec<usize> = columns.to_vec();
+        ascending.sort_unstable();
+        ascending.dedup();
+        let wanted: Vec<(usize, Kind)> = columns
+            .iter()
+            .map(|column| (ascending.binary_search(column).unwrap_or_default(), self.columns[*column].kind))
+            .collect();
+        Ok(reader.map(move |batch| {
+            let damaged = |e: &dyn std::fmt::Display| Error::spec(&place, format!("damaged, cannot be read to its end: {e}"));
+            let batch: RecordBatch = batch.map_err(|e| damaged(&e))?;
+            wanted.iter().map(|&(at, kind)| plain(batch.column(at), kind).map_err(|e| damaged(&e))).collect()
+        }))
+    }
+
+    /// A whole column of whole numbers; null cells are 0.
+    pub fn integers(&self, column: usize) -> Result<Vec<i64>> {
+        let mut values = Vec::with_capacity(self.rows);
+        for batch in self.stream(&[column])? {
+            values.extend_from_slice(batch?[0].as_primitive::<Int64Type>().values());
+        }
+        Ok(values)
+    }
+
+    /// A whole column of numbers or flags; null cells are set in the mask, which is empty where there are none.
+    pub fn numbers(&self, column: usize) -> Result<(Vec<f64>, Vec<bool>)> {
+        let mut values = Vec::with_capacity(self.rows);
+        let mut nulls: Vec<bool> = Vec::new();
+        for batch in self.stream(&[column])? {
+            let array = &batch?[0];
+            if array.null_count() > 0 {
+                nulls.resize(values.len(), false);
+                nulls.extend((0..array.len()).map(|row| array.is_null(row)));
+            }
+            push_numbers(array, &mut values);
+            if !nulls.is_empty() {
+                nulls.resize(values.len(), false);
+            }
+        }
+        Ok((values, nulls))
+    }
+}
+
+/// The numbers of a batch; flags are 0 and 1, whole numbers beyond 2^53 are rounded.
+pub(super) fn push_numbers(array: &ArrayRef, values: &mut Vec<f64>) {
+    match array.data_type() {
+        DataType::Float64 => values.extend_from_slice(array.as_primitive::<Float64Type>().values()),
+        DataType::Int64 => values.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| value as f64)),
+        DataType::Boolean => {
+            let flags: &BooleanArray = array.as_boolean();
+            values.extend(flags.values().iter().map(|flag| f64::from(u8::from(flag))));
+        }
+        // Texts have no number; nobody asks for it.
+        _ => values.resize(values.len() + array.len(), f64::NAN),
+    }
+}
+
+fn metadata_of(schema: Option<&Schema>, column: &str, key: &str) -> Option<String> {
+    schema?.field_with_name(column).ok()?.metadata().get(key).cloned()
+}
+
+fn kind(data_type: &DataType) -> Option<Kind> {
+    use DataType as T;
+    match data_type {
+        T::Float16 | T::Float32 | T::Float64 | T::Decimal32(..) | T::Decimal64(..) | T::Decimal128(..) | T::Decimal256(..) => {
+            Some(Kind::Float)
+        }
+        T::Int8 | T::Int16 | T::Int32 | T::Int64 | T::UInt8 | T::UInt16 | T::UInt32 => Some(Kind::Int),
+        T::Boolean => Some(Kind::Flag),
+        T::Utf8 | T::LargeUtf8 | T::Utf8View | T::UInt64 | T::Date32 | T::Date64 | T::Time32(_) | T::Time64(_) => {
+            Some(Kind::Text)
+        }
+        T::Timestamp(..) | T::Duration(_) => Some(Kind::Text),
+        _ => None,
+    }
+}
+
+fn plain(array: &ArrayRef, kind: Kind) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
+    let wanted = match kind {
+        Kind::Float => DataType::Float64,
+        Kind::Int => DataType::Int64,
+        Kind::Flag => DataType::Boolean,
+        Kind::Text => DataType::Utf8,
+    };
+    if array.data_type() == &wanted { Ok(array.clone()) } else { cast(array, &wanted) }
+}
