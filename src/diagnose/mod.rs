@@ -20,7 +20,7 @@ pub use finding::{Evidence, Finding, Number, Rival};
 pub use noise::Repeatability;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
-use crate::effect::{EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey};
+use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey};
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -209,7 +209,8 @@ fn fitted(
     question: &Question,
 ) -> Course {
     let robot = question.robot;
-    let setting = Setting { base: *from.stack.base(), load: Load::GravityTorque };
+    // The base starts where it was found, so that its correction is too small to matter to what else moves it.
+    let setting = Setting { base: from.base(), load: Load::GravityTorque };
     let rigid: Vec<Box<dyn Effect>> = from
         .stack
         .effects()
@@ -222,6 +223,9 @@ fn fitted(
     let stack = EffectStack::new(robot, setting.base, rigid.into_iter().chain(own).collect());
     let mut model = Model::nominal(robot.clone(), stack);
     model.x[..count].copy_from_slice(&from.x[..count]);
+    if let Some((_, range)) = model.stack.effects().find(|(effect, _)| effect.name() == BaseFrame::NAME) {
+        model.x[range].fill(0.0);
+    }
     let mut at = count;
     for cause in causes {
         for (k, value) in cause.coefficients.iter().enumerate() {

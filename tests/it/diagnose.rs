@@ -47,7 +47,7 @@ fn the_practice_cases_are_solved() {
         let model = parameters.model(robot, &[], Load::GravityTorque).expect("a model");
         for (point, row) in model.predict(&data).iter().zip(&predictions.0) {
             let apart = (point * 1e3 - Vector3::new(row.x_mm, row.y_mm, row.z_mm)).norm();
-            assert!(apart < 5e-5, "{}: {apart} mm at row {}", case.display(), row.sequence);
+            assert!(apart < 1e-5, "{}: {apart} mm at row {}", case.display(), row.sequence);
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
