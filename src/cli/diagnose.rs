@@ -1,43 +1,25 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::surroundings::{cores, default_store, surroundings};
+use super::pipeline_arguments::PipelineArguments;
 use super::{emit, emit_json};
 use crate::error::{Error, Result};
-use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
-use crate::progress::{Progress, Verbosity};
-use crate::stage::{Diagnose, STAGES, Stage};
+use crate::pipeline::{Outcome, Selection};
+use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{FindingNumbers, Findings, Rivals, Table, Verdict, VerdictRow};
 use clap::Args;
 use serde_json::{Value, json};
 use std::ffi::OsString;
-use std::path::PathBuf;
 
 /// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
 ///
-/// Runs the pipeline's `diagnose` stage and what it needs. The simulation is the nominal robot with its geometry, reduction
+/// Runs the `diagnose` stage of PIPELINE and what it needs. The simulation is the nominal robot with its geometry, reduction
 /// ratios and declared couplings identified from the recording; everything else is a finding.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DiagnoseArguments {
-    /// The pipeline's YAML file, with a stage `diagnose`
-    #[arg(value_name = "PIPELINE")]
-    pipeline: PathBuf,
-    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
-    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
-    set: Vec<Override>,
-    /// Where tables and records are kept [default: .calib in the working directory]
-    #[arg(long, value_name = "DIR")]
-    store: Option<PathBuf>,
-    /// Worker threads; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Prints one JSON document on stdout
-    #[arg(long)]
-    json: bool,
-    /// Prints no progress; warnings and errors remain
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    shared: PipelineArguments,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -45,20 +27,20 @@ const EXAMPLES: &str = "Examples:
   calib diagnose pipeline.yaml --json > diagnosis.json";
 
 pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
-    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
+    arguments.shared.told(execute(&arguments.shared, command_line))
+}
+
+fn execute(shared: &PipelineArguments, command_line: &[OsString]) -> Result<()> {
+    let plan = shared.plan()?;
     let Some(stage) = plan.stages.iter().position(|stage| stage.entry.name == Diagnose::NAME) else {
-        let place = arguments.pipeline.display().to_string();
+        let place = shared.pipeline.display().to_string();
         return Err(Error::spec(place, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
     };
     let plan = plan.needed_for(stage);
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
-    let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
-    let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-    let options = RunOptions { selection: Selection::default(), jobs: arguments.jobs.map_or_else(cores, usize::from) };
-    let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
-    progress.finish();
-    let told = Told::read(&result?, &store)?;
-    if arguments.json { emit_json(&told.document()) } else { emit(&told.text()) }
+    let store = shared.store()?;
+    let outcome = shared.run(&plan, &store, Selection::default(), command_line)?;
+    let told = Told::read(&outcome, &store)?;
+    if shared.json { emit_json(&told.document()) } else { emit(&told.text()) }
 }
 
 /// The tables of a diagnosis.

@@ -3,6 +3,7 @@
 mod check;
 mod diagnose;
 mod diff;
+mod pipeline_arguments;
 mod poses;
 mod run;
 mod schema;

@@ -1,16 +1,13 @@
 //! `calib run`: runs what is not already done.
 
-use super::surroundings::{cores, default_store, surroundings};
+use super::pipeline_arguments::PipelineArguments;
 use super::{emit, emit_json, searches, tables};
-use crate::error::{Error, Fault, Result};
-use crate::pipeline::{Forecast, Outcome, Override, Plan, Prospect, RunOptions, Selection, StageStatus, preview, run};
-use crate::progress::{Progress, Verbosity};
-use crate::stage::STAGES;
+use crate::error::Result;
+use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// Run a pipeline: every stage that is not already done, in order.
@@ -21,12 +18,8 @@ use std::time::Instant;
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RunArguments {
-    /// The pipeline's YAML file
-    #[arg(value_name = "PIPELINE")]
-    pipeline: PathBuf,
-    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
-    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
-    set: Vec<Override>,
+    #[command(flatten)]
+    shared: PipelineArguments,
     /// Shows what would run and why, and runs nothing
     #[arg(long, short = 'n')]
     dry_run: bool,
@@ -42,18 +35,6 @@ pub(super) struct RunArguments {
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
     #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "")]
     force: Option<Vec<String>>,
-    /// Where tables and records are kept [default: .calib in the working directory]
-    #[arg(long, value_name = "DIR")]
-    store: Option<PathBuf>,
-    /// Worker threads; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-    /// Prints one JSON document on stdout
-    #[arg(long)]
-    json: bool,
-    /// Prints no progress; warnings and errors remain
-    #[arg(long, short)]
-    quiet: bool,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -64,36 +45,27 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --json --quiet > result.json";
 
 pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
-    let result = execute(arguments, command_line);
-    if let (true, Err(error)) = (arguments.json, &result) {
-        emit_json(&failure(error))?;
-    }
-    result
+    arguments.shared.told(execute(arguments, command_line))
 }
 
 fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     let begun = Instant::now();
-    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let shared = &arguments.shared;
+    let (plan, store) = (shared.plan()?, shared.store()?);
     // `--force` without a stage stands for all of them.
     let force = arguments.force.as_ref().map(|ids| ids.iter().filter(|id| !id.is_empty()).cloned().collect());
     let selection =
         Selection { only: arguments.only.clone(), from: arguments.from.clone(), until: arguments.until.clone(), force };
     if arguments.dry_run {
         let forecasts = preview(&plan, &store, &selection)?;
-        return if arguments.json {
+        return if shared.json {
             emit_json(&json!({ "pipeline": plan.name, "stages": forecasts }))
         } else {
             emit(&forecast_lines(&forecasts))
         };
     }
-    let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
-    let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-    let options = RunOptions { selection, jobs: arguments.jobs.map_or_else(cores, usize::from) };
-    let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
-    progress.finish();
-    let outcome = result?;
-    if arguments.json {
+    let outcome = shared.run(&plan, &store, selection, command_line)?;
+    if shared.json {
         return emit_json(&document(&outcome, &store)?);
     }
     let mut text = tables::statistics(&outcome, &store)?;
@@ -163,14 +135,4 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "report": outcome.documents.first(),
         "documents": outcome.documents,
     }))
-}
-
-fn failure(error: &Error) -> serde_json::Value {
-    let fault = |fault: &Fault| json!({ "place": fault.place, "message": fault.message });
-    let faults: Vec<serde_json::Value> = match error {
-        Error::Spec(faults) | Error::Data(faults) => faults.iter().map(fault).collect(),
-        Error::Store(only) => vec![fault(only)],
-        Error::Bug(message) => vec![json!({ "place": "", "message": message })],
-    };
-    json!({ "status": "failed", "exit_code": error.exit_code(), "faults": faults })
 }

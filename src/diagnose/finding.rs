@@ -1,10 +1,11 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
-use super::Course;
+use super::judge::Worth;
 use super::pool::Pool;
 use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
+use super::{ALIKE, Course};
 use crate::effect::{Effect, Form, Place, Placed, Signature};
 use crate::estimate::{Fate, Kind, Screening, tail};
 use crate::units::Unit;
@@ -26,8 +27,8 @@ pub struct Evidence {
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
-    /// Fall of the held-out rms error, m.
-    pub heldout_gain: f64,
+    /// Fall of the held-out rms error, m; `None` where no rows are held out, or several effects make up the finding.
+    pub heldout_gain: Option<f64>,
     /// Rms of the whole effect over the recording, m.
     pub effect_rms: f64,
     /// Fall of the whitened squared residual.
@@ -65,9 +66,6 @@ impl Finding {
         !FAULTS.contains(&self.effect)
     }
 }
-
-/// Sets that are worse by less than this explain as well.
-const ALIKE: f64 = 6.0;
 
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
@@ -136,7 +134,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             f_statistic,
             p_value: tail(f_statistic, rank as f64, freedom),
             delta_bic: pool.bic(&rest) - bic,
-            heldout_gain: looked.worths.iter().find(|w| w.effect == effect && w.place == place).map_or(0.0, |w| w.gain),
+            heldout_gain: worth_of(&forms, &place, &looked.worths),
             effect_rms,
             gain,
         };
@@ -151,6 +149,13 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
+}
+
+/// What held-out rows say of forms of one effect at a place.
+fn worth_of(forms: &[Form], place: &str, worths: &[Worth]) -> Option<f64> {
+    let name = forms.first()?.name();
+    let own = worths.iter().find(|worth| worth.effect == name && worth.place == place);
+    own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|worth| worth.gain)
 }
 
 /// Cosines of a curve up to this one make at most two periods over its range.

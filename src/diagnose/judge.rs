@@ -1,7 +1,7 @@
 //! Held-out rows judge: what each finding is worth there, and which of two explanations that fit alike carries over.
 
 use super::pool::Pool;
-use super::{Chosen, Course, Question, fitted, start_of};
+use super::{ALIKE, Chosen, Course, Question, fitted, start_of};
 use crate::effect::{Effect, Form, Placed};
 use crate::robot::Measurements;
 
@@ -15,8 +15,6 @@ pub(crate) struct Worth {
 
 /// A model that is worse on held-out rows by this share is worse.
 const WORSE: f64 = 0.03;
-/// Explanations whose criterion is this close fit alike.
-const ALIKE: f64 = 6.0;
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
 

@@ -48,6 +48,10 @@ pub struct Question<'a> {
 const ROUNDS: usize = 6;
 /// Repeats that make the noise known; with fewer it is taken from a residual without structure.
 const REPEATS: usize = 10;
+/// The gate is closed above this probability that what is left is noise.
+const SIGNIFICANT: f64 = 0.004;
+/// Explanations whose criterion is this close fit alike (Kass and Raftery, 1995).
+const ALIKE: f64 = 6.0;
 /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
 const SEARCHED: usize = 800;
 /// A repeatability that changes by less than this share is settled.
@@ -119,7 +123,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
         let kept_same = next.screening.kept == now.screening.kept;
         let last_round = round >= ROUNDS;
-        if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > options.alpha {
+        if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > SIGNIFICANT {
             asked_residual = true;
             let rows = &next.screening.kept;
             let predicted = next.model.predict(&data);
@@ -270,9 +274,16 @@ fn yielding(now: &Course, joints: usize) -> Vec<f64> {
     out
 }
 
-/// Rows that the search looks at: all, or every so many-th; the model is fitted to all.
+/// Rows that the search looks at: all, or [`SEARCHED`] of them by a sequence that keeps no step with any design of the recording; the
+/// model is fitted to all.
 fn thinned(rows: &[usize]) -> Vec<usize> {
-    rows.iter().copied().step_by(rows.len().div_ceil(SEARCHED).max(1)).collect()
+    if rows.len() <= SEARCHED {
+        return rows.to_vec();
+    }
+    // Multiples of the golden ratio fill the unit interval evenly (Kuipers and Niederreiter, 1974).
+    let share = SEARCHED as f64 / rows.len() as f64;
+    let chosen = |i: &usize| (*i as f64 * 0.618_033_988_749_895).fract() < share;
+    (0..rows.len()).filter(chosen).map(|i| rows[i]).collect()
 }
 
 /// Poses of rows, numbered in order: repeats share one.

@@ -13,15 +13,14 @@ pub(crate) struct SearchOptions {
     pub most: usize,
     /// Sets followed side by side.
     pub beam: usize,
-    /// Draws of the gate, and the probability above which it is closed.
+    /// Draws of the gate.
     pub draws: usize,
-    pub alpha: f64,
     pub seed: u64,
 }
 
 impl Default for SearchOptions {
     fn default() -> Self {
-        Self { most: 12, beam: 3, draws: 299, alpha: 0.004, seed: 1 }
+        Self { most: 12, beam: 3, draws: 299, seed: 1 }
     }
 }
 
@@ -78,7 +77,7 @@ impl<'a, 'b> Search<'a, 'b> {
         while best.len() < self.options.most {
             last = self.gate(&best);
             first.get_or_insert(last);
-            if last > self.options.alpha {
+            if last > super::SIGNIFICANT {
                 break;
             }
             let Some(order) = self.step(&states) else { break };

@@ -5,7 +5,7 @@ use super::judge::Worth;
 use super::noise::Repeatability;
 use super::pool::Pool;
 use super::statement::{next, not_observable};
-use super::{Course, Question};
+use super::{Course, Question, REPEATS, SIGNIFICANT};
 use crate::effect::{Effect, Placed, Survey};
 use crate::estimate::{Fitted, Model, Screening, Weight};
 use crate::robot::Measurements;
@@ -94,14 +94,11 @@ pub(crate) struct Looked<'a, 'b> {
     pub survey: &'b Survey<'a>,
 }
 
-/// A gate above this holds nothing.
-const SIGNIFICANT: f64 = 0.004;
 /// With structure left, a residual this much larger than the noise is not explained; without, this much.
 const LOUD: f64 = 1.25;
 const TOO_LOUD: f64 = 2.5;
 /// Without repeats a residual is not called noise where it is this many times the instrument's.
 const NOT_NOISE: f64 = 4.0;
-const REPEATS: usize = 10;
 
 /// A weak unnamed finding of less than this share of the strongest one's gain is its rest.
 const REST: f64 = 0.03;

@@ -17,7 +17,7 @@ crate::table::rows! { "findings",
         p_value: Option<f64>,
         /// How much worse the criterion is without it.
         delta_bic: Option<f64>,
-        /// By how much the held-out rms is larger without it.
+        /// By how much the held-out rms is larger without it; null where no rows are held out, or several effects make it up.
         heldout_gain_mm: Option<f64>,
         /// Rms of the whole effect over the fitted rows.
         effect_rms_mm: Option<f64>,
@@ -67,7 +67,7 @@ impl Findings {
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),
             delta_bic: finding.evidence.map(|e| e.delta_bic),
-            heldout_gain_mm: finding.evidence.map(|e| e.heldout_gain * 1e3),
+            heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).map(|gain| gain * 1e3),
             effect_rms_mm: finding.evidence.map(|e| e.effect_rms * 1e3),
             valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
             valid_from_rad: finding.valid.map(|(_, range)| range[0]),
