@@ -145,7 +145,15 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         let statement = sentence(effect, &place, &forms, &numbers, effect_rms);
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
-    out.extend(faults(&last.screening));
+    let data = looked.survey.data;
+    let by_the_way_there = |form: &Form| match form {
+        Form::JointLogLag(_) => true,
+        Form::Backlash(_) => data.direction.is_none(),
+        _ => false,
+    };
+    // Nobody knows from where the arm came to the first row.
+    let unknown = last.chosen.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
+    out.extend(faults(&last.screening, unknown));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
@@ -206,10 +214,10 @@ fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>
 /// Less than this share of a finding's gain at its own joint is its finer shape.
 const REFINEMENT: f64 = 0.1;
 
-/// Rows of the recording that no model can follow, as findings.
-fn faults(screening: &Screening) -> Vec<Finding> {
+/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
+fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     let of = |kinds: fn(Kind) -> bool| -> Vec<usize> {
-        screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind)).map(|s| s.row + 1).collect()
+        screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown).map(|s| s.row + 1).collect()
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();

@@ -1,7 +1,7 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{Question, diagnose};
-use crate::error::{Fault, Result};
+use crate::error::{Error, Fault, Result};
 use crate::estimate::Suspect;
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
@@ -24,6 +24,9 @@ pub struct Diagnose {
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
+
+/// Fewest rows to fit: geometry alone takes some thirty numbers from three of each row.
+const FEWEST: usize = 15;
 
 crate::stage::reads! {
     /// Input ports of [`Diagnose`].
@@ -69,6 +72,11 @@ impl Stage for Diagnose {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let data = reads.recording.measurements(&self.tracker);
         let fit = reads.split.rows(&reads.recording, &self.on)?;
+        if fit.len() < FEWEST {
+            let message =
+                format!("{} rows to fit say nothing beyond the geometry's parameters: at least {FEWEST} are needed", fit.len());
+            return Err(Error::data("table recording", message));
+        }
         let validate: Vec<usize> = (0..data.rows()).filter(|row| fit.binary_search(row).is_err()).collect();
         let set = screened::numbered(&reads.split);
         let question = Question { robot: &robot, data: &data, fit: &fit, validate: &validate, set: &set, seed: context.seed };
