@@ -14,6 +14,7 @@
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
+//! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
 //! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
@@ -53,6 +54,8 @@ pub mod robot;
 pub mod effect;
 
 pub mod estimate;
+
+pub mod compensate;
 
 pub mod diagnose;
 

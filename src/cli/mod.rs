@@ -1,8 +1,10 @@
 //! The command line: one file per verb. Results go to stdout, progress and messages to stderr; nothing below here prints.
 
 mod check;
+mod compensate;
 mod diagnose;
 mod diff;
+mod identified;
 mod pipeline_arguments;
 mod poses;
 mod run;
@@ -30,6 +32,7 @@ struct Arguments {
 enum Verb {
     Run(run::RunArguments),
     Check(check::CheckArguments),
+    Compensate(Box<compensate::CompensateArguments>),
     Diagnose(diagnose::DiagnoseArguments),
     Diff(diff::DiffArguments),
     Poses(poses::PosesArguments),
@@ -54,6 +57,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
     let result = match parsed.verb {
         Verb::Run(verb) => run::main(&verb, &arguments),
         Verb::Check(verb) => check::main(&verb),
+        Verb::Compensate(verb) => compensate::main(&verb, &arguments),
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Diff(verb) => return diff::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),

@@ -148,6 +148,16 @@ impl EffectStack {
         }
     }
 
+    /// Tool frame (tracker frame) of the row that [`Self::point`] has just placed, and the velocity (v; w) of its origin by each joint.
+    pub(crate) fn tool(&self, robot: &RobotModel, scratch: &Scratch, velocities: &mut [Twist]) -> Pose {
+        let behind = &scratch.posture.behind;
+        let tool = behind[robot.joints()] * *robot.home();
+        for (joint, velocity) in velocities.iter_mut().enumerate() {
+            *velocity = robot.velocity(joint, &behind[joint], &tool.translation);
+        }
+        tool
+    }
+
     /// How the point moves with every joint and station.
     fn velocities(&self, robot: &RobotModel, point: &Vector3<f64>, scratch: &mut Scratch) {
         let Scratch { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = scratch;

@@ -88,6 +88,16 @@ impl RobotModel {
         Pose::new(Matrix3::identity() + turn, -(turn * self.points[joint]))
     }
 
+    /// Velocity (v; w) of `point` by joint `joint`, whose zero-pose coordinates `frame` maps; both in one common frame.
+    pub(crate) fn velocity(&self, joint: usize, frame: &Pose, point: &Vector3<f64>) -> Twist {
+        let axis = frame.rotation * self.axes[joint];
+        if !self.is_revolute(joint) {
+            return Twist::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0);
+        }
+        let v = axis.cross(&(point - frame.point(&self.points[joint])));
+        Twist::new(v.x, v.y, v.z, axis.x, axis.y, axis.z)
+    }
+
     /// Tool frame in the base frame for joint positions `q` (rad or m): exp(x1 q1) ... exp(xn qn) home.
     pub fn forward(&self, q: &[f64]) -> Pose {
         let mut pose = Pose::identity();

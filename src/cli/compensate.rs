@@ -1,0 +1,210 @@
+//! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
+
+mod columns;
+mod correct;
+mod parquet;
+mod text;
+
+use super::identified::{Identified, ModelArguments};
+use crate::compensate::Arm;
+use crate::error::{Error, Fault, Result};
+use crate::units::{Quantity, Unit};
+use clap::{Args, ValueEnum};
+use columns::Units;
+use correct::{Corrector, Manner};
+use std::ffi::OsString;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use text::Layout;
+
+/// Correct targets: joint commands that bring the real arm to where the nominal robot would have put the tool.
+///
+/// The whole identified model is solved, with all accepted effects and the learned correction. A joint target stands for the point that the
+/// nominal robot reaches with it; a Cartesian target is a point, or a pose, in the robot's base frame. Columns are known by name: q1_deg (or
+/// _rad, _mm), the robot's joint names; x_mm, y_mm, z_mm, with qw, qx, qy, qz or a_deg, b_deg, c_deg (about z, y', x''); payload_kg, temp_c,
+/// time_s, dir1 (+1: the joint comes from below), i1_a. Joints are replaced in place, all other columns stay byte for byte, and what is
+/// known of each target is appended.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct CompensateArguments {
+    #[command(flatten)]
+    model: ModelArguments,
+    /// Targets: delimited text or Parquet; `-` or nothing: text on stdin
+    #[arg(value_name = "TARGETS", default_value = "-")]
+    targets: PathBuf,
+    /// Writes to this file, .parquet or text [default: stdout]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// What is a target where a file has both: the joints, or the pose, near the joints
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = What::Joints)]
+    target: What,
+    /// Orientation of joint targets: free, for the least change of joints, or kept as the nominal robot has it
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = Orientation::Free)]
+    orientation: Orientation,
+    /// One step by the nominal Jacobian instead of solving (Wang et al. 2020, Fig. 2)
+    #[arg(long)]
+    one_step: bool,
+    /// Replaces the joints and appends nothing
+    #[arg(long)]
+    plain: bool,
+    /// Payload where the targets do not say, kg
+    #[arg(long, value_name = "KG", default_value_t = 0.0)]
+    payload: f64,
+    /// Temperature where the targets do not say, C [default: that at the start of the recording]
+    #[arg(long, value_name = "C", allow_hyphen_values = true)]
+    temperature: Option<f64>,
+    /// Time on the recording's clock, s [default: long after it: steps have happened, the arm is warm]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    time: Option<f64>,
+    /// Side from which all joints come to rest, 1 or -1 [default: by the order of the targets]
+    #[arg(long, value_name = "SIGN", allow_hyphen_values = true)]
+    direction: Option<f64>,
+    /// Where the first Cartesian target is searched from, deg (mm for a prismatic joint)
+    #[arg(long, value_name = "Q1,..", value_delimiter = ',', allow_hyphen_values = true)]
+    start: Option<Vec<f64>>,
+    /// Unit of angles whose column does not name one: deg, rad
+    #[arg(long, value_name = "UNIT")]
+    angle: Option<String>,
+    /// Unit of lengths whose column does not name one: mm, m
+    #[arg(long, value_name = "UNIT")]
+    length: Option<String>,
+    /// Leaves out the uncertainty of each target
+    #[arg(long)]
+    no_sigma: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum What {
+    Joints,
+    Pose,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum Orientation {
+    Free,
+    Keep,
+}
+
+const EXAMPLES: &str = "Examples:
+  calib compensate pipeline.yaml targets.csv > corrected.csv
+  calib compensate latest targets.parquet --out corrected.parquet
+  calib compensate pipeline.yaml poses.csv --target pose --payload 120 --out corrected.csv
+  calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
+
+pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
+    check(arguments)?;
+    let identified = arguments.model.load(command_line)?;
+    let arm = Arm::new(identified.model.clone(), identified.correction.clone());
+    let coverage = identified.coverage();
+    let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
+    let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.model.jobs())
+        .build()
+        .map_err(|error| Error::store("--jobs", error.to_string()))?;
+    let place = if arguments.targets.as_os_str() == "-" { "stdin".into() } else { arguments.targets.display().to_string() };
+    let units = Units { angle: unit(arguments.angle.as_deref()), length: unit(arguments.length.as_deref()) };
+    let cartesian = arguments.target == What::Pose;
+    let layout = Layout { place: &place, robot: &identified.robot, units, plain: arguments.plain, cartesian };
+    threads.install(|| corrected(arguments, &layout, &mut corrector))?;
+    if !arguments.model.quiet {
+        let text = format!("model: {}\n{}", identified.origin, corrector.tally.text());
+        let _ = std::io::stderr().write_all(text.as_bytes());
+    }
+    Ok(())
+}
+
+fn check(arguments: &CompensateArguments) -> Result<()> {
+    let mut faults = Vec::new();
+    for (option, given, quantity) in
+        [("--angle", &arguments.angle, Quantity::Angle), ("--length", &arguments.length, Quantity::Length)]
+    {
+        if let Some(given) = given.as_deref().filter(|given| Unit::parse(given).is_none_or(|unit| unit.quantity() != quantity)) {
+            faults.push(Fault::new(option, format!("unknown unit `{given}`; allowed: {}", Unit::symbols(quantity).join(", "))));
+        }
+    }
+    if !(arguments.payload.is_finite() && arguments.payload >= 0.0) {
+        faults.push(Fault::new("--payload", format!("expected a mass of 0 or more, kg, found {}", arguments.payload)));
+    }
+    if let Some(direction) = arguments.direction.filter(|direction| direction.abs() != 1.0) {
+        faults.push(Fault::new("--direction", format!("expected 1 or -1, found {direction}")));
+    }
+    if arguments.out.as_ref().is_some_and(|out| same_file(out, &arguments.targets)) {
+        faults.push(Fault::new("--out", "is the file of the targets: write beside it"));
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+fn unit(symbol: Option<&str>) -> Option<Unit> {
+    symbol.and_then(Unit::parse)
+}
+
+fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Manner> {
+    let robot = &identified.model.robot;
+    let start = match &arguments.start {
+        Some(start) if start.len() != robot.joints() => {
+            let message = format!("has {} positions, the robot {} joints", start.len(), robot.joints());
+            return Err(Error::spec("--start", message));
+        }
+        Some(start) => {
+            let unit = |joint| if robot.is_revolute(joint) { Unit::Degree } else { Unit::Millimetre };
+            Some(start.iter().enumerate().map(|(joint, value)| unit(joint).to_si(*value)).collect())
+        }
+        None => None,
+    };
+    Ok(Manner {
+        cartesian: arguments.target == What::Pose,
+        oriented: arguments.orientation == Orientation::Keep,
+        one_step: arguments.one_step,
+        payload: arguments.payload,
+        temperature: arguments.temperature,
+        time: arguments.time,
+        direction: arguments.direction,
+        start,
+    })
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+}
+
+/// Reads, corrects and writes; a file appears only when it is whole.
+fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+    let Some(out) = &arguments.out else {
+        return convert(&arguments.targets, std::io::stdout(), has_ending(&arguments.targets, "parquet"), layout, corrector);
+    };
+    let columnar = has_ending(out, "parquet");
+    if columnar != has_ending(&arguments.targets, "parquet") {
+        let message = "text stays text and Parquet stays Parquet: give --out the ending of the targets";
+        return Err(Error::spec("--out", message));
+    }
+    let refused = |error: &std::io::Error| Error::store(out.display().to_string(), format!("cannot be written: {error}"));
+    let mut name = out.clone().into_os_string();
+    name.push(".part");
+    let aside = PathBuf::from(name);
+    let file = File::create(&aside).map_err(|error| refused(&error))?;
+    let result = convert(&arguments.targets, file, columnar, layout, corrector)
+        .and_then(|()| std::fs::rename(&aside, out).map_err(|error| refused(&error)));
+    if result.is_err() {
+        let _ = std::fs::remove_file(&aside);
+    }
+    result
+}
+
+fn convert(targets: &Path, output: impl Write + Send, columnar: bool, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+    let open =
+        || File::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
+    let mut output = BufWriter::new(output);
+    if columnar {
+        return parquet::stream(open()?, &mut output, layout, corrector);
+    }
+    if targets.as_os_str() == "-" {
+        return text::stream(&mut BufReader::new(std::io::stdin()), &mut output, layout, corrector);
+    }
+    text::stream(&mut BufReader::new(open()?), &mut output, layout, corrector)
+}

@@ -1,0 +1,237 @@
+//! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
+
+use crate::compensate::{
+    Arm, Chain, Circumstance, Coverage, Found, LONG_AFTER, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse,
+    least_change, one_step,
+};
+use crate::robot::RobotModel;
+use crate::spatial::Pose;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// m and rad: a target farther off is said to be not reached.
+const REACHED: f64 = 1e-6;
+
+/// rad or m: a smaller move has no direction.
+const STILL: f64 = 1e-9;
+
+/// A target as it was given, SI.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Target {
+    pub q: Option<Vec<f64>>,
+    /// Base frame.
+    pub point: Option<Vector3<f64>>,
+    pub rotation: Option<Matrix3<f64>>,
+    pub payload: Option<f64>,
+    pub temperature: Option<f64>,
+    pub time: Option<f64>,
+    pub direction: Option<Vec<f64>>,
+    pub current: Option<Vec<f64>>,
+}
+
+/// How to correct, and what holds where a target does not say.
+#[derive(Debug, Clone)]
+pub(super) struct Manner {
+    /// Cartesian columns are the targets though there are joints; these then say near which posture.
+    pub cartesian: bool,
+    /// Whether joint targets keep the nominal orientation.
+    pub oriented: bool,
+    pub one_step: bool,
+    pub payload: f64,
+    pub temperature: Option<f64>,
+    pub time: Option<f64>,
+    pub direction: Option<f64>,
+    /// Where the first Cartesian target is searched from.
+    pub start: Option<Vec<f64>>,
+}
+
+/// A command and what is known of it, SI.
+#[derive(Debug, Clone)]
+pub(super) struct Answer {
+    pub q: Vec<f64>,
+    /// How far the uncorrected command would be off by the model.
+    pub uncorrected: f64,
+    pub residual: f64,
+    pub iterations: usize,
+    pub sigma: Option<f64>,
+    /// What is wrong with it; empty if nothing.
+    pub remark: String,
+    /// Whether the wanted point is reached.
+    pub reached: bool,
+}
+
+pub(super) struct Corrector<'a> {
+    arm: &'a Arm,
+    coverage: Option<Coverage>,
+    uncertainty: Option<Uncertainty>,
+    manner: Manner,
+    /// Nominal joints of the target before.
+    last: Option<Vec<f64>>,
+    direction: Vec<f64>,
+    pub tally: Tally,
+}
+
+/// What became of all targets.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tally {
+    pub targets: u64,
+    pub uncorrected_sum: f64,
+    pub uncorrected_max: f64,
+    pub residual_max: f64,
+    pub not_reached: u64,
+    pub turned: u64,
+    pub beyond_limits: u64,
+    pub beyond_measured: u64,
+}
+
+struct Job {
+    wanted: Wanted,
+    home: Vec<f64>,
+    circumstance: Circumstance,
+}
+
+impl<'a> Corrector<'a> {
+    pub fn new(arm: &'a Arm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
+        let joints = arm.model().robot.joints();
+        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: Tally::default() }
+    }
+
+    pub fn has_uncertainty(&self) -> bool {
+        self.uncertainty.is_some()
+    }
+
+    /// Answers in the order of the targets, which follow those of the batch before.
+    pub fn batch(&mut self, targets: Vec<Target>) -> Vec<Answer> {
+        let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
+        let this: &Self = self;
+        let answers: Vec<Answer> = jobs
+            .par_iter()
+            .map_init(
+                || (this.arm.reach(), Nominal::new(&this.arm.model().robot)),
+                |(reach, nominal), job| this.solve(reach, nominal, job),
+            )
+            .collect();
+        for answer in &answers {
+            self.tally.add(answer);
+        }
+        answers
+    }
+
+    fn prepare(&mut self, target: Target) -> Job {
+        let robot: &RobotModel = &self.arm.model().robot;
+        let n = robot.joints();
+        let seed = target.q.clone().or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
+        let (wanted, home) = match (&target.q, target.point) {
+            (Some(q), point) if !(self.manner.cartesian && point.is_some()) => {
+                (Wanted { pose: robot.forward(q), oriented: self.manner.oriented }, q.clone())
+            }
+            (_, point) => {
+                let oriented = target.rotation.is_some();
+                let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
+                let wanted = Wanted { pose, oriented };
+                let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
+                (wanted, home)
+            }
+        };
+        if let Some(last) = &self.last {
+            for (direction, (now, before)) in self.direction.iter_mut().zip(home.iter().zip(last)) {
+                if (now - before).abs() > STILL {
+                    *direction = (now - before).signum();
+                }
+            }
+        }
+        self.last = Some(home.clone());
+        let fixed = self.manner.direction.map(|direction| vec![direction; n]);
+        let circumstance = Circumstance {
+            payload: target.payload.unwrap_or(self.manner.payload),
+            temperature: target.temperature.or(self.manner.temperature),
+            time: target.time.or(self.manner.time).unwrap_or(LONG_AFTER),
+            direction: target.direction.or(fixed).unwrap_or_else(|| self.direction.clone()),
+            current: target.current,
+        };
+        Job { wanted, home, circumstance }
+    }
+
+    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> Answer {
+        reach.under(&job.circumstance);
+        let found: Found =
+            if self.manner.one_step { one_step(reach, nominal, &job.wanted, &job.home) } else { self.reached(reach, job) };
+        let turned = job.wanted.oriented && found.turn > REACHED;
+        let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
+        let reached = self.manner.one_step || found.residual < REACHED;
+        let mut remarks = Vec::new();
+        if !reached {
+            remarks.push(format!("not reached, {:.3} mm off", found.residual * 1e3));
+        }
+        if turned {
+            remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
+        }
+        remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
+        if let Some(coverage) = &self.coverage {
+            remarks.extend(coverage.beyond(&found.q, &job.circumstance));
+        }
+        let share = reach.share();
+        if share < 1.0 {
+            remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+        }
+        Answer {
+            q: found.q,
+            uncorrected: found.before,
+            residual: found.residual,
+            iterations: found.iterations,
+            sigma,
+            remark: remarks.join("; "),
+            reached,
+        }
+    }
+}
+
+impl Corrector<'_> {
+    /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
+    fn reached(&self, reach: &mut Reach, job: &Job) -> Found {
+        let found = least_change(reach, &job.wanted, &job.home, &job.home);
+        if !job.wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
+            return found;
+        }
+        let point = Wanted { oriented: false, ..job.wanted };
+        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, &job.home, &job.home);
+        let turn = job.wanted.turn_left(&reach.place(&q));
+        Found { q, residual, turn, before, iterations: iterations + found.iterations }
+    }
+}
+
+impl Tally {
+    fn add(&mut self, answer: &Answer) {
+        self.targets += 1;
+        self.uncorrected_sum += answer.uncorrected;
+        self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
+        self.residual_max = self.residual_max.max(answer.residual);
+        self.not_reached += u64::from(!answer.reached);
+        self.turned += u64::from(answer.remark.contains("orientation off"));
+        self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
+        self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
+    }
+
+    /// For a person, on one or several lines.
+    pub fn text(&self) -> String {
+        let mean = self.uncorrected_sum / self.targets.max(1) as f64;
+        let mut text = format!(
+            "{} targets; uncorrected they would be off by {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
+            self.targets,
+            mean * 1e3,
+            self.uncorrected_max * 1e3,
+            self.residual_max * 1e3
+        );
+        for (count, what) in [
+            (self.not_reached, "could not be reached"),
+            (self.turned, "are reached but for their orientation: the wrist is stretched"),
+            (self.beyond_limits, "leave the joint limits"),
+            (self.beyond_measured, "are outside of what was measured: the model extrapolates there"),
+        ] {
+            if count > 0 {
+                text.push_str(&format!("warning: {count} of them {what} (column `remark`)\n"));
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,257 @@
+//! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
+
+use super::surroundings::{cores, default_store, surroundings};
+use crate::compensate::{Arm, Coverage, Uncertainty};
+use crate::effect::Load;
+use crate::error::{Error, Fault, Result, nearest};
+use crate::estimate::Model;
+use crate::estimate::network::Correction;
+use crate::pipeline::{Override, Plan, RunOptions, Selection, run};
+use crate::progress::{Progress, Verbosity};
+use crate::robot::description::RobotDescription;
+use crate::robot::import::{Text, read_calib, read_case};
+use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::stage::STAGES;
+use crate::store::frame::FrameBuilder;
+use crate::store::{Store, TableRef};
+use crate::table::{Network, Parameters, Recording, Robot, Table};
+use clap::Args;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde::Deserialize;
+use std::ffi::OsString;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Where the model comes from.
+#[derive(Args)]
+pub(super) struct ModelArguments {
+    /// A pipeline (its stages run as far as they are not done), `latest` or the id of a run in the store, or a table
+    /// `parameters` (Parquet)
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// The stage whose parameters to take [default: the last that writes some]
+    #[arg(long, value_name = "STAGE")]
+    step: Option<String>,
+    /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
+    #[arg(long, value_name = "FILE")]
+    robot: Option<PathBuf>,
+    /// Overrides a variable, the seed, or a setting of a stage of the pipeline
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Prints no progress and no summary; warnings and errors remain
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// What was identified, and from what.
+pub(super) struct Identified {
+    pub robot: RobotDescription,
+    pub parameters: Parameters,
+    pub model: Model,
+    pub correction: Option<Correction>,
+    /// The recording, where it is known.
+    pub data: Option<Measurements>,
+    /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
+    pub origin: String,
+}
+
+/// The part of a run's manifest that is needed here.
+#[derive(Deserialize)]
+struct Record {
+    run_id: String,
+    status: String,
+    stages: Vec<StageRecord>,
+}
+
+#[derive(Deserialize)]
+struct StageRecord {
+    id: String,
+    inputs: Vec<TableRecord>,
+    outputs: Vec<TableRecord>,
+}
+
+#[derive(Deserialize)]
+struct TableRecord {
+    #[serde(default)]
+    kind: String,
+    #[serde(flatten)]
+    table: TableRef,
+}
+
+impl ModelArguments {
+    pub fn jobs(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
+
+    /// Loads the model; runs the pipeline's stages that are not done.
+    pub fn load(&self, command_line: &[OsString]) -> Result<Identified> {
+        let ending = self.model.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+        if ending == "parquet" {
+            return self.of_table();
+        }
+        let store = Store::open(self.store.clone().unwrap_or_else(default_store))?;
+        let record = if matches!(ending.as_str(), "yaml" | "yml") {
+            let plan = Plan::load(&self.model, &self.set, STAGES)?;
+            let last = plan
+                .stages
+                .iter()
+                .rposition(|stage| stage.outputs.iter().any(|port| port.kind == Parameters::KIND || port.kind == Network::KIND));
+            let Some(last) = last else {
+                let message = "identifies nothing; put a stage `identify` after the split";
+                return Err(Error::spec(self.model.display().to_string(), message));
+            };
+            let plan = plan.needed_for(last);
+            let verbosity = if self.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+            let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
+            let options = RunOptions { selection: Selection::default(), jobs: self.jobs() };
+            let outcome = run(&plan, &store, &options, &surroundings(command_line), &progress);
+            progress.finish();
+            serde_json::to_value(&outcome?.manifest).map_err(|error| Error::Bug(error.to_string()))?
+        } else {
+            store.manifest(&self.run(&store)?)?
+        };
+        let record: Record =
+            serde_json::from_value(record).map_err(|error| Error::store("manifest", format!("not of a run: {error}")))?;
+        self.of_record(&record, &store)
+    }
+
+    /// The id of a run by its name: whole, its beginning, or `latest`.
+    fn run(&self, store: &Store) -> Result<String> {
+        let name = self.model.to_string_lossy();
+        let runs = store.runs()?;
+        let done = |id: &&String| store.manifest(id).is_ok_and(|manifest| manifest["status"] == "done");
+        if name == "latest" {
+            let place = store.root().display().to_string();
+            return runs.iter().rev().find(done).cloned().ok_or_else(|| Error::spec(place, "has no run that is done"));
+        }
+        let fits: Vec<&String> = runs.iter().filter(|id| id.starts_with(&*name)).collect();
+        match fits[..] {
+            [id] => Ok(id.clone()),
+            [] => Err(Error::spec(
+                &*name,
+                format!(
+                    "neither a pipeline (.yaml), a table (.parquet) nor a run in {}; `latest` is the last run",
+                    store.root().display()
+                ),
+            )),
+            _ => Err(Error::spec(&*name, format!("{} runs begin with this; give more of the id", fits.len()))),
+        }
+    }
+
+    fn of_record(&self, record: &Record, store: &Store) -> Result<Identified> {
+        if record.status != "done" {
+            return Err(Error::spec(&record.run_id, format!("the run is {}, not done", record.status)));
+        }
+        let last = |kind: &str| record.stages.iter().flat_map(|stage| &stage.outputs).rfind(|output| output.kind == kind);
+        let with =
+            |stage: &StageRecord| stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|o| o.table.clone());
+        let found: Vec<(&StageRecord, TableRef)> = record.stages.iter().filter_map(|stage| Some((stage, with(stage)?))).collect();
+        let chosen = match &self.step {
+            Some(step) => found.iter().find(|(stage, _)| stage.id == *step).ok_or_else(|| {
+                let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
+                let hint = nearest(step, ids.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+                Error::spec("--step", format!("no stage `{step}` writes parameters; {hint}allowed: {}", ids.join(", ")))
+            })?,
+            None => found.last().ok_or_else(|| Error::spec(&record.run_id, "the run identified nothing"))?,
+        };
+        let (stage, table) = chosen;
+        let robot = last(Robot::KIND).ok_or_else(|| Error::spec(&record.run_id, "the run has no table `robot`"))?;
+        let robot = Robot::from_frame(&store.load(&robot.table)?)?.to_description()?;
+        let parameters = Parameters::from_frame(&store.load(table)?)?;
+        // A correction was learned on top of one model and belongs to no other.
+        let learned = record.stages.iter().rfind(|stage| {
+            stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
+                && stage.outputs.iter().any(|output| output.kind == Network::KIND)
+        });
+        let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
+        let recording = last(Recording::KIND).map(|output| Recording::from_frame(&store.load(&output.table)?)).transpose()?;
+        let prismatic: Vec<bool> =
+            (0..robot.joints.len()).map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint)).collect();
+        let correction = match network {
+            Some(network) => Network::from_frame(&store.load(&network.table)?)?.correction(&prismatic)?,
+            None => None,
+        };
+        let origin = format!("run {}, stage {}", record.run_id, stage.id);
+        identified(robot, parameters, correction, recording.map(|table| table.measurements(&Instrument::default())), origin)
+    }
+
+    fn of_table(&self) -> Result<Identified> {
+        let Some(robot) = &self.robot else {
+            let message = "say which robot the parameters are of: --robot robot.yaml, or the table `robot` of the same run";
+            return Err(Error::spec(self.model.display().to_string(), message));
+        };
+        let parameters: Parameters = read_table(&self.model)?;
+        identified(read_robot(robot)?, parameters, None, None, format!("table {}", self.model.display()))
+    }
+}
+
+fn identified(
+    robot: RobotDescription,
+    parameters: Parameters,
+    correction: Option<Correction>,
+    data: Option<Measurements>,
+    origin: String,
+) -> Result<Identified> {
+    let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
+    Ok(Identified { robot, parameters, model, correction, data, origin })
+}
+
+impl Identified {
+    pub fn coverage(&self) -> Option<Coverage> {
+        self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
+    }
+
+    /// The uncertainty of what the model predicts; none where it was not identified from a recording that is at hand.
+    pub fn uncertainty(&self, arm: &Arm) -> Option<Uncertainty> {
+        let data = self.data.as_ref()?;
+        let specs = self.model.stack.specs();
+        let known = |name: &str| self.parameters.0.iter().any(|row| row.name == name && row.sigma.is_some());
+        let free: Vec<usize> = (0..specs.len()).filter(|k| known(&specs[*k].name)).collect();
+        let mut off: Vec<f64> =
+            self.model.predict(data).iter().zip(&data.position).map(|(model, measured)| (model - measured).norm()).collect();
+        off.sort_by(f64::total_cmp);
+        // Of a point with one sigma per axis, half the errors are shorter: suspects do not count.
+        const MEDIAN: f64 = 1.538;
+        let sigma = off.get(off.len() / 2)? / MEDIAN;
+        Uncertainty::new(arm, &free, data, sigma)
+    }
+}
+
+/// Reads a robot by its ending: a table `robot`, the practice layout, or calib's YAML.
+pub(super) fn read_robot(path: &Path) -> Result<RobotDescription> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if ending == "parquet" {
+        return read_table::<Robot>(path)?.to_description();
+    }
+    let label = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let file = Text { label: &label, text: &text };
+    Ok(if ending == "json" { read_case(file)?.robot } else { read_calib(file, None)?.robot })
+}
+
+/// Reads a table from a Parquet file that calib wrote.
+fn read_table<T: Table>(path: &Path) -> Result<T> {
+    let label = path.display().to_string();
+    let fault = |message: String| Error::Data(vec![Fault::new(&label, format!("not a table `{}` of calib: {message}", T::KIND))]);
+    let file = File::open(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| fault(error.to_string()))?;
+    let schema = builder.schema().clone();
+    let reader = builder.build().map_err(|error| fault(error.to_string()))?;
+    let batches = reader.collect::<std::result::Result<Vec<_>, _>>().map_err(|error| fault(error.to_string()))?;
+    let batch = arrow::compute::concat_batches(&schema, &batches).map_err(|error| fault(error.to_string()))?;
+    let mut frame = FrameBuilder::new(T::KIND);
+    for (field, column) in schema.fields().iter().zip(batch.columns()) {
+        frame.push(field.name(), column.clone());
+    }
+    let named = |error: Error| match error {
+        Error::Bug(message) => fault(message),
+        other => other,
+    };
+    T::from_frame(&frame.finish().map_err(named)?)
+}

@@ -1,0 +1,162 @@
+//! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
+
+use super::solve::Chain;
+use crate::effect::Scratch;
+use crate::estimate::Model;
+use crate::estimate::network::Correction;
+use crate::robot::Measurements;
+use crate::spatial::{Pose, Twist};
+use nalgebra::Vector3;
+
+/// s; later than anything recorded, so that steps have happened and the arm is warm.
+pub const LONG_AFTER: f64 = 1e9;
+
+/// Under which conditions a command will be carried out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Circumstance {
+    /// kg.
+    pub payload: f64,
+    /// C; none: that of the first recorded row.
+    pub temperature: Option<f64>,
+    /// s of the recording's clock.
+    pub time: f64,
+    /// Side from which each joint comes to rest, +1 or -1; 0 where unknown.
+    pub direction: Vec<f64>,
+    /// A, for models whose compliance is by motor current.
+    pub current: Option<Vec<f64>>,
+}
+
+impl Circumstance {
+    /// No payload, warm, nothing known of the approach.
+    pub fn unknown(joints: usize) -> Self {
+        Self { payload: 0.0, temperature: None, time: LONG_AFTER, direction: vec![0.0; joints], current: None }
+    }
+}
+
+/// Whether an effect belongs to the measurement and not to the arm: a command need not make up for it.
+pub fn silent(effect: &str, place: &str) -> bool {
+    matches!(effect, "tracker_drift" | "tracker_scale" | "joint_log_lag" | "base_shift" | "outlier" | "mislabelled_point")
+        || matches!(place, "tracker" | "recording")
+}
+
+/// An identified arm.
+pub struct Arm {
+    model: Model,
+    base: Pose,
+    correction: Option<Correction>,
+}
+
+impl Arm {
+    /// The arm of a model; effects of the measurement itself are taken out.
+    pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
+        let specs = model.stack.specs();
+        let quiet: Vec<usize> = (model.stack.effects())
+            .flat_map(|(effect, range)| range.filter(|k| silent(effect.name(), &specs[*k].place)).collect::<Vec<_>>())
+            .collect();
+        for parameter in quiet {
+            model.x[parameter] = 0.0;
+        }
+        let base = model.base();
+        Self { model, base, correction }
+    }
+
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The base in the tracker's frame.
+    pub fn base(&self) -> &Pose {
+        &self.base
+    }
+
+    pub fn correction(&self) -> Option<&Correction> {
+        self.correction.as_ref()
+    }
+
+    /// Buffers to place the arm with; one a thread.
+    pub fn reach(&self) -> Reach<'_> {
+        let joints = self.model.robot.joints();
+        let data = Measurements {
+            joints,
+            q: vec![0.0; joints],
+            position: vec![Vector3::zeros()],
+            sigma: vec![Vector3::zeros()],
+            payload: vec![0.0],
+            time: Some(vec![LONG_AFTER]),
+            direction: Some(vec![0.0; joints]),
+            ..Measurements::default()
+        };
+        Reach {
+            arm: self,
+            scratch: self.model.stack.scratch(&self.model.robot),
+            data,
+            velocities: vec![Twist::zeros(); joints],
+            sources: Vec::new(),
+        }
+    }
+}
+
+/// One arm being placed.
+pub struct Reach<'a> {
+    arm: &'a Arm,
+    scratch: Scratch,
+    /// A single row: the command and its circumstances.
+    data: Measurements,
+    velocities: Vec<Twist>,
+    sources: Vec<f64>,
+}
+
+impl Reach<'_> {
+    pub fn under(&mut self, circumstance: &Circumstance) {
+        let Circumstance { payload, temperature, time, direction, current } = circumstance;
+        self.data.payload[0] = *payload;
+        self.data.temperature = temperature.map(|value| vec![value]);
+        self.data.time = Some(vec![*time]);
+        self.data.direction = Some(direction.clone());
+        self.data.current.clone_from(current);
+    }
+
+    /// How much of the learned correction applies at the command placed last: 1 inside its range, 0 far outside; 1 without one.
+    pub fn share(&mut self) -> f64 {
+        let Some(correction) = self.arm.correction() else { return 1.0 };
+        self.fill_sources();
+        correction.at(&self.sources).share
+    }
+
+    /// The derivative of the point (m, tracker frame) at command `q` by every parameter of the model.
+    pub(super) fn derivatives(&mut self, q: &[f64], emit: impl FnMut(usize, Vector3<f64>)) {
+        self.data.q.copy_from_slice(q);
+        let Model { robot, stack, x, .. } = &self.arm.model;
+        stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
+    }
+
+    fn fill_sources(&mut self) {
+        self.sources.clear();
+        self.sources.extend_from_slice(&self.data.q);
+        self.sources.push(self.data.payload[0]);
+    }
+}
+
+impl Chain for Reach<'_> {
+    fn place(&mut self, q: &[f64]) -> Pose {
+        self.data.q.copy_from_slice(q);
+        let Model { robot, stack, x, .. } = &self.arm.model;
+        stack.point(robot, &self.data, 0, x, &mut self.scratch);
+        let base = &self.arm.base;
+        let mut pose = stack.tool(robot, &self.scratch, &mut self.velocities);
+        if let Some(correction) = &self.arm.correction {
+            self.fill_sources();
+            pose.translation += Vector3::from(correction.at(&self.sources).delta);
+        }
+        for velocity in &mut self.velocities {
+            let (v, w): (Vector3<f64>, Vector3<f64>) = (velocity.fixed_rows::<3>(0).into(), velocity.fixed_rows::<3>(3).into());
+            let (v, w) = (base.rotation.tr_mul(&v), base.rotation.tr_mul(&w));
+            *velocity = Twist::new(v.x, v.y, v.z, w.x, w.y, w.z);
+        }
+        Pose::new(base.rotation.tr_mul(&pose.rotation), base.inverse_point(&pose.translation))
+    }
+
+    fn velocities(&self) -> &[Twist] {
+        &self.velocities
+    }
+}

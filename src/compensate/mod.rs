@@ -1,0 +1,19 @@
+//! Joint commands that bring the real arm to a wanted point: the inverse of the whole identified model.
+//!
+//! A joint target stands for the point where the *nominal* robot would put the tool; the command is the nearest one (least change of
+//! joints) at which the identified arm, with every accepted effect and the learned correction, puts it there. Newton's method on the
+//! effect stack: its Jacobian leaves out how effects change with the joints, which is of the order of the errors themselves, so that
+//! every step gains about three digits. Frames: targets are in the robot's base frame, as identified.
+
+mod arm;
+mod coverage;
+mod inverse;
+mod solve;
+mod uncertainty;
+
+pub use arm::{Arm, Circumstance, LONG_AFTER, Reach, silent};
+pub use coverage::Coverage;
+pub(crate) use coverage::beyond_limits;
+pub use inverse::inverse;
+pub use solve::{Chain, Found, Nominal, SETTLED, Wanted, least_change, one_step};
+pub use uncertainty::Uncertainty;

@@ -1,0 +1,205 @@
+//! Newton's method with least change of the joints, and the paper's single step (Wang et al. 2020, Fig. 2).
+
+use crate::robot::{RobotModel, Travel};
+use crate::spatial::{Pose, Twist};
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+/// m (rad at an arm's length of 1 m): nearer than this the wanted point is reached; controllers round to a micrometre.
+pub const SETTLED: f64 = 1e-10;
+
+/// Placements before it is given up.
+const MOST: usize = 60;
+
+/// The largest move of a joint in one step, rad or m: beyond it the Jacobian says nothing.
+const STRIDE: f64 = 0.4;
+
+/// An arm that can be placed, nominal or real. Frames: the base's.
+pub trait Chain {
+    /// The tool frame at joint positions `q` (rad or m).
+    fn place(&mut self, q: &[f64]) -> Pose;
+    /// Velocity (v; w) of the tool's origin by each joint, at the positions placed last.
+    fn velocities(&self) -> &[Twist];
+}
+
+/// The robot as its file describes it.
+pub struct Nominal<'a> {
+    robot: &'a RobotModel,
+    before: Vec<Pose>,
+    velocities: Vec<Twist>,
+}
+
+impl<'a> Nominal<'a> {
+    pub fn new(robot: &'a RobotModel) -> Self {
+        let joints = robot.joints();
+        Self { robot, before: vec![Pose::identity(); joints], velocities: vec![Twist::zeros(); joints] }
+    }
+}
+
+impl Chain for Nominal<'_> {
+    fn place(&mut self, q: &[f64]) -> Pose {
+        let mut pose = Pose::identity();
+        for (joint, (before, travel)) in self.before.iter_mut().zip(q).enumerate() {
+            *before = pose;
+            pose = pose * self.robot.motion(joint, &Travel::new(*travel));
+        }
+        let tool = pose * *self.robot.home();
+        for (joint, (velocity, before)) in self.velocities.iter_mut().zip(&self.before).enumerate() {
+            *velocity = self.robot.velocity(joint, before, &tool.translation);
+        }
+        tool
+    }
+
+    fn velocities(&self) -> &[Twist] {
+        &self.velocities
+    }
+}
+
+/// Where the tool shall be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Base frame.
+    pub pose: Pose,
+    /// Whether the orientation counts, or the point alone.
+    pub oriented: bool,
+}
+
+impl Wanted {
+    /// How far (rad) `pose` is turned away.
+    pub fn turn_left(&self, pose: &Pose) -> f64 {
+        self.error(pose).fixed_rows::<3>(3).norm()
+    }
+
+    /// What is missing from `pose`: displacement (m) and turn (rad), base frame.
+    fn error(&self, pose: &Pose) -> Twist {
+        let v = self.pose.translation - pose.translation;
+        let w = if self.oriented {
+            let turn = self.pose.rotation * pose.rotation.transpose();
+            Pose::new(turn, Vector3::zeros()).rotation_vector()
+        } else {
+            Vector3::zeros()
+        };
+        Twist::new(v.x, v.y, v.z, w.x, w.y, w.z)
+    }
+}
+
+/// A command and how well it does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// rad or m.
+    pub q: Vec<f64>,
+    /// What is left of the displacement, m, and of the turn, rad.
+    pub residual: f64,
+    pub turn: f64,
+    /// How far the start was off, m.
+    pub before: f64,
+    /// Steps taken.
+    pub iterations: usize,
+}
+
+impl Found {
+    fn of(q: Vec<f64>, before: &Twist, error: &Twist, iterations: usize) -> Self {
+        let [before, residual] = [before, error].map(|error| error.fixed_rows::<3>(0).norm());
+        Self { q, residual, turn: error.fixed_rows::<3>(3).norm(), before, iterations }
+    }
+}
+
+/// The joint positions nearest to `home` at which `chain` is where it is wanted, by Newton's method from `start`.
+///
+/// Of redundant joints the change from `home` is least in the sum of squares (1 rad counts as 1 m). Steps are damped where the arm
+/// is singular; what cannot be reached is approached, and the residual says so.
+pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home: &[f64]) -> Found {
+    let mut q = start.to_vec();
+    let before = wanted.error(&chain.place(&q));
+    let mut error = before;
+    let mut jacobian = chain.velocities().to_vec();
+    let mut damping = 0.0;
+    let mut trial = q.clone();
+    let mut iterations = 0;
+    while iterations < MOST && (error.norm() > SETTLED) {
+        let normal = normal(&jacobian, wanted.oriented);
+        let scale = normal.trace() / 6.0;
+        let Some(step) = step(&jacobian, &normal, damping * scale, &error, &q, home) else {
+            damping = harder(damping);
+            iterations += 1;
+            continue;
+        };
+        for ((to, from), by) in trial.iter_mut().zip(&q).zip(step) {
+            *to = from + by;
+        }
+        let next = wanted.error(&chain.place(&trial));
+        iterations += 1;
+        if next.norm() < error.norm() || next.norm() <= SETTLED {
+            (error, damping) = (next, if damping > 1e-9 { damping * 0.1 } else { 0.0 });
+            jacobian.copy_from_slice(chain.velocities());
+            std::mem::swap(&mut q, &mut trial);
+        } else if damping > 1e3 {
+            break;
+        } else {
+            damping = harder(damping);
+        }
+    }
+    chain.place(&q);
+    Found::of(q, &before, &error, iterations)
+}
+
+fn harder(damping: f64) -> f64 {
+    if damping == 0.0 { 1e-6 } else { damping * 10.0 }
+}
+
+/// J J^T, with ones where an orientation does not count.
+fn normal(jacobian: &[Twist], oriented: bool) -> Matrix6<f64> {
+    let mut sum = Matrix6::zeros();
+    for column in jacobian {
+        sum += column * column.transpose();
+    }
+    if !oriented {
+        for k in 3..6 {
+            sum.row_mut(k).fill(0.0);
+            sum.column_mut(k).fill(0.0);
+            sum[(k, k)] = sum[(0, 0)] + sum[(1, 1)] + sum[(2, 2)];
+        }
+    }
+    sum
+}
+
+/// d + J^T (J J^T + damping)^-1 (e - J d), d the way back to `home`; none where the arm is singular.
+fn step<'a>(
+    jacobian: &'a [Twist],
+    normal: &Matrix6<f64>,
+    damping: f64,
+    error: &Twist,
+    q: &'a [f64],
+    home: &'a [f64],
+) -> Option<impl Iterator<Item = f64> + 'a> {
+    // Pulled home, a damped step would rest between home and the wanted point.
+    let pull = if damping == 0.0 { 1.0 } else { 0.0 };
+    let back = move |(q, home): (&f64, &f64)| pull * (home - q);
+    let mut rest = *error;
+    for (column, d) in jacobian.iter().zip(q.iter().zip(home).map(back)) {
+        rest -= column * d;
+    }
+    let solved: Vector6<f64> = (normal + Matrix6::identity() * damping).cholesky()?.solve(&rest);
+    if !solved.iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    let raw = move |(column, d): (&Twist, f64)| d + column.dot(&solved);
+    let largest = jacobian.iter().zip(q.iter().zip(home).map(back)).map(raw).fold(0.0, |most: f64, by| most.max(by.abs()));
+    let share = if largest > STRIDE { STRIDE / largest } else { 1.0 };
+    Some(jacobian.iter().zip(q.iter().zip(home).map(back)).map(raw).map(move |by| by * share))
+}
+
+/// The paper's mapping: the predicted error at `home`, taken back once by the nominal Jacobian.
+pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &Wanted, home: &[f64]) -> Found {
+    let error = wanted.error(&real.place(home));
+    nominal.place(home);
+    let jacobian = nominal.velocities();
+    let normal = normal(jacobian, wanted.oriented);
+    let scale = normal.trace() / 6.0;
+    let damped = [0.0, 1e-9, 1e-6].into_iter().find_map(|damping| step(jacobian, &normal, damping * scale, &error, home, home));
+    let q: Vec<f64> = match damped {
+        Some(step) => home.iter().zip(step).map(|(from, by)| from + by).collect(),
+        None => home.to_vec(),
+    };
+    let left = wanted.error(&real.place(&q));
+    Found::of(q, &error, &left, 1)
+}
