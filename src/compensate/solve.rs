@@ -116,9 +116,7 @@ pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home
     let mut trial = q.clone();
     let mut iterations = 0;
     while iterations < MOST && (error.norm() > SETTLED) {
-        let normal = normal(&jacobian, wanted.oriented);
-        let scale = normal.trace() / 6.0;
-        let Some(step) = step(&jacobian, &normal, damping * scale, &error, &q, home) else {
+        let Some(step) = step(&jacobian, damping, (&error, wanted.oriented), &q, home) else {
             damping = harder(damping);
             iterations += 1;
             continue;
@@ -165,12 +163,13 @@ fn normal(jacobian: &[Twist], oriented: bool) -> Matrix6<f64> {
 /// d + J^T (J J^T + damping)^-1 (e - J d), d the way back to `home`; none where the arm is singular.
 fn step<'a>(
     jacobian: &'a [Twist],
-    normal: &Matrix6<f64>,
     damping: f64,
-    error: &Twist,
+    (error, oriented): (&Twist, bool),
     q: &'a [f64],
     home: &'a [f64],
 ) -> Option<impl Iterator<Item = f64> + 'a> {
+    let normal = normal(jacobian, oriented);
+    let damping_scaled = damping * normal.trace() / 6.0;
     // Pulled home, a damped step would rest between home and the wanted point.
     let pull = if damping == 0.0 { 1.0 } else { 0.0 };
     let back = move |(q, home): (&f64, &f64)| pull * (home - q);
@@ -178,7 +177,10 @@ fn step<'a>(
     for (column, d) in jacobian.iter().zip(q.iter().zip(home).map(back)) {
         rest -= column * d;
     }
-    let solved: Vector6<f64> = (normal + Matrix6::identity() * damping).cholesky()?.solve(&rest);
+    if !oriented {
+        rest.fixed_rows_mut::<3>(3).fill(0.0);
+    }
+    let solved: Vector6<f64> = (normal + Matrix6::identity() * damping_scaled).cholesky()?.solve(&rest);
     if !solved.iter().all(|value| value.is_finite()) {
         return None;
     }
@@ -193,9 +195,7 @@ pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &Wanted, h
     let error = wanted.error(&real.place(home));
     nominal.place(home);
     let jacobian = nominal.velocities();
-    let normal = normal(jacobian, wanted.oriented);
-    let scale = normal.trace() / 6.0;
-    let damped = [0.0, 1e-9, 1e-6].into_iter().find_map(|damping| step(jacobian, &normal, damping * scale, &error, home, home));
+    let damped = [0.0, 1e-9, 1e-6].into_iter().find_map(|damping| step(jacobian, damping, (&error, wanted.oriented), home, home));
     let q: Vec<f64> = match damped {
         Some(step) => home.iter().zip(step).map(|(from, by)| from + by).collect(),
         None => home.to_vec(),

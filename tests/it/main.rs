@@ -2,6 +2,7 @@
 
 mod arms;
 mod cmd;
+mod compensate;
 mod conceal;
 mod desk;
 mod diagnose;

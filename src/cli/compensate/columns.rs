@@ -109,9 +109,10 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Rol
     let of = |quantity: Quantity, otherwise: Option<Unit>, option: &str| match ending.or(otherwise) {
         Some(unit) if unit.quantity() == quantity => Ok(unit),
         Some(unit) => Err(format!("column `{name}`: {unit} is no unit of it; allowed: {}", Unit::symbols(quantity).join(", "))),
-        None => {
-            Err(format!("column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}", Unit::symbols(quantity)[0]))
-        }
+        None => Err(format!(
+            "column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}",
+            option.rsplit(' ').next().unwrap_or_default()
+        )),
     };
     let numbered = |prefix: &str| {
         stem.strip_prefix(prefix).and_then(|number| number.parse::<usize>().ok()).filter(|n| (1..=robot.joints.len()).contains(n))

@@ -177,9 +177,8 @@ impl Sheet<'_> {
         }
         let number = |index: usize| -> Result<Option<f64>, String> {
             let (range, text) = &cells[index];
-            parse(text, self.delimiter).map_err(|()| {
-                format!("column {} (`{}`): `{text}` is no number", range.start + 1, self.columns.count.min(index + 1))
-            })
+            parse(text, self.delimiter)
+                .map_err(|()| format!("column {}: field {} is `{text}`, no number", range.start + 1, index + 1))
         };
         let mut row = Row::default();
         for (index, role) in &self.columns.roles {

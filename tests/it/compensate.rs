@@ -1,0 +1,398 @@
+//! Compensation: the true robot, a twin that shares no kinematics with the model, goes where it was wanted.
+
+use crate::desk::{Desk, table};
+use calib::compensate::{Arm as Identified, Chain, Circumstance, Nominal, Wanted, inverse, least_change, one_step};
+use calib::effect::Load;
+use calib::estimate::Model;
+use calib::robot::RobotModel;
+use calib::robot::description::{JointKind, RobotDescription};
+use calib::stage::{Diagnose, DiagnoseReads};
+use calib::table::{Findings, Parameters, Recording, Robot, Split, SplitRow, Verdict};
+use calib::twin::arm::Arm;
+use calib::twin::conceal::robots::Kind;
+use calib::twin::effect::{GearCyclic, Physical, ZeroShift};
+use calib::twin::plan::{Block, Climate, Point, Poses, plan};
+use calib::twin::recorder::{Experiment, Motors, Shot};
+use calib::twin::tracker::Tracker;
+use calib::twin::truth::{LinkError, TrueRobot};
+use nalgebra::Vector3;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+struct Cell {
+    robot: RobotDescription,
+    truth: TrueRobot,
+    effects: Vec<Physical>,
+    tracker: Tracker,
+    poses: Poses,
+}
+
+impl Cell {
+    fn new(kind: Kind, effects: Vec<Physical>) -> Self {
+        let robot = kind.description([60.0, -45.0, 35.0]);
+        let n = robot.joints.len();
+        let scale = kind.reach_m();
+        let link = |link: usize| LinkError {
+            link,
+            shift_mm: [0.4 * scale, -0.3 * scale, 0.2 * scale],
+            tilt_arcsec: [60.0, -40.0, 30.0],
+        };
+        let [floor_mm, clearance_mm] = kind.room_mm();
+        let truth = TrueRobot {
+            links: (1..n).map(link).collect(),
+            offset_deg: (0..n).map(|j| 0.03 - 0.01 * j as f64).collect(),
+            ratio: (0..n).map(|j| 1.0 + 1e-4 * (j as f64 - 2.0)).collect(),
+            ..TrueRobot::default()
+        };
+        let poses = Poses { floor_mm, clearance_mm, candidates: 3, ..Poses::default() };
+        let tracker = Tracker { position_mm: [3000.0 * scale / 2.0, -1500.0, 900.0], ..Tracker::default() };
+        Self { robot, truth, effects, tracker, poses }
+    }
+
+    fn points(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
+        let blocks: Vec<Block> = payload_kg
+            .iter()
+            .map(|kg| Block { usage: "fit".into(), points: count / payload_kg.len(), payload_kg: *kg })
+            .collect();
+        let arm = Arm::new(&self.robot, &self.truth);
+        plan(&self.robot, &arm, &self.poses, &blocks, &Climate::default(), seed).expect("poses are allowed")
+    }
+
+    fn measure(&self, points: Vec<Point>, tracker: &Tracker) -> Vec<Shot> {
+        let (motors, poses, climate) = (Motors::default(), self.poses.clone(), Climate::default());
+        let experiment = Experiment {
+            robot: &self.robot,
+            truth: &self.truth,
+            effects: &self.effects,
+            tracker,
+            motors: &motors,
+            repeatability_arcsec: &[],
+            poses: &poses,
+            blocks: &[],
+            climate: &climate,
+            seed: 77,
+        };
+        experiment.measure(points, || {})
+    }
+
+    /// What `diagnose` makes of a recording of `count` points.
+    fn diagnosed(&self, count: usize, payload_kg: &[f64]) -> (Model, Findings, f64) {
+        let points = self.points(count, payload_kg, 5);
+        let payload: Vec<f64> = points.iter().map(|point| point.payload_kg).collect();
+        let shots = self.measure(points, &self.tracker);
+        let recording = Recording {
+            joints: self.robot.joints.len(),
+            prismatic: self.robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
+            sequence: (0..shots.len() as i64).collect(),
+            point_id: (0..shots.len()).map(|k| format!("p{k}")).collect(),
+            usage: vec![None; shots.len()],
+            q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+            position: shots.iter().map(|shot| shot.position).collect(),
+            position_sigma: None,
+            time: Some(shots.iter().map(|shot| shot.time_s).collect()),
+            payload: Some(payload),
+            temperature: None,
+            current: None,
+            direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+        };
+        let set = |k: usize| if k % 4 == 3 { "validate" } else { "fit" };
+        let row = |k: usize| SplitRow { sequence: k as i64, point_id: format!("p{k}"), set: set(k).into() };
+        let split = Split((0..shots.len()).map(row).collect());
+        let stage: Diagnose = serde_json::from_value(serde_json::json!({})).expect("settings");
+        let reads = DiagnoseReads { robot: Robot::from_description(&self.robot), recording, split };
+        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let parameters: Parameters = table(&tables).remove(0);
+        let verdict: Verdict = table(&tables).remove(0);
+        let findings: Findings = table(&tables).remove(0);
+        let model = parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model");
+        (model, findings, verdict.0[0].noise_floor_mm)
+    }
+
+    /// Rms (mm) of where the true robot goes, with the commands that `solve` makes of each target.
+    fn true_error(
+        &self,
+        arm: &Identified,
+        targets: &[Point],
+        solve: impl Fn(&mut calib::compensate::Reach, &Wanted, &[f64]) -> Vec<f64>,
+    ) -> f64 {
+        let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
+        let robot = RobotModel::new(self.robot.clone());
+        let mut reach = arm.reach();
+        let mut commands = Vec::new();
+        for target in targets {
+            reach.under(&Circumstance {
+                payload: target.payload_kg,
+                temperature: None,
+                time: target.time_s,
+                direction: target.direction.clone(),
+                current: None,
+            });
+            let wanted = Wanted { pose: robot.forward(&target.q), oriented: false };
+            commands.push(Point { q: solve(&mut reach, &wanted, &target.q), ..target.clone() });
+        }
+        let shots = self.measure(commands, &exact);
+        let square = shots.iter().zip(targets).map(|(shot, target)| {
+            let wanted = arm.base().point(&robot.forward(&target.q).translation);
+            (Vector3::from(shot.position) - wanted).norm_squared()
+        });
+        (square.sum::<f64>() / targets.len() as f64).sqrt() * 1e3
+    }
+}
+
+/// 500 unseen targets; what the true robot misses them by, in noise floors.
+fn proof(kind: Kind, effects: Vec<Physical>) {
+    let cell = Cell::new(kind, effects);
+    let rated = cell.robot.payload_mass;
+    let (model, findings, floor) = cell.diagnosed(200, &[0.0, rated]);
+    let arm = Identified::new(model, None);
+    // Later than the recording, with another seed.
+    let mut targets = cell.points(500, &[0.0, rated], 99);
+    targets.iter_mut().for_each(|target| target.time_s += 1e5);
+    let before = cell.true_error(&arm, &targets, |_, _, q| q.to_vec());
+    let after = cell.true_error(&arm, &targets, |reach, wanted, q| {
+        let found = least_change(reach, wanted, q, q);
+        assert!(found.residual < 1e-9, "round trip {} m after {} steps", found.residual, found.iterations);
+        found.q
+    });
+    let step =
+        cell.true_error(&arm, &targets, |reach, wanted, q| one_step(reach, &mut Nominal::new(&arm.model().robot), wanted, q).q);
+    let named: Vec<String> = findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
+    println!(
+        "{}: {before:.4} mm -> {after:.4} mm (one step {step:.4}), floor {floor:.4} mm, {:.2} floors; {named:?}",
+        kind.name(),
+        after / floor
+    );
+    assert!(after < 1.5 * floor, "{}: {after:.4} mm above {floor:.4} mm; found {named:?}", kind.name());
+    assert!(after > 0.05 * floor, "too good: the truth leaked");
+    assert!(step < 0.2 * before && step >= 0.99 * after);
+}
+
+#[test]
+fn a_spherical_wrist_goes_where_it_is_wanted() {
+    proof(
+        Kind::Sr210d,
+        vec![
+            Physical::GearCyclic(GearCyclic {
+                joint: 2,
+                order: 3.0,
+                amplitude_arcsec: 25.0,
+                arcsec_per_nm: 0.0,
+                phase_deg: 40.0,
+            }),
+            Physical::ZeroShift(ZeroShift { joint: 3, step_arcsec: 40.0, at_s: 1500.0 }),
+        ],
+    );
+}
+
+#[test]
+fn an_offset_wrist_goes_where_it_is_wanted() {
+    proof(
+        Kind::Compact6,
+        vec![Physical::GearCyclic(GearCyclic {
+            joint: 3,
+            order: 2.0,
+            amplitude_arcsec: 60.0,
+            arcsec_per_nm: 0.0,
+            phase_deg: 10.0,
+        })],
+    );
+}
+
+#[test]
+fn a_redundant_arm_goes_where_it_is_wanted() {
+    proof(
+        Kind::Seven7r,
+        vec![Physical::GearCyclic(GearCyclic {
+            joint: 4,
+            order: 2.0,
+            amplitude_arcsec: 80.0,
+            arcsec_per_nm: 0.0,
+            phase_deg: 10.0,
+        })],
+    );
+}
+
+#[test]
+fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
+    let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
+    let q = [0.3, 0.2, -0.4, 0.5, 0.8, -1.0];
+    let wanted = Wanted { pose: robot.forward(&q), oriented: true };
+    let found = inverse(&robot, &wanted, &[0.0; 6]);
+    let placed = Nominal::new(&robot).place(&found);
+    assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
+    assert!((placed.rotation - wanted.pose.rotation).norm() < 1e-9);
+    for (joint, q) in robot.description().joints.iter().zip(&found) {
+        let [lower, upper] = joint.limits.expect("limits");
+        assert!((lower..=upper).contains(q));
+    }
+}
+
+#[test]
+fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
+    let robot = RobotModel::new(Kind::Seven7r.description([60.0, 0.0, 20.0]));
+    let home = [0.4, 0.7, -0.3, 1.0, 0.2, 0.6, -0.5];
+    let mut wanted = Wanted { pose: robot.forward(&home), oriented: false };
+    wanted.pose.translation += Vector3::new(3e-3, -2e-3, 4e-3);
+    let mut chain = Nominal::new(&robot);
+    let found = least_change(&mut chain, &wanted, &home, &home);
+    assert!(found.residual < 1e-10 && found.iterations < 8);
+    // The change of least length lies in the row space of the Jacobian: no part of it leaves the point where it is.
+    chain.place(&found.q);
+    let change: Vec<f64> = found.q.iter().zip(&home).map(|(q, home)| q - home).collect();
+    let length = change.iter().map(|d| d * d).sum::<f64>();
+    let jacobian =
+        nalgebra::Matrix3xX::from_columns(&chain.velocities().iter().map(|v| Vector3::new(v[0], v[1], v[2])).collect::<Vec<_>>());
+    let solved =
+        jacobian.clone().svd(true, true).solve(&(&jacobian * nalgebra::DVector::from_vec(change)), 1e-12).expect("a solution");
+    assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
+}
+
+const ROBOT: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+    - {axis: [0, 1, 0], point: [0, 0, 900]}
+    - {axis: [1, 0, 0], point: [500, 0, 900]}
+    - {axis: [0, 1, 0], point: [700, 0, 900]}
+    - {axis: [1, 0, 0], point: [700, 0, 900]}
+tool: {point: [830, 40, 930]}
+joints:
+  - {name: A1, limits: [-120, 120]}
+  - {name: A2, limits: [-60, 75]}
+  - {name: A3, limits: [-80, 75]}
+  - {name: A4, limits: [-170, 170]}
+  - {name: A5, limits: [-125, 125]}
+  - {name: A6, limits: [-170, 170]}
+";
+
+const PIPELINE: &str = "calib: 1
+name: small
+seed: 3
+stages:
+  - uses: robot
+    with: {file: robot.yaml}
+  - uses: simulate
+    with:
+      truth: {offset_deg: [0.02, -0.05, 0.04, 0.03, -0.06, 0.0], links: [{link: 2, shift_mm: [0.4, 0.2, -0.3]}]}
+      poses: {floor_mm: 100, clearance_mm: 200}
+      blocks: [{usage: fit, points: 60}, {usage: validate, points: 20}]
+  - uses: split
+    with: {by: usage}
+  - uses: identify
+    with: {on: [fit]}
+";
+
+/// A folder with a robot that was identified.
+pub fn cell() -> &'static Path {
+    static CELL: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = CELL.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("robot.yaml"), ROBOT).expect("a file");
+        std::fs::write(folder.path().join("pipeline.yaml"), PIPELINE).expect("a file");
+        let output = calib(folder.path(), &["run", "pipeline.yaml", "--quiet"], "");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        folder
+    });
+    folder.path()
+}
+
+/// Runs calib in a folder with a text on its stdin.
+pub fn calib(folder: &Path, arguments: &[&str], input: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("calib");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    // A program that refuses its arguments does not read.
+    let _ = std::io::Write::write_all(&mut pipe, input.as_bytes());
+    drop(pipe);
+    child.wait_with_output().expect("calib ends")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("UTF-8")
+}
+
+#[test]
+fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
+    let input = "\u{feff}name;A1_deg;A2_deg;A3_deg;A4_deg;A5_deg;A6_deg;note\r\nP1;10,5;20;-30;5;40;0;\"a;b\"\r\n\r\nP2; -10;  20.25;3e1;5;40;1; x \r\n";
+    let output = calib(cell(), &["compensate", "latest", "--plain", "--quiet"], input);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let corrected = text(&output.stdout);
+    assert_eq!(corrected.matches('\n').count(), 4);
+    let (before, after): (Vec<&str>, Vec<&str>) = (input.split("\r\n").collect(), corrected.split("\r\n").collect());
+    assert_eq!((before[0], before[2], before[4]), (after[0], after[2], after[4]));
+    assert!(after[1].starts_with("P1;10,") && after[1].ends_with(";\"a;b\""), "{}", after[1]);
+    assert!(after[3].starts_with("P2;-") && after[3].ends_with("; x "), "{}", after[3]);
+    let first: f64 = after[1].split(';').nth(1).expect("a field").replace(',', ".").parse().expect("a number");
+    assert!((first - 10.5).abs() > 1e-3 && (first - 10.5).abs() < 0.5);
+}
+
+#[test]
+fn what_is_known_of_a_target_stands_behind_it() {
+    let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
+    let output = calib(cell(), &["compensate", "pipeline.yaml", "-"], input);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    let mut lines = said.lines();
+    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,remark"));
+    let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
+    let number = |k: usize| first[k].parse::<f64>().expect("a number");
+    assert!((0.1..3.0).contains(&number(6)), "{first:?}");
+    assert!(number(7) < 1e-5 && (2.0..8.0).contains(&number(8)), "{first:?}");
+    assert!((0.001..0.1).contains(&number(9)), "{first:?}");
+    assert_eq!(first[10], "");
+    assert!(lines.next().expect("a row").contains("joint 6 beyond its limits"), "{said}");
+    assert!(text(&output.stderr).contains("1 of them leave the joint limits"));
+}
+
+#[test]
+fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
+    let joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,25,40,10\n";
+    let robot =
+        calib::robot::import::read_calib(calib::robot::import::Text { label: "robot.yaml", text: ROBOT }, None).expect("a robot");
+    let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
+    let pose = RobotModel::new(robot.robot).forward(&q);
+    let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();
+    let turn = nalgebra::UnitQuaternion::from_matrix(&pose.rotation);
+    let [qx, qy, qz, qw]: [f64; 4] = turn.coords.into();
+    let cartesian = format!("x_mm,y_mm,z_mm,qw,qx,qy,qz\n{x},{y},{z},{qw},{qx},{qy},{qz}\n");
+    let quiet = ["compensate", "latest", "--plain", "--quiet"];
+    let by_joints = calib(cell(), &[&quiet[..], &["--orientation", "keep"]].concat(), joints);
+    let by_pose = calib(cell(), &[&quiet[..], &["--start", "12,18,-28,20,45,5"]].concat(), &cartesian);
+    let last = |output: &Output| -> Vec<f64> {
+        let said = text(&output.stdout);
+        let row: Vec<f64> = said.lines().nth(1).expect("a row").split(',').map(|cell| cell.parse().expect("a number")).collect();
+        row[row.len() - 6..].to_vec()
+    };
+    for (a, b) in last(&by_joints).iter().zip(last(&by_pose)) {
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
+    let run = |input: &str| {
+        let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
+        (output.status.code(), text(&output.stderr), text(&output.stdout))
+    };
+    let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
+    let (code, said, _) = run(&format!("{header}1,2,3,4,5,6\n1,2,x,4,5,6\n1,2\n"));
+    assert_eq!(code, Some(10));
+    assert!(said.contains("stdin:3: column 5: field 3 is `x`, no number"), "{said}");
+    assert!(said.contains("stdin:4: has 2 fields, the header 6"), "{said}");
+    let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
+    assert_eq!(code, Some(2));
+    assert!(said.contains("`A1` has no unit") && said.contains("--angle deg"), "{said}");
+    let (code, said, _) = run("foo,bar\n1,2\n");
+    assert_eq!(code, Some(2));
+    assert!(said.contains("no targets found"), "{said}");
+}
