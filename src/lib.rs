@@ -23,6 +23,7 @@
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
@@ -72,6 +73,8 @@ pub mod report;
 pub mod stage;
 
 pub mod pipeline;
+
+pub mod fleet;
 
 pub mod progress;
 

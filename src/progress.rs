@@ -1,5 +1,9 @@
 //! Progress on stderr: bars on a terminal, plain lines elsewhere. The only file that knows a terminal.
 
+mod fleet;
+
+pub use fleet::{FleetProgress, shown};
+
 use crate::pipeline::{Observer, StageReport, StageStatus};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};

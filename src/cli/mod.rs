@@ -4,6 +4,7 @@ mod check;
 mod compensate;
 mod diagnose;
 mod diff;
+mod fleet;
 mod identified;
 mod pipeline_arguments;
 mod poses;
@@ -35,6 +36,7 @@ enum Verb {
     Compensate(Box<compensate::CompensateArguments>),
     Diagnose(diagnose::DiagnoseArguments),
     Diff(diff::DiffArguments),
+    Fleet(fleet::FleetArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
     Simulate(simulate::SimulateArguments),
@@ -60,6 +62,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Compensate(verb) => compensate::main(&verb, &arguments),
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Diff(verb) => return diff::main(&verb),
+        Verb::Fleet(verb) => fleet::main(&verb, &arguments),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Schema(verb) => schema::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb, &arguments),

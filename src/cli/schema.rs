@@ -12,7 +12,8 @@ use clap::{Args, Subcommand};
 #[command(after_help = "Examples:
   calib schema list
   calib schema show prediction
-  calib schema pipeline > schemas/pipeline.v1.schema.json")]
+  calib schema pipeline > schemas/pipeline.v1.schema.json
+  calib schema fleet > schemas/fleet.v1.schema.json")]
 pub(super) struct SchemaArguments {
     #[command(subcommand)]
     verb: SchemaVerb,
@@ -29,12 +30,15 @@ enum SchemaVerb {
     },
     /// The JSON Schema of the pipeline's YAML, for editors
     Pipeline,
+    /// The JSON Schema of FLEET.yaml, for editors
+    Fleet,
 }
 
 pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
     match &arguments.verb {
         SchemaVerb::List => emit(&list()),
         SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
+        SchemaVerb::Fleet => emit(&crate::fleet::file::json_schema()),
         SchemaVerb::Pipeline => emit(&pipeline::json_schema(STAGES)),
     }
 }

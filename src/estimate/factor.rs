@@ -102,6 +102,11 @@ impl Factor {
         self
     }
 
+    /// An entry of R; row and column p are the right-hand side's.
+    pub(super) fn entry(&self, i: usize, j: usize) -> f64 {
+        self.r[(i, j)]
+    }
+
     pub fn parameters(&self) -> usize {
         self.r.ncols() - 1
     }

@@ -1,6 +1,7 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
 mod align;
+mod change;
 pub mod choose;
 mod cluster;
 mod covariance;
@@ -21,6 +22,7 @@ pub mod swarm;
 pub mod threads;
 
 pub use align::align;
+pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
 pub use fit::{Fate, FitOptions, Fitted, fit};

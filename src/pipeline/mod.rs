@@ -2,6 +2,7 @@
 
 mod desk;
 mod execute;
+mod identity;
 mod lock;
 mod manifest;
 mod overrides;

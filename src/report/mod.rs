@@ -8,6 +8,7 @@ mod data;
 mod distribution;
 mod errors;
 mod fits;
+pub mod fleet;
 mod number;
 mod parameters;
 mod svg;

@@ -1,6 +1,7 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
 mod advice;
+mod compare;
 mod diagnose;
 mod identified;
 mod identify;
@@ -18,6 +19,7 @@ pub mod split;
 mod stiffness;
 mod validate;
 
+pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
@@ -260,6 +262,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Identify>(),
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Diagnose>(),
+    StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Optimise>(),
     StageEntry::of::<Validate>(),

@@ -4,12 +4,14 @@
 //! people | `tmp/`. Objects and records are written aside, synced and moved into place; a crash leaves nothing visible by half.
 
 pub mod actions;
+pub(crate) mod bytes;
 mod cell;
 mod check;
 pub mod content;
 mod disk;
 pub mod frame;
 pub mod key;
+mod notes;
 mod reader;
 pub mod runs;
 pub mod schema;

@@ -15,10 +15,13 @@ use crate::units::Unit;
 
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
+    include_str!("../../schemas/changes.json"),
     include_str!("../../schemas/document.json"),
     include_str!("../../schemas/finding_numbers.json"),
     include_str!("../../schemas/findings.json"),
     include_str!("../../schemas/fit.json"),
+    include_str!("../../schemas/fleet.json"),
+    include_str!("../../schemas/fleet_changes.json"),
     include_str!("../../schemas/intake.json"),
     include_str!("../../schemas/network.json"),
     include_str!("../../schemas/observability.json"),

@@ -13,6 +13,11 @@ pub trait Table: Sized + Send + Sync + 'static {
     fn from_frame(frame: &Frame) -> Result<Self>;
 }
 
+/// A table from the bytes of its Parquet file; `label` names the file in errors.
+pub fn from_parquet<T: Table>(label: &str, bytes: Vec<u8>) -> Result<T> {
+    T::from_frame(&crate::store::bytes::frame(T::KIND, label, bytes)?)
+}
+
 /// Declares a table as a list of rows: `rows! { "kind", /// doc pub struct Name of Row { column: type, ... } }`.
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
@@ -42,9 +47,11 @@ macro_rules! rows {
 }
 pub(crate) use rows;
 
+mod changes;
 mod document;
 mod findings;
 mod fit;
+mod fleet;
 mod intake;
 mod network;
 mod observability;
@@ -62,9 +69,11 @@ mod training;
 mod truth;
 mod verdict;
 
+pub use changes::{ChangeRow, Changes};
 pub use document::{Document, DocumentRow};
 pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
 pub use fit::{Fit, FitRow};
+pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
 pub use intake::{Intake, IntakeRow};
 pub use network::{Network, NetworkRow};
 pub use observability::{Beside, Observability, ObservabilityRow};
@@ -85,10 +94,13 @@ pub use verdict::{Verdict, VerdictRow};
 
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
+    Changes::KIND,
     Document::KIND,
     FindingNumbers::KIND,
     Findings::KIND,
     Fit::KIND,
+    FleetTable::KIND,
+    FleetChanges::KIND,
     Intake::KIND,
     Network::KIND,
     Observability::KIND,

@@ -10,6 +10,7 @@ mod diff;
 mod disk;
 mod effects;
 mod fixture;
+mod fleet;
 mod folds;
 mod identify;
 mod ingest;

@@ -36,7 +36,16 @@ fn the_pipeline_of_the_readme_is_understood() {
     put("robot.yaml", &example("calib_robot:"));
     put("monday/controller.csv", "");
     put("monday/tracker.csv", "");
-    put("pipeline.yaml", &example("calib:"));
+    put("pipeline.yaml", &example("stages:"));
     let plan = Plan::load(&folder.path().join("pipeline.yaml"), &[], STAGES).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(plan.stages.len(), 7);
+}
+
+#[test]
+fn the_fleet_file_of_the_readme_is_understood() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("FLEET.yaml");
+    std::fs::write(&file, example("robots:")).expect("a file");
+    let (fleet, _) = calib::fleet::FleetFile::load(&file).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((fleet.robots.len(), fleet.previous.map(|previous| previous.stage)), (2, Some("compare".to_string())));
 }

@@ -34,3 +34,10 @@ fn every_file_with_a_stage_is_in_the_list() {
     let stages = files.filter(|path| std::fs::read_to_string(path).unwrap().contains("\nimpl Stage for ")).count();
     assert_eq!(stages, STAGES.len(), "a stage is missing in STAGES (src/stage/mod.rs)");
 }
+
+#[test]
+fn the_schema_of_fleet_files_is_that_of_their_type() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fleet.v1.schema.json");
+    let fresh = calib::fleet::file::json_schema();
+    assert!(std::fs::read_to_string(file).unwrap() == fresh, "run: calib schema fleet > schemas/fleet.v1.schema.json");
+}

@@ -1,0 +1,131 @@
+//! Robots on a cluster: what is asked of it, and the wait for their records.
+
+use crate::error::{Error, Fault, Result};
+use crate::fleet::cluster::Wishes;
+use crate::fleet::ledger::RunNote;
+use crate::fleet::slurm::{self, Waited};
+use crate::fleet::{Ending, Workshop};
+use crate::progress::FleetProgress;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Args)]
+pub(super) struct ClusterArguments {
+    /// Slurm's partition
+    #[arg(long, value_name = "NAME", help_heading = "Cluster")]
+    partition: Option<String>,
+    /// Robots of one task, one after the other
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Cluster")]
+    robots_per_task: u32,
+    /// Tasks at once
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Cluster")]
+    max_parallel: Option<u32>,
+    /// Memory of a task, e.g. 2G
+    #[arg(long, value_name = "SIZE", help_heading = "Cluster")]
+    mem: Option<String>,
+    /// Time of a task, e.g. 00:30:00
+    #[arg(long, value_name = "TIME", help_heading = "Cluster")]
+    time: Option<String>,
+    /// Another option of sbatch, e.g. --sbatch-arg=--account=robots; may be given several times
+    #[arg(long, value_name = "ARG", allow_hyphen_values = true, help_heading = "Cluster")]
+    sbatch_arg: Vec<String>,
+    /// Times that robots whose tasks were lost are submitted again
+    #[arg(long, value_name = "N", default_value_t = 3, help_heading = "Cluster")]
+    resubmit: u32,
+    /// Submits and returns; `calib fleet status` says how far it is, `run` again makes the tables
+    #[arg(long, help_heading = "Cluster")]
+    detach: bool,
+}
+
+impl ClusterArguments {
+    /// What to ask of the cluster; paths as all nodes know them.
+    pub(super) fn wishes(&self, store: &std::path::Path) -> Result<Wishes> {
+        let fault = |error: std::io::Error| Error::store("--store", error.to_string());
+        let program: PathBuf = std::env::current_exe().map_err(fault)?;
+        Ok(Wishes {
+            program,
+            store: std::path::absolute(store).map_err(fault)?,
+            partition: self.partition.clone(),
+            max_parallel: self.max_parallel,
+            memory: self.mem.clone(),
+            time: self.time.clone(),
+            more: self.sbatch_arg.clone(),
+        })
+    }
+
+    /// Robots by task.
+    pub(super) fn tasks(&self, robots: &[usize]) -> Vec<Vec<usize>> {
+        robots.chunks(self.robots_per_task as usize).map(<[usize]>::to_vec).collect()
+    }
+}
+
+/// Submits what has no record and waits for it; gives how many were computed, or nothing where the wait is the person's.
+pub(super) fn on_slurm(
+    workshop: &Workshop,
+    note: &mut RunNote,
+    chosen: &[usize],
+    arguments: &ClusterArguments,
+    progress: &FleetProgress,
+) -> Result<Option<usize>> {
+    let wishes = arguments.wishes(workshop.ledger.store.root())?;
+    let robots = &workshop.fleet.roster.0;
+    // What may work now is tried again.
+    let keys: Vec<(usize, String)> = chosen.iter().map(|index| (*index, workshop.key(&robots[*index]))).collect();
+    for (_, key) in &keys {
+        if workshop.ledger.find(key)?.is_some_and(|record| record.exit_code == crate::fleet::ledger::LATER) {
+            workshop.ledger.forget(key)?;
+        }
+    }
+    let missing = || -> Result<(Vec<usize>, usize)> {
+        let (mut missing, mut bad) = (Vec::new(), 0);
+        for (index, key) in &keys {
+            match workshop.ledger.find(key)? {
+                None => missing.push(*index),
+                Some(record) => bad += usize::from(record.ending != Ending::Done),
+            }
+        }
+        Ok((missing, bad))
+    };
+    let at_first = missing()?.0;
+    let mut left = at_first.clone();
+    let mut round = 0;
+    while !left.is_empty() {
+        note.tasks = arguments.tasks(&left);
+        note.jobs.clear();
+        slurm::submit(&workshop.ledger, note, &wishes)?;
+        progress.say(&format!("{} robots in {} tasks: jobs {}", left.len(), note.tasks.len(), note.jobs.join(", ")));
+        if arguments.detach {
+            return Ok(None);
+        }
+        let look = || {
+            let (missing, bad) = missing()?;
+            progress.count(chosen.len() - missing.len(), bad);
+            Ok(missing.len())
+        };
+        let waited = slurm::wait(&note.jobs, look, &|| workshop.ledger.cancelled(&note.run))?;
+        left = missing()?.0;
+        match waited {
+            Waited::Complete => break,
+            Waited::Stopped => {
+                slurm::cancel(&note.jobs)?;
+                break;
+            }
+            Waited::Gone if round >= arguments.resubmit => {
+                let message =
+                    format!("{} robots have no record after {} rounds; see {}", left.len(), round + 1, log_folder(&wishes, note));
+                return Err(Error::Store(Fault::new("slurm", message)));
+            }
+            Waited::Gone => {
+                round += 1;
+                // Tasks of a new array need numbers of their own.
+                note.run = (workshop.surroundings)().run_id;
+                progress.say(&format!("{} robots have no record and no task: they are submitted again", left.len()));
+            }
+        }
+    }
+    Ok(Some(at_first.len() - left.len()))
+}
+
+fn log_folder(wishes: &Wishes, note: &RunNote) -> String {
+    crate::fleet::cluster::logs(&wishes.store, &note.fleet).display().to_string()
+}

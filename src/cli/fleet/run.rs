@@ -1,0 +1,238 @@
+//! `calib fleet run` and `retry`.
+
+use super::super::surroundings::{cores, surroundings};
+use super::super::{emit, emit_json};
+use super::cluster::{ClusterArguments, on_slurm};
+use super::{Place, records, verdict, workshop};
+use crate::error::{Error, Result};
+use crate::fleet::ledger::{Member, RunNote};
+use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop, local, tables};
+use crate::progress::{FleetProgress, Verbosity, shown};
+use crate::store::Store;
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::ffi::OsString;
+use std::time::Instant;
+
+/// Run the pipeline for every robot that has no record yet; a robot with bad data is reported and the others finish.
+///
+/// The same command again goes on where it stood: what is recorded is never computed again. Tables of the whole fleet and a page
+/// are made at the end. Exit codes: 0 all done; 10 some robots' data were rejected; 75 some could not be computed now; 70 a bug.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct FleetRunArguments {
+    #[command(flatten)]
+    pub(super) place: Place,
+    #[command(flatten)]
+    pub(super) how: How,
+}
+
+#[derive(Args)]
+pub(super) struct How {
+    /// Only these robots, by name; may be given several times
+    #[arg(long, value_name = "NAME")]
+    robot: Vec<String>,
+    /// Robots at once on this machine; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Where the robots are computed
+    #[arg(long, value_enum, default_value_t = Engine::Local)]
+    engine: Engine,
+    #[command(flatten)]
+    cluster: ClusterArguments,
+    /// Stops at the first robot that is not done
+    #[arg(long)]
+    fail_fast: bool,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Prints no progress
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Engine {
+    /// Threads of this process
+    Local,
+    /// Arrays of jobs on a Slurm cluster that shares the store
+    Slurm,
+}
+
+/// Compute robots again that were rejected or failed.
+#[derive(Args)]
+pub(super) struct RetryArguments {
+    #[command(flatten)]
+    place: Place,
+    /// Those that are not done; the only choice so far
+    #[arg(long)]
+    failed: bool,
+    #[command(flatten)]
+    how: How,
+}
+
+const EXAMPLES: &str = "Examples:
+  calib fleet run FLEET.yaml
+  calib fleet run FLEET.yaml --robot 'cell 4' --robot r7 -j 1
+  calib fleet run FLEET.yaml --engine slurm --partition main --robots-per-task 4 --store /shared/store";
+
+pub(super) fn main(arguments: &FleetRunArguments, command_line: &[OsString]) -> Result<()> {
+    let store = arguments.place.store()?;
+    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
+    run(&fleet, &store, &arguments.place, &arguments.how, command_line)
+}
+
+pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Result<()> {
+    if !arguments.failed {
+        return Err(Error::spec("retry", "say which: --failed"));
+    }
+    let store = arguments.place.store()?;
+    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
+    let fresh = || surroundings(command_line);
+    let workshop = workshop(&fleet, &store, &fresh);
+    for record in records(&workshop)?.into_iter().flatten().filter(|record| record.ending != Ending::Done) {
+        if arguments.how.robot.is_empty() || arguments.how.robot.contains(&record.robot) {
+            workshop.ledger.forget(&record.key)?;
+        }
+    }
+    run(&fleet, &store, &arguments.place, &arguments.how, command_line)
+}
+
+fn run(fleet: &Fleet, store: &Store, place: &Place, how: &How, command_line: &[OsString]) -> Result<()> {
+    let begun = Instant::now();
+    let fresh = || surroundings(command_line);
+    let workshop = workshop(fleet, store, &fresh);
+    sound(&workshop)?;
+    let chosen = chosen(fleet, &how.robot)?;
+    let mut note = note(fleet, place, &fresh().run_id)?;
+    let verbosity = if how.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let (fresh_records, computed) = match how.engine {
+        Engine::Local => {
+            workshop.ledger.put_run(&note)?;
+            let workers = how.jobs.map_or_else(cores, usize::from);
+            let progress = FleetProgress::new(verbosity, workers, chosen.len());
+            let stop = || workshop.ledger.cancelled(&note.run);
+            let options = local::Options { workers, fail_fast: how.fail_fast, stop: &stop };
+            let worked = local::work(&workshop, &chosen, &options, &progress);
+            progress.finish();
+            let worked = worked?;
+            (worked.records, worked.computed)
+        }
+        Engine::Slurm => {
+            note.engine = "slurm".into();
+            let progress = FleetProgress::new(verbosity, 0, chosen.len());
+            let waited = on_slurm(&workshop, &mut note, &chosen, &how.cluster, &progress);
+            progress.finish();
+            match waited? {
+                Some(computed) => (Vec::new(), computed),
+                None => return emit(&format!("submitted: jobs {} of run {}\n", note.jobs.join(", "), note.run)),
+            }
+        }
+    };
+    // Of robots outside of what was asked for, what is known stays known.
+    let all =
+        if fresh_records.iter().all(Option::is_some) && !fresh_records.is_empty() { fresh_records } else { records(&workshop)? };
+    for (member, record) in note.robots.iter_mut().zip(&all) {
+        member.key = record.as_ref().map(|record| record.key.clone());
+    }
+    workshop.ledger.close(&note)?;
+    let told = tables::publish(fleet, &workshop.ledger, &all)?;
+    let seconds = begun.elapsed().as_secs_f64();
+    if how.json {
+        emit_json(&document(fleet, &note.run, &all, computed, seconds, &told))?;
+    } else {
+        emit(&text(&all, computed, seconds, &told))?;
+    }
+    verdict(fleet, &all)
+}
+
+/// Fails with the pipeline's faults where not a single robot could be planned: then they are not the robots'.
+fn sound(workshop: &Workshop) -> Result<()> {
+    let mut first = None;
+    for robot in &workshop.fleet.roster.0 {
+        match workshop.plan(robot) {
+            Ok(_) => return Ok(()),
+            Err(error) => drop(first.get_or_insert(error)),
+        }
+    }
+    first.map_or(Ok(()), Err)
+}
+
+/// The positions of the robots that were asked for.
+fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
+    if names.is_empty() {
+        return Ok((0..fleet.roster.0.len()).collect());
+    }
+    let find = |name: &String| {
+        let known = fleet.roster.0.iter().map(|robot| robot.name.as_str());
+        let hint = || crate::error::nearest(name, known).map(|near| format!("; did you mean {near:?}?")).unwrap_or_default();
+        fleet.roster.position(name).ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet{}", hint())))
+    };
+    names.iter().map(find).collect()
+}
+
+/// The run as engines and later campaigns find it.
+pub(super) fn note(fleet: &Fleet, place: &Place, run: &str) -> Result<RunNote> {
+    let file = std::path::absolute(&place.fleet);
+    let file = file.map_err(|error| Error::store(place.fleet.display().to_string(), error.to_string()))?;
+    let member = |robot: &crate::fleet::Robot| Member { name: robot.name.clone(), groups: robot.groups.clone(), key: None };
+    Ok(RunNote {
+        run: run.into(),
+        fleet: fleet.name().into(),
+        engine: "local".into(),
+        file,
+        robots: fleet.roster.0.iter().map(member).collect(),
+        tasks: Vec::new(),
+        jobs: Vec::new(),
+    })
+}
+
+pub(super) fn count(records: &[Option<Record>], ending: Ending) -> usize {
+    records.iter().flatten().filter(|record| record.ending == ending).count()
+}
+
+fn text(records: &[Option<Record>], computed: usize, seconds: f64, told: &tables::Told) -> String {
+    let mut text = String::new();
+    for row in told.fleet.0.iter().filter(|row| row.flags.is_some()) {
+        text.push_str(&format!("{}: {}\n", shown(&row.robot), shown(row.flags.as_deref().unwrap_or_default())));
+    }
+    for path in &told.tables {
+        text.push_str(&format!("table: {}\n", path.display()));
+    }
+    text.push_str(&format!("page: {}\n", told.page.display()));
+    let rate = if computed > 0 { format!(", {:.0} a minute", computed as f64 / seconds * 60.0) } else { String::new() };
+    text + &format!(
+        "{} of {} robots done, {} rejected, {} failed; {computed} computed now ({seconds:.1} s{rate})\n",
+        count(records, Ending::Done),
+        records.len(),
+        count(records, Ending::Rejected),
+        count(records, Ending::Failed)
+    )
+}
+
+fn document(
+    fleet: &Fleet,
+    run: &str,
+    records: &[Option<Record>],
+    computed: usize,
+    seconds: f64,
+    told: &tables::Told,
+) -> serde_json::Value {
+    let robots = fleet.roster.0.iter().zip(records).zip(&told.fleet.0).map(|((robot, record), row)| {
+        json!({
+            "robot": robot.name, "status": row.status, "reason": row.reason, "exit_code": record.as_ref().map(|r| r.exit_code),
+            "before_rms_mm": row.before_rms_mm, "after_rms_mm": row.after_rms_mm, "floor_mm": row.floor_mm,
+            "verdict": row.verdict, "causes": row.causes, "flags": row.flags, "run": record.as_ref().and_then(|r| r.run.clone()),
+        })
+    });
+    json!({
+        "fleet": fleet.name(), "run": run, "robots": robots.collect::<Vec<_>>(), "computed": computed, "wall_seconds": seconds,
+        "done": count(records, Ending::Done), "rejected": count(records, Ending::Rejected), "failed": count(records, Ending::Failed),
+        "missing": records.iter().filter(|record| record.is_none()).count(), "tables": told.tables, "page": told.page,
+    })
+}
+
+/// The ledger of a fleet whose robots need not be known.
+pub(super) fn ledger<'a>(store: &'a Store, name: &str) -> Ledger<'a> {
+    Ledger::new(store, name)
+}

@@ -1,0 +1,121 @@
+//! `calib fleet status` and `cancel`.
+
+use super::super::surroundings::surroundings;
+use super::super::{emit, emit_json};
+use super::run::{count, ledger};
+use super::{Place, records, workshop};
+use crate::error::{Error, Result};
+use crate::fleet::{Ending, Fleet, FleetFile, Record, slurm};
+use crate::progress::shown;
+use clap::Args;
+use serde_json::json;
+use std::ffi::OsString;
+
+/// Say what became of every robot, or of one: its record, its run and its tables.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib fleet status FLEET.yaml
+  calib fleet status FLEET.yaml --robot r7")]
+pub(super) struct StatusArguments {
+    #[command(flatten)]
+    place: Place,
+    /// One robot, in detail
+    #[arg(long, value_name = "NAME")]
+    robot: Option<String>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+/// Stop the latest run after the robots in hand, and take its jobs from the cluster.
+#[derive(Args)]
+pub(super) struct CancelArguments {
+    #[command(flatten)]
+    place: Place,
+}
+
+pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Result<()> {
+    let store = arguments.place.store()?;
+    let fleet = Fleet::load(&arguments.place.fleet, &store)?;
+    let fresh = || surroundings(command_line);
+    let workshop = workshop(&fleet, &store, &fresh);
+    if let Some(name) = &arguments.robot {
+        let position =
+            fleet.roster.position(name).ok_or_else(|| Error::spec("--robot", format!("no robot {name:?} in the fleet")))?;
+        let record = workshop.record(&fleet.roster.0[position])?;
+        return match (record, arguments.json) {
+            (Some(record), true) => emit_json(&json!(record)),
+            (Some(record), false) => emit(&detail(&record, &store, fleet.name())),
+            (None, true) => emit_json(&json!({ "robot": name, "ending": "missing" })),
+            (None, false) => emit(&format!("{}: not computed yet for its settings and data as they are\n", shown(name))),
+        };
+    }
+    let records = records(&workshop)?;
+    let missing = records.iter().filter(|record| record.is_none()).count();
+    let [done, rejected, failed] = [Ending::Done, Ending::Rejected, Ending::Failed].map(|ending| count(&records, ending));
+    if arguments.json {
+        let robots = fleet.roster.0.iter().zip(&records).map(|(robot, record)| {
+            let ending = record.as_ref().map_or("missing", |record| record.ending.name());
+            json!({ "robot": robot.name, "status": ending, "reason": record.as_ref().and_then(|record| record.reason.clone()) })
+        });
+        let robots: Vec<_> = robots.collect();
+        return emit_json(&json!({
+            "fleet": fleet.name(), "done": done, "rejected": rejected, "failed": failed, "missing": missing, "robots": robots,
+        }));
+    }
+    let mut text = String::new();
+    for record in records.iter().flatten().filter(|record| record.ending != Ending::Done) {
+        text.push_str(&format!("{}: {}: {}\n", shown(&record.robot), record.ending.name(), first_line(record)));
+    }
+    text.push_str(&format!(
+        "fleet {}: {done} of {} robots done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
+        fleet.name(),
+        records.len()
+    ));
+    emit(&text)
+}
+
+fn first_line(record: &Record) -> String {
+    shown(record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default())
+}
+
+fn detail(record: &Record, store: &crate::store::Store, fleet: &str) -> String {
+    let mut text = format!("{}: {}\n", shown(&record.robot), record.ending.name());
+    for line in record.reason.iter().flat_map(|reason| reason.lines()) {
+        text.push_str(&format!("  {}\n", shown(line)));
+    }
+    text.push_str(&format!("  by {}, {:.1} s, ended {}\n", record.worker, record.wall_seconds, record.ended));
+    if let Some(log) = &record.log {
+        text.push_str(&format!("  task's log: {}\n", crate::fleet::cluster::logs(store.root(), fleet).join(log).display()));
+    }
+    if let Some(run) = &record.run {
+        text.push_str(&format!("  log: {}\n", store.root().join("runs").join(run).join("manifest.json").display()));
+        for stage in store.manifest(run).ok().iter().filter_map(|manifest| manifest["stages"].as_array()).flatten() {
+            for warning in stage["warnings"].as_array().into_iter().flatten().filter_map(|line| line.as_str()) {
+                text.push_str(&format!("  {}: warning: {}\n", stage["id"].as_str().unwrap_or_default(), shown(warning)));
+            }
+        }
+    }
+    for made in &record.tables {
+        text.push_str(&format!(
+            "  {}.{}: {} rows, {}\n",
+            made.stage,
+            made.port,
+            made.table.rows,
+            store.object_path(&made.table).display()
+        ));
+    }
+    text
+}
+
+pub(super) fn cancel(arguments: &CancelArguments) -> Result<()> {
+    let store = arguments.place.store()?;
+    let (file, _) = FleetFile::load(&arguments.place.fleet)?;
+    let ledger = ledger(&store, &file.name);
+    let note = ledger.run(None)?.ok_or_else(|| Error::spec(&file.name, "the fleet has no run in this store"))?;
+    ledger.cancel(&note.run)?;
+    if note.engine == "slurm" {
+        slurm::cancel(&note.jobs)?;
+    }
+    emit(&format!("run {} stops after the robots in hand; `calib fleet run` goes on where it stood\n", note.run))
+}

@@ -1,0 +1,181 @@
+//! What changed on a robot between two recordings: the same parameters in both, a base of its own in each, and one more step
+//! for every parameter that may have changed since.
+//!
+//! All is linear about the robust fits. With what both recordings share eliminated by QR, the steps are judged one by one and
+//! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
+
+use super::factor::Factor;
+use super::fit::Fitted;
+use super::model::Model;
+use super::problem::Problem;
+use crate::effect::BaseFrame;
+use crate::robot::Measurements;
+use faer::Mat;
+
+/// A recording with the model fitted to it; both models of a comparison have the same parameters.
+pub struct Session<'a> {
+    pub data: &'a Measurements,
+    pub rows: &'a [usize],
+    pub model: &'a Model,
+    pub fitted: &'a Fitted,
+}
+
+/// A parameter's step from one recording to the other, SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Position in the stack.
+    pub parameter: usize,
+    pub step: f64,
+    pub sigma: f64,
+    /// Two-sided.
+    pub p_value: f64,
+    /// Order in which it was taken in, from 1.
+    pub rank: Option<usize>,
+}
+
+/// Steps taken in at most.
+const MOST: usize = 6;
+/// A step is taken in where chance gives one as large in one robot of so many. The fleet's own limit is stricter.
+const CHANCE: f64 = 1e-3;
+/// Below this share of its own length a column is a combination of the others.
+const DISTINCT: f64 = 1e-6;
+/// Steps nearly as good as the best: an earlier one in the list is the better known cause.
+const TIE: f64 = 0.99;
+
+/// Tests every parameter but the base's, in order of precedence.
+pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<Change> {
+    let stack = &before.model.stack;
+    let base: Vec<usize> =
+        stack.effects().filter(|(effect, _)| effect.name() == BaseFrame::NAME).flat_map(|(_, range)| range).collect();
+    let shared: Vec<usize> = (0..stack.specs().len()).filter(|k| !base.contains(k)).collect();
+    let mut reduced = Reduced::of(before, after, &shared, &base);
+    let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;
+    let mut ranks: Vec<Option<usize>> = vec![None; shared.len()];
+    for rank in 1..=MOST {
+        let open: Vec<usize> = (0..shared.len())
+            .filter(|j| ranks[*j].is_none())
+            .filter(|j| reduced.sigma(*j).is_some_and(|s| s < wide(*j)))
+            .collect();
+        let score = |j: usize| reduced.step(j).abs() / reduced.sigma(j).unwrap_or(f64::INFINITY);
+        let Some(best) = open.iter().map(|j| score(*j)).max_by(f64::total_cmp) else { break };
+        if chance(best) * open.len() as f64 > CHANCE {
+            break;
+        }
+        let tied = open.into_iter().filter(|j| score(*j) >= TIE * best);
+        let Some(chosen) = tied.min_by_key(|j| precedence(shared[*j])) else { break };
+        ranks[chosen] = Some(rank);
+        reduced.take(chosen);
+    }
+    let told = (0..shared.len()).filter_map(|j| {
+        // Those taken in are judged beside each other.
+        let others = ranks.iter().enumerate().filter(|(i, rank)| *i != j && rank.is_some()).map(|(i, _)| i);
+        let alone = if ranks[j].is_some() { reduced.fresh_without(others) } else { reduced.clone() };
+        let (step, sigma) = (alone.step(j), alone.sigma(j)?);
+        (sigma < wide(j)).then(|| Change {
+            parameter: shared[j],
+            step,
+            sigma,
+            p_value: chance(step.abs() / sigma),
+            rank: ranks[j],
+        })
+    });
+    told.collect()
+}
+
+/// Two-sided chance of a normal variable so many standard deviations off.
+fn chance(score: f64) -> f64 {
+    libm::erfc(score / std::f64::consts::SQRT_2)
+}
+
+/// The steps' problem with everything else eliminated.
+#[derive(Clone)]
+struct Reduced {
+    columns: Vec<Vec<f64>>,
+    right: Vec<f64>,
+    /// Before any was taken in.
+    original: (Vec<Vec<f64>>, Vec<f64>),
+    lengths: Vec<f64>,
+    /// Of the noise, against what the weights say; never below one.
+    scale: f64,
+}
+
+impl Reduced {
+    fn of(before: &Session, after: &Session, shared: &[usize], base: &[usize]) -> Self {
+        let order: Vec<usize> = shared.iter().chain(base).copied().collect();
+        let factor = |session: &Session| {
+            let problem = Problem { data: session.data, rows: session.rows, unmodelled: session.fitted.unmodelled };
+            problem.observe(session.model, &order).factor
+        };
+        let (first, second) = (factor(before), factor(after));
+        let (s, b) = (shared.len(), base.len());
+        let height = s + b + 1;
+        // Columns: shared | base before | base after | steps | right side. Rows: before, after, what is known beforehand.
+        let width = s + 2 * b + s + 1;
+        let mut rows = Mat::zeros(2 * height + s, width);
+        for i in 0..height {
+            for j in 0..s + b {
+                rows[(i, j)] = first.entry(i, j);
+                let place = if j < s { j } else { j + b };
+                rows[(height + i, place)] = second.entry(i, j);
+                if j < s {
+                    rows[(height + i, s + 2 * b + j)] = second.entry(i, j);
+                }
+            }
+            // About the values before: what the later fit moved is for the steps to explain.
+            let moved: f64 = (0..s).map(|j| second.entry(i, j) * (after.model.x[shared[j]] - before.model.x[shared[j]])).sum();
+            rows[(i, width - 1)] = first.entry(i, s + b);
+            rows[(height + i, width - 1)] = second.entry(i, s + b) + moved;
+        }
+        for (j, k) in shared.iter().enumerate() {
+            let sigma = before.model.stack.specs()[*k].prior_sigma;
+            rows[(2 * height + j, j)] = 1.0 / sigma;
+            rows[(2 * height + j, width - 1)] = -before.model.x[*k] / sigma;
+        }
+        let whole = Factor::of(&rows);
+        let start = s + 2 * b;
+        let columns: Vec<Vec<f64>> = (0..s).map(|j| (0..s).map(|i| whole.entry(start + i, start + j)).collect()).collect();
+        let right: Vec<f64> = (0..s).map(|i| whole.entry(start + i, width - 1)).collect();
+        let values = 3 * (before.rows.len() + after.rows.len());
+        let freedom = values.saturating_sub(2 * s + 2 * b).max(1) as f64;
+        let rest = whole.entry(width - 1, width - 1).powi(2);
+        let lengths = (0..s).map(|j| (0..s + b + 1).map(|i| second.entry(i, j).powi(2)).sum::<f64>().sqrt()).collect();
+        let original = (columns.clone(), right.clone());
+        Self { columns, right, original, lengths, scale: (rest / freedom).sqrt().max(1.0) }
+    }
+
+    fn square(&self, j: usize) -> f64 {
+        self.columns[j].iter().map(|value| value * value).sum()
+    }
+    fn step(&self, j: usize) -> f64 {
+        self.columns[j].iter().zip(&self.right).map(|(a, b)| a * b).sum::<f64>() / self.square(j).max(f64::MIN_POSITIVE)
+    }
+    /// `None` where the rest can do the same.
+    fn sigma(&self, j: usize) -> Option<f64> {
+        let length = self.square(j).sqrt();
+        (length > DISTINCT * self.lengths[j] && length > 0.0).then(|| self.scale / length)
+    }
+
+    /// Eliminates a step, so that the others are judged beside it.
+    fn take(&mut self, j: usize) {
+        let square = self.square(j);
+        if square <= 0.0 {
+            return;
+        }
+        let own = self.columns[j].clone();
+        let project = |column: &mut Vec<f64>| {
+            let share = column.iter().zip(&own).map(|(a, b)| a * b).sum::<f64>() / square;
+            column.iter_mut().zip(&own).for_each(|(a, b)| *a -= share * b);
+        };
+        project(&mut self.right);
+        self.columns.iter_mut().enumerate().filter(|(i, _)| *i != j).for_each(|(_, column)| project(column));
+        self.columns[j].fill(0.0);
+    }
+
+    /// From the beginning, with others taken in.
+    fn fresh_without(&self, others: impl Iterator<Item = usize>) -> Self {
+        let (columns, right) = self.original.clone();
+        let mut fresh = Self { columns, right, ..self.clone() };
+        others.for_each(|other| fresh.take(other));
+        fresh
+    }
+}

@@ -1,0 +1,123 @@
+//! Job files for clusters: arrays of tasks that each call `calib fleet exec`, which is all that a cluster ever runs.
+//!
+//! They hold the run's id and the task's number, never the name of a robot; what is done, the store says, not the scheduler.
+
+use super::ledger::RunNote;
+use crate::error::{Error, Fault, Result};
+use std::path::{Path, PathBuf};
+
+/// Slurm's default `MaxArraySize` is 1001: larger arrays are refused.
+const ARRAY: usize = 1000;
+
+/// What a cluster is asked for.
+#[derive(Debug, Clone)]
+pub struct Wishes {
+    /// The `calib` that the nodes run.
+    pub program: PathBuf,
+    /// Absolute, on storage that all nodes share.
+    pub store: PathBuf,
+    pub partition: Option<String>,
+    /// Tasks at once.
+    pub max_parallel: Option<u32>,
+    /// E.g. `2G`.
+    pub memory: Option<String>,
+    /// E.g. `00:30:00`.
+    pub time: Option<String>,
+    /// More options of sbatch, each a word.
+    pub more: Vec<String>,
+}
+
+/// The script of one array and the tasks that it takes.
+pub struct Script {
+    pub text: String,
+    pub tasks: usize,
+}
+
+impl Wishes {
+    /// Everything that goes into a directive is a plain word: sbatch has no quoting that all its versions share.
+    fn check(&self) -> Result<()> {
+        let plain = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_./-+=,:@".contains(c));
+        let store = self.store.to_string_lossy().into_owned();
+        let words = [("--partition", &self.partition), ("--mem", &self.memory), ("--time", &self.time)];
+        let words = words.into_iter().filter_map(|(option, word)| Some((option, word.as_ref()?.clone())));
+        let more = self.more.iter().map(|word| ("--sbatch-arg", word.clone()));
+        let faults: Vec<Fault> = words
+            .chain(more)
+            .chain([("--store", store)])
+            .filter(|(_, word)| !plain(word))
+            .map(|(option, word)| {
+                Fault::new(option, format!("{word:?}: allowed in a job file are letters, digits and _ . / - + = , : @"))
+            })
+            .collect();
+        if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+    }
+}
+
+/// Where the tasks of a run say what they did.
+pub fn logs(store: &Path, fleet: &str) -> PathBuf {
+    store.join("fleets").join(fleet).join("logs")
+}
+
+/// The scripts of a run for `sbatch`, one an array.
+pub fn slurm(note: &RunNote, wishes: &Wishes) -> Result<Vec<Script>> {
+    wishes.check()?;
+    let count = note.tasks.len();
+    let scripts = (0..count).step_by(ARRAY).map(|first| {
+        let tasks = ARRAY.min(count - first);
+        let parallel = wishes.max_parallel.map(|most| format!("%{most}")).unwrap_or_default();
+        let mut text = format!(
+            "#!/bin/sh\n#SBATCH --job-name=calib-{}\n#SBATCH --array=0-{}{parallel}\n#SBATCH --ntasks=1\n#SBATCH --cpus-per-task=1\n\
+             #SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output={}/%A_%a.out\n",
+            note.fleet,
+            tasks - 1,
+            logs(&wishes.store, &note.fleet).display()
+        );
+        for (option, word) in [("partition", &wishes.partition), ("mem", &wishes.memory), ("time", &wishes.time)] {
+            if let Some(word) = word {
+                text.push_str(&format!("#SBATCH --{option}={word}\n"));
+            }
+        }
+        for word in &wishes.more {
+            text.push_str(&format!("#SBATCH {word}\n"));
+        }
+        text.push_str(&format!(
+            "exec {} fleet exec --store {} --fleet {} --run {} --task \"$((SLURM_ARRAY_TASK_ID + {first}))\"\n",
+            quoted(&wishes.program.to_string_lossy()),
+            quoted(&wishes.store.to_string_lossy()),
+            quoted(&note.fleet),
+            quoted(&note.run)
+        ));
+        Script { text, tasks }
+    });
+    Ok(scripts.collect())
+}
+
+/// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
+pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> String {
+    let yaml = |text: &str| serde_json::Value::from(text).to_string();
+    let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
+    let limit =
+        wishes.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();
+    format!(
+        "# Experimental. Memory is in Kubernetes' own spelling, e.g. 2Gi.\n\
+         apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {}\nspec:\n  completionMode: Indexed\n  completions: {}\n  parallelism: {}\n  \
+         backoffLimitPerIndex: 3\n  template:\n    spec:\n      restartPolicy: Never\n      containers:\n        - name: calib\n          \
+         image: {}\n          args: [fleet, exec, --store, {}, --fleet, {}, --run, {}, --task, $(JOB_COMPLETION_INDEX)]\n          \
+         resources:\n            requests: {{cpu: \"1\"}}\n{limit}          volumeMounts:\n            - {{name: store, mountPath: {}}}\n      \
+         volumes:\n        - name: store\n          persistentVolumeClaim: {{claimName: {}}}\n",
+        yaml(&name),
+        note.tasks.len(),
+        wishes.max_parallel.unwrap_or(10),
+        yaml(image),
+        yaml(&wishes.store.to_string_lossy()),
+        yaml(&note.fleet),
+        yaml(&note.run),
+        yaml(&wishes.store.to_string_lossy()),
+        yaml(claim)
+    )
+}
+
+/// A word for a POSIX shell, whatever is in it.
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "'\\''"))
+}

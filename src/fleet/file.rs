@@ -1,0 +1,236 @@
+//! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
+
+use crate::error::{Error, Fault, Result};
+use crate::yaml::{self, Mark, Node, Trouble, typed};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The format of the file that this version reads.
+const FORMAT: u64 = 1;
+
+/// A fleet: one pipeline, many robots.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "calib fleet")]
+pub struct FleetFile {
+    /// Format of this file: 1.
+    pub calib: u64,
+    /// Name of the fleet, e.g. of a plant and its campaign; part of the paths of its tables.
+    pub name: String,
+    /// The pipeline's YAML file, relative to this one.
+    pub pipeline: PathBuf,
+    /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.every: 4}`.
+    #[serde(default)]
+    pub set: BTreeMap<String, Value>,
+    /// What is known of all robots.
+    #[serde(default)]
+    pub groups: Groups,
+    /// Where the robots come from.
+    pub robots: Vec<Source>,
+    /// Robots that differ from the others; later entries win.
+    #[serde(default)]
+    pub overrides: Vec<Exception>,
+    /// An earlier fleet of the same robots, done in the same store: changes since then are tested.
+    #[serde(default)]
+    pub previous: Option<Previous>,
+    /// What an earlier fleet in the same store says of parameters, as priors.
+    #[serde(default)]
+    pub prior: Option<PriorFrom>,
+}
+
+/// What robots are told apart by in tables and pools.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Groups {
+    /// Model of the robot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    /// Where it stands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plant: Option<String>,
+    /// Date of the measurement, e.g. 2026-10-01.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub campaign: Option<String>,
+}
+
+/// Robots: exactly one of `folders`, `list` and `recording`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// One folder a robot, as a pattern relative to this file: `recordings/*`. The folder's name is the robot's.
+    #[serde(default)]
+    pub folders: Option<String>,
+    /// CSV or Parquet with the columns `robot`, and if wanted `folder`, `model`, `plant`, `campaign`, `set.TARGET` (a value as in
+    /// `set`) and `path.TARGET` (a file relative to the list).
+    #[serde(default)]
+    pub list: Option<PathBuf>,
+    /// One CSV or Parquet table with the rows of all robots.
+    #[serde(default)]
+    pub recording: Option<PathBuf>,
+    /// The column of `recording` that names the robot.
+    #[serde(default = "robot_id")]
+    pub by: String,
+    /// The pipeline's variable that takes the folder, or the robot's part of the recording.
+    #[serde(default)]
+    pub variable: Option<String>,
+    /// What is known of these robots.
+    #[serde(default)]
+    pub groups: Groups,
+    /// Variables and settings of the pipeline for these robots.
+    #[serde(default)]
+    pub set: BTreeMap<String, Value>,
+}
+
+/// Robots that differ from the others.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Exception {
+    /// Names; `*` stands for anything.
+    pub robots: Vec<String>,
+    #[serde(default)]
+    pub groups: Groups,
+    #[serde(default)]
+    pub set: BTreeMap<String, Value>,
+}
+
+/// The campaign before this one.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Previous {
+    /// Name of the earlier fleet.
+    pub fleet: String,
+    /// The id of this pipeline's stage `compare`.
+    #[serde(default = "compare")]
+    pub stage: String,
+    /// Chance of a false flag in the whole fleet, shared by all robots and parameters.
+    #[serde(default = "five_percent")]
+    pub alpha: f64,
+}
+
+/// Priors of a stage from an earlier fleet.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PriorFrom {
+    /// Name of the earlier fleet.
+    pub fleet: String,
+    /// The stage of this pipeline that takes the priors, with a setting `prior`; its namesake there gives them.
+    pub stage: String,
+    pub by: PriorBy,
+    /// Effects that it speaks of, by canonical name.
+    pub effects: Vec<String>,
+}
+
+/// Whose parameters make a prior.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PriorBy {
+    /// The robot's own.
+    Robot,
+    /// Mean and spread over all robots of the same `groups.model`, with the robot's own left out.
+    Model,
+}
+
+fn robot_id() -> String {
+    "robot_id".into()
+}
+fn compare() -> String {
+    "compare".into()
+}
+fn five_percent() -> f64 {
+    0.05
+}
+
+impl FleetFile {
+    /// Reads the file; fails with every fault at once.
+    pub fn load(path: &Path) -> Result<(Self, Node)> {
+        let label = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
+        let (tree, mut troubles) = yaml::parse(&text);
+        let Some(tree) = tree else { return Err(faulty(&label, troubles)) };
+        match typed::<Self>(&tree) {
+            Ok(file) => {
+                troubles.extend(file.check(&tree));
+                if troubles.is_empty() { Ok((file, tree)) } else { Err(faulty(&label, troubles)) }
+            }
+            Err(more) => {
+                troubles.extend(more);
+                Err(faulty(&label, troubles))
+            }
+        }
+    }
+
+    /// What types cannot express.
+    fn check(&self, tree: &Node) -> Vec<Trouble> {
+        let mut troubles = Vec::new();
+        let mut fault = |path: &str, message: String| {
+            troubles.push(Trouble::new(message).at(tree.nearest_mark(path)).below(path));
+        };
+        if self.calib != FORMAT {
+            fault("calib", format!("format {} is not known to this calib, which reads {FORMAT}", self.calib));
+        }
+        let letter = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let starts = self.name.starts_with(|c: char| c.is_ascii_alphanumeric());
+        if !starts || self.name.len() > 64 || !self.name.chars().all(letter) {
+            fault("name", "expected letters, digits, `-` and `_`, starting with a letter or digit".into());
+        }
+        if self.robots.is_empty() {
+            fault("robots", "expected at least one of `- folders:`, `- list:` and `- recording:`".into());
+        }
+        for (index, source) in self.robots.iter().enumerate() {
+            let given = [source.folders.is_some(), source.list.is_some(), source.recording.is_some()];
+            if given.iter().filter(|given| **given).count() != 1 {
+                fault(&format!("robots[{index}]"), "expected exactly one of `folders`, `list` and `recording`".into());
+            }
+            if source.recording.is_some() && source.variable.is_none() {
+                let message = "missing: the variable of the pipeline that takes a robot's part of the recording";
+                fault(&format!("robots[{index}].variable"), message.into());
+            }
+        }
+        if let Some(previous) = &self.previous {
+            if !(previous.alpha > 0.0 && previous.alpha < 1.0) {
+                fault("previous.alpha", "expected a chance between 0 and 1, e.g. 0.05".into());
+            }
+            if previous.fleet == self.name {
+                fault("previous.fleet", "is this fleet itself; give every campaign a name of its own".into());
+            }
+        }
+        troubles
+    }
+}
+
+/// The text of the pipeline, or the place in FLEET.yaml that names it.
+pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result<String> {
+    std::fs::read_to_string(pipeline).map_err(|error| {
+        let message = format!("`{}`: {} (relative to this file)", pipeline.display(), unreadable(&error));
+        let trouble = Trouble::new(message).at(tree.nearest_mark("pipeline")).below("pipeline");
+        Error::Spec(vec![trouble.fault(&path.display().to_string())])
+    })
+}
+
+fn unreadable(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "no such file".into(),
+        std::io::ErrorKind::InvalidData => "not a text file: expected YAML in UTF-8".into(),
+        _ => error.to_string(),
+    }
+}
+
+/// All faults of the file, in its order.
+pub(super) fn faulty(label: &str, mut troubles: Vec<Trouble>) -> Error {
+    troubles.sort_by_key(|trouble| match trouble.mark {
+        Some(Mark::Line { line, column }) => (line, column),
+        _ => (u64::MAX, 0),
+    });
+    let faults: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(label)).collect();
+    Error::Spec(faults)
+}
+
+/// The JSON Schema of FLEET.yaml, for editors.
+pub fn json_schema() -> String {
+    let schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<FleetFile>().to_value();
+    serde_json::to_string_pretty(&schema).expect("a schema is plain data") + "\n"
+}

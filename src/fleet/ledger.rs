@@ -1,0 +1,248 @@
+//! What became of every robot, in the store: the only truth about which are done, whoever computed them.
+//!
+//! `fleets/<fleet>/records/ab/<key>.json`, put if absent; `claims/` are locks of the living, on which no result depends;
+//! `runs/<id>.json` is the roster of a run, for the tasks of a cluster and for later campaigns; `cancelled.json` names a run.
+
+use super::file::Groups;
+use super::roster::Robot;
+use crate::error::Result;
+use crate::store::{Store, TableRef};
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File};
+use std::path::PathBuf;
+
+/// Bumped when older records can no longer be understood.
+const RECORD_FORMAT: u32 = 1;
+/// Exit code of what may work later.
+pub const LATER: u8 = 75;
+
+/// How it ended for a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    Done,
+    /// Its data are at fault: the same data will be rejected again.
+    Rejected,
+    /// The machine, or calib itself.
+    Failed,
+}
+
+impl Ending {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Rejected => "rejected",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+/// A table of a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Made {
+    pub stage: String,
+    pub port: String,
+    pub kind: String,
+    #[serde(flatten)]
+    pub table: TableRef,
+}
+
+/// What became of a robot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    pub record_format: u32,
+    pub robot: String,
+    /// Hash of the robot's name, settings and data.
+    pub key: String,
+    pub ending: Ending,
+    /// As `calib run` would have ended.
+    pub exit_code: u8,
+    /// Why it is not done.
+    pub reason: Option<String>,
+    /// The run in `runs/`, with all that was said; none where the plan could not be made.
+    pub run: Option<String>,
+    /// Host or node, and thread.
+    pub worker: String,
+    /// What the cluster's task said, among the fleet's logs.
+    #[serde(default)]
+    pub log: Option<String>,
+    pub ended: String,
+    pub wall_seconds: f64,
+    pub tables: Vec<Made>,
+    /// Name of the robot's folder among the documents.
+    pub handle: String,
+    pub documents: Vec<String>,
+}
+
+impl Record {
+    /// The last table of a kind.
+    pub fn last(&self, kind: &str) -> Option<&TableRef> {
+        self.tables.iter().rfind(|made| made.kind == kind).map(|made| &made.table)
+    }
+    /// The table of a kind that a stage wrote.
+    pub fn of_stage(&self, stage: &str, kind: &str) -> Option<&TableRef> {
+        self.tables.iter().rfind(|made| made.stage == stage && made.kind == kind).map(|made| &made.table)
+    }
+    pub(super) fn blank(robot: &Robot, key: String, worker: &str) -> Self {
+        Self {
+            record_format: RECORD_FORMAT,
+            robot: robot.name.clone(),
+            key,
+            ending: Ending::Done,
+            exit_code: 0,
+            reason: None,
+            run: None,
+            worker: worker.into(),
+            log: None,
+            ended: String::new(),
+            wall_seconds: 0.0,
+            tables: Vec::new(),
+            handle: robot.handle(),
+            documents: Vec::new(),
+        }
+    }
+}
+
+/// One run of a fleet, as its tasks and later campaigns need it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct RunNote {
+    pub run: String,
+    pub fleet: String,
+    pub engine: String,
+    /// Absolute, so that other hosts find it.
+    pub file: PathBuf,
+    pub robots: Vec<Member>,
+    /// Robots of every task of a cluster, by position.
+    #[serde(default)]
+    pub tasks: Vec<Vec<usize>>,
+    /// Ids of the cluster's jobs.
+    #[serde(default)]
+    pub jobs: Vec<String>,
+}
+
+/// A robot of a run.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Member {
+    pub name: String,
+    #[serde(default)]
+    pub groups: Groups,
+    /// Of its record, once there is one.
+    #[serde(default)]
+    pub key: Option<String>,
+}
+
+/// The records of one fleet.
+pub struct Ledger<'a> {
+    pub store: &'a Store,
+    pub fleet: String,
+}
+
+/// Held while a robot is computed; the kernel frees it when the process dies.
+pub(super) struct Claim {
+    path: PathBuf,
+    _file: Option<File>,
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+impl<'a> Ledger<'a> {
+    pub fn new(store: &'a Store, fleet: &str) -> Self {
+        Self { store, fleet: fleet.into() }
+    }
+
+    fn records<'p>(&'p self, key: &'p str) -> [&'p str; 4] {
+        ["fleets", &self.fleet, "records", key.get(..2).unwrap_or("00")]
+    }
+    fn runs(&self) -> [&str; 3] {
+        ["fleets", &self.fleet, "runs"]
+    }
+
+    /// The record of a key; one that is torn, or whose tables are gone, is none.
+    pub fn find(&self, key: &str) -> Result<Option<Record>> {
+        let note = self.store.note(&self.records(key), &format!("{key}.json"))?;
+        let record = note.and_then(|note| serde_json::from_value::<Record>(note).ok());
+        let whole = |record: &Record| {
+            let there = |made: &Made| {
+                fs::metadata(self.store.object_path(&made.table)).is_ok_and(|metadata| metadata.len() == made.table.bytes)
+            };
+            record.record_format == RECORD_FORMAT && record.tables.iter().all(there)
+        };
+        Ok(record.filter(whole))
+    }
+
+    /// Records what became of a robot; the record that stands is handed back, be it another's.
+    pub fn put(&self, record: Record) -> Result<Record> {
+        let (place, name) = (self.records(&record.key), format!("{}.json", record.key));
+        if self.store.put_note_once(&place, &name, &record)? {
+            return Ok(record);
+        }
+        match self.find(&record.key)? {
+            Some(standing) => Ok(standing),
+            None => self.store.put_note(&place, &name, &record).map(|()| record.clone()),
+        }
+    }
+
+    /// Takes a record away, so that the robot is computed again.
+    pub fn forget(&self, key: &str) -> Result<()> {
+        self.store.drop_note(&self.records(key), &format!("{key}.json"))
+    }
+
+    /// The right to compute a robot; none while another living process has it. Where locks cannot be had, both compute and the
+    /// first record stands.
+    pub(super) fn claim(&self, key: &str) -> Result<Option<Claim>> {
+        let path = self.store.place_of_note(&["fleets", &self.fleet, "claims"], &format!("{key}.lock"))?;
+        let open = || {
+            path.parent().map_or(Ok(()), fs::create_dir_all)?;
+            File::options().create(true).append(true).open(&path)
+        };
+        let Ok(file) = open() else { return Ok(Some(Claim { path, _file: None })) };
+        match file.try_lock() {
+            Ok(()) => Ok(Some(Claim { path, _file: Some(file) })),
+            Err(fs::TryLockError::WouldBlock) => Ok(None),
+            Err(fs::TryLockError::Error(_)) => Ok(Some(Claim { path, _file: None })),
+        }
+    }
+
+    pub fn put_run(&self, note: &RunNote) -> Result<()> {
+        self.store.put_note(&self.runs(), &format!("{}.json", note.run), note)
+    }
+
+    /// The run of an id, or the latest.
+    pub fn run(&self, id: Option<&str>) -> Result<Option<RunNote>> {
+        let name = match id {
+            Some(id) => Some(format!("{id}.json")),
+            None => {
+                let folder = self.store.place_of_note(&self.runs()[..2], "runs")?;
+                let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+                // Ids sort by time.
+                entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| name.ends_with(".json")).max()
+            }
+        };
+        let Some(name) = name else { return Ok(None) };
+        let note = self.store.note(&self.runs(), &name)?;
+        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
+    }
+
+    /// Keeps the roster with the keys of its records, for status and later campaigns.
+    pub fn close(&self, note: &RunNote) -> Result<()> {
+        self.store.put_note(&["fleets", &self.fleet], "roster.json", note)
+    }
+    /// The roster as the last run left it.
+    pub fn closed(&self) -> Result<Option<RunNote>> {
+        let note = self.store.note(&["fleets", &self.fleet], "roster.json")?;
+        Ok(note.and_then(|note| serde_json::from_value(note).ok()))
+    }
+
+    /// Asks the workers of a run to stop after the robots that they have in hand.
+    pub fn cancel(&self, run: &str) -> Result<()> {
+        self.store.put_note(&["fleets", &self.fleet], "cancelled.json", &serde_json::json!({ "run": run }))
+    }
+    pub fn cancelled(&self, run: &str) -> bool {
+        let note = self.store.note(&["fleets", &self.fleet], "cancelled.json").ok().flatten();
+        note.is_some_and(|note| note["run"] == run)
+    }
+}

@@ -1,0 +1,55 @@
+//! Many robots through one pipeline: FLEET.yaml -> roster -> one record a robot in the store -> tables and a page.
+//!
+//! A robot is done when its record is in the store, whoever computed it: threads of this process ([`local`]) or tasks of a
+//! cluster ([`cluster`]). Names of robots are data: they become hashes in paths and never reach a shell.
+
+pub mod cluster;
+pub mod file;
+pub mod ledger;
+mod list;
+pub mod local;
+mod partition;
+mod pool;
+mod recalibration;
+pub mod roster;
+pub mod slurm;
+pub mod tables;
+mod work;
+
+pub use file::FleetFile;
+pub use ledger::{Ending, Ledger, Record};
+pub use roster::{Groups, Robot, Roster};
+pub use work::{Visit, Watcher, Workshop};
+
+use crate::error::Result;
+use crate::store::Store;
+use std::path::{Path, PathBuf};
+
+/// A fleet whose file is sound and whose robots are known.
+pub struct Fleet {
+    pub file: FleetFile,
+    /// The pipeline's YAML, where it lies.
+    pub pipeline: PathBuf,
+    /// Its text.
+    pub text: String,
+    pub roster: Roster,
+}
+
+impl Fleet {
+    /// Reads FLEET.yaml and finds its robots; fails with every fault at once. A large recording table is parted into the store.
+    pub fn load(path: &Path, store: &Store) -> Result<Self> {
+        let (file, tree) = FleetFile::load(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let pipeline = folder.join(&file.pipeline);
+        let text = file::pipeline_text(path, &tree, &pipeline)?;
+        let roster = Roster::gather(path, &file, &tree, store)?;
+        let mut fleet = Self { file, pipeline, text, roster };
+        let ledger = Ledger::new(store, &fleet.file.name);
+        fleet.look_back(&ledger)?;
+        Ok(fleet)
+    }
+
+    pub fn name(&self) -> &str {
+        &self.file.name
+    }
+}

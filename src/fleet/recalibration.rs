@@ -1,0 +1,134 @@
+//! One campaign after another: limits for changes over all robots and parameters, and why a person should look at a robot.
+
+use super::Fleet;
+use super::ledger::{Ledger, Member, Record, RunNote};
+use super::tables::{causes, load};
+use crate::error::{Error, Result};
+use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
+
+/// How rare a change by chance may be.
+pub(super) struct Limits {
+    /// In the whole fleet.
+    pub alpha: f64,
+}
+
+/// Changes of all robots with their control limits: alpha shared by every robot and parameter that was tested (Bonferroni).
+pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &Limits) -> FleetChanges {
+    let tests = robots.iter().map(|(_, changes)| changes.0.len()).sum::<usize>().max(1);
+    let each = limits.alpha / tests as f64;
+    let width = normal_limit(each);
+    let mut table = FleetChanges::default();
+    for (robot, changes) in robots {
+        for row in &changes.0 {
+            table.0.push(FleetChangeRow {
+                robot: (*robot).into(),
+                parameter: row.name.clone(),
+                effect: row.effect.clone(),
+                place: row.place.clone(),
+                unit: row.unit.clone(),
+                previous: row.previous,
+                change: row.change,
+                sigma: row.sigma,
+                p_value: row.p_value,
+                limit: width * row.sigma,
+                rank: row.rank,
+                flagged: row.rank.is_some() && row.p_value < each,
+            });
+        }
+    }
+    table.0.sort_by(|a, b| (&a.robot, &a.parameter).cmp(&(&b.robot, &b.parameter)));
+    table
+}
+
+/// The distance from the mean, in standard deviations, that a normal variable exceeds either way with chance `p`: bisection.
+fn normal_limit(p: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if libm::erfc(middle / std::f64::consts::SQRT_2) > p { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The latest run of an earlier fleet in the same store.
+pub(super) struct Earlier {
+    fleet: String,
+    note: RunNote,
+}
+
+impl Earlier {
+    /// Of the fleet that the file names as `previous`; fails where there is none.
+    pub fn find(fleet: &Fleet, ledger: &Ledger) -> Result<Option<Self>> {
+        fleet.file.previous.as_ref().map(|previous| Self::named(&previous.fleet, "previous.fleet", ledger)).transpose()
+    }
+
+    pub fn named(name: &str, place: &str, ledger: &Ledger) -> Result<Self> {
+        let missing = || Error::spec(place, format!("no fleet `{name}` was run in store {}", ledger.store.root().display()));
+        let note = Ledger::new(ledger.store, name).closed()?.ok_or_else(missing)?;
+        Ok(Self { fleet: name.into(), note })
+    }
+
+    pub fn members(&self) -> &[Member] {
+        &self.note.robots
+    }
+
+    /// The record of a robot, where it has one there.
+    pub fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<Record>> {
+        let member = self.note.robots.iter().find(|member| member.name == robot);
+        let Some(key) = member.and_then(|member| member.key.as_deref()) else { return Ok(None) };
+        Ledger::new(ledger.store, &self.fleet).find(key)
+    }
+
+    /// Why a person should look at a robot: parameters beyond their limits, and another diagnosis than before.
+    pub fn flags(&self, ledger: &Ledger, robot: &str, all: &FleetChanges, findings: Option<&Findings>) -> Result<Vec<String>> {
+        let Some(record) = self.record(ledger, robot)? else { return Ok(vec!["not in the campaign before".into()]) };
+        let member = self.note.robots.iter().find(|member| member.name == robot);
+        let since = member.and_then(|member| member.groups.campaign.as_deref()).unwrap_or(&self.fleet);
+        let mut changed: Vec<&FleetChangeRow> = all.0.iter().filter(|row| row.robot == robot && row.flagged).collect();
+        changed.sort_by_key(|row| row.rank);
+        let mut flags: Vec<String> = changed.into_iter().map(|row| sentence(row, since)).collect();
+        if let (Some(now), Some(before)) = (findings, load::<Findings>(ledger, record.last(Findings::KIND))?) {
+            let (now, before) = (causes(now), causes(&before));
+            if now != before {
+                let told = |causes: &str| if causes.is_empty() { "nothing".to_string() } else { causes.to_string() };
+                flags.push(format!("diagnosis was {} and is {}", told(&before), told(&now)));
+            }
+        }
+        Ok(flags)
+    }
+}
+
+/// `zero_shift joint 3 since 2026-04-01: +0.021 +- 0.002 deg`.
+fn sentence(row: &FleetChangeRow, since: &str) -> String {
+    let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
+    format!(
+        "{} {} since {since}: {} {unit} {} ({:.1} sigma)",
+        row.effect,
+        row.place,
+        figure(row.change * factor, row.sigma * factor),
+        row.parameter,
+        (row.change / row.sigma).abs()
+    )
+}
+
+/// A value with two digits of its uncertainty.
+fn figure(value: f64, sigma: f64) -> String {
+    let digits = (1.0 - sigma.abs().log10().floor()).clamp(0.0, 12.0);
+    let digits = if digits.is_finite() { digits as usize } else { 6 };
+    if digits > 6 {
+        return format!("{value:+.3e} +- {sigma:.1e}");
+    }
+    format!("{value:+.digits$} +- {sigma:.digits$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::normal_limit;
+
+    #[test]
+    fn limits_are_those_of_the_normal_distribution() {
+        // Quantiles from tables: 5 % -> 1.959964, 0.27 % -> 3.
+        assert!((normal_limit(0.05) - 1.959_963_985).abs() < 1e-8);
+        assert!((normal_limit(0.002_699_796) - 3.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,226 @@
+//! The robots of a fleet, each with its name, its groups and what it sets in the pipeline.
+
+pub use super::file::Groups;
+use super::file::{FleetFile, Source, faulty};
+use super::{list, partition};
+use crate::error::{Error, Result};
+use crate::pipeline::Override;
+use crate::store::Store;
+use crate::yaml::{Node, Trouble};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// One robot. Its name is data from outside: never a path, never a command.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    pub name: String,
+    pub groups: Groups,
+    /// Later ones win.
+    pub sets: Vec<Override>,
+    /// Why its data cannot be reached at all.
+    pub unreadable: Option<String>,
+}
+
+/// All robots, in the order of the file, those of a source by name.
+#[derive(Debug, Clone, Default)]
+pub struct Roster(pub Vec<Robot>);
+
+/// The variable that takes a robot's folder, where the file does not say.
+const FOLDER: &str = "case";
+
+impl Robot {
+    pub(super) fn new(name: String) -> Self {
+        Self { name, groups: Groups::default(), sets: Vec::new(), unreadable: None }
+    }
+
+    /// A name for paths: letters and digits of the robot's name, then its hash.
+    pub fn handle(&self) -> String {
+        let kept = self.name.chars().filter(char::is_ascii_alphanumeric).take(24).collect::<String>();
+        let hash = blake3::hash(self.name.as_bytes()).to_hex();
+        if kept.is_empty() { hash[..16].to_string() } else { format!("{kept}-{}", &hash[..16]) }
+    }
+
+    /// Sets a path or another text.
+    pub(super) fn set_text(&mut self, target: &str, text: &str) {
+        self.sets.push(Override { target: target.into(), value: quoted(text) });
+    }
+    fn set_values(&mut self, values: &BTreeMap<String, Value>) {
+        self.sets.extend(values.iter().map(|(target, value)| Override { target: target.clone(), value: written(value) }));
+    }
+}
+
+impl Groups {
+    /// These, and where they are silent the other's.
+    fn or(&self, other: &Self) -> Self {
+        let first = |a: &Option<String>, b: &Option<String>| a.clone().or_else(|| b.clone());
+        Self {
+            model: first(&self.model, &other.model),
+            plant: first(&self.plant, &other.plant),
+            campaign: first(&self.campaign, &other.campaign),
+        }
+    }
+}
+
+impl Roster {
+    /// Finds the robots of all sources; every fault at once.
+    pub(super) fn gather(path: &Path, file: &FleetFile, tree: &Node, store: &Store) -> Result<Self> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut robots: Vec<Robot> = Vec::new();
+        let mut troubles = Vec::new();
+        for (index, source) in file.robots.iter().enumerate() {
+            let place = format!("robots[{index}]");
+            let mut found = match found(folder, file, source, store) {
+                Ok(found) => found,
+                Err(Error::Spec(faults)) => {
+                    let mark = tree.nearest_mark(&place);
+                    troubles.extend(
+                        faults
+                            .into_iter()
+                            .map(|fault| Trouble::new(fault.message).at(mark).below(&format!("{place}.{}", fault.place))),
+                    );
+                    continue;
+                }
+                Err(other) => return Err(other),
+            };
+            for robot in &mut found {
+                let own = std::mem::take(&mut robot.sets);
+                robot.set_values(&file.set);
+                robot.set_values(&source.set);
+                robot.sets.extend(own);
+                robot.groups = robot.groups.or(&source.groups).or(&file.groups);
+            }
+            robots.extend(found);
+        }
+        let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
+        for robot in &robots {
+            *seen.entry(&robot.name).or_default() += 1;
+        }
+        for (name, times) in seen.into_iter().filter(|(_, times)| *times > 1) {
+            let message = format!("{times} robots have the name {name:?}; names tell robots apart");
+            troubles.push(Trouble::new(message).at(tree.nearest_mark("robots")).below("robots"));
+        }
+        for (index, exception) in file.overrides.iter().enumerate() {
+            for (k, pattern) in exception.robots.iter().enumerate() {
+                if !robots.iter().any(|robot| matches(pattern, &robot.name)) {
+                    let place = format!("overrides[{index}].robots[{k}]");
+                    let message = format!("no robot has a name like {pattern:?}");
+                    troubles.push(Trouble::new(message).at(tree.nearest_mark(&place)).below(&place));
+                }
+            }
+            for robot in &mut robots {
+                if exception.robots.iter().any(|pattern| matches(pattern, &robot.name)) {
+                    robot.set_values(&exception.set);
+                    robot.groups = exception.groups.or(&robot.groups);
+                }
+            }
+        }
+        if troubles.is_empty() { Ok(Self(robots)) } else { Err(faulty(&path.display().to_string(), troubles)) }
+    }
+
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.0.iter().position(|robot| robot.name == name)
+    }
+}
+
+fn found(folder: &Path, file: &FleetFile, source: &Source, store: &Store) -> Result<Vec<Robot>> {
+    if let Some(pattern) = &source.folders {
+        return folders(folder, pattern, source.variable.as_deref().unwrap_or(FOLDER));
+    }
+    if let Some(path) = &source.list {
+        return list::read(&folder.join(path), source.variable.as_deref().unwrap_or(FOLDER));
+    }
+    match (&source.recording, &source.variable) {
+        (Some(path), Some(variable)) => partition::read(&folder.join(path), &source.by, variable, &file.name, store),
+        _ => Ok(Vec::new()),
+    }
+}
+
+fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<Robot>> {
+    let base = folder.to_str().ok_or_else(|| Error::spec("folders", "the folder of this file has a name that is not UTF-8"))?;
+    let whole = if base.is_empty() { pattern.to_string() } else { format!("{}/{pattern}", glob::Pattern::escape(base)) };
+    let paths = glob::glob(&whole).map_err(|error| Error::spec("folders", format!("`{pattern}` is no pattern: {error}")))?;
+    let mut robots = Vec::new();
+    for path in paths {
+        let path = path.map_err(|error| Error::spec("folders", format!("`{pattern}`: {error}")))?;
+        if !path.is_dir() {
+            continue;
+        }
+        let raw = path.file_name().unwrap_or(path.as_os_str());
+        let mut robot = Robot::new(raw.to_string_lossy().into_owned());
+        match path.to_str() {
+            Some(text) => robot.set_text(variable, text),
+            None => {
+                // Two such names may look alike once they are text.
+                robot.name = format!("{} ({})", robot.name, &blake3::hash(raw.as_encoded_bytes()).to_hex()[..8]);
+                robot.unreadable = Some("the folder's name is not UTF-8: rename it".into());
+            }
+        }
+        robots.push(robot);
+    }
+    if robots.is_empty() {
+        return Err(Error::spec("folders", format!("no folder matches `{pattern}` (relative to this file)")));
+    }
+    robots.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(robots)
+}
+
+/// Whether a name is like a pattern in which `*` stands for anything.
+fn matches(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((head, rest)) => name
+            .strip_prefix(head)
+            .is_some_and(|tail| (0..=tail.len()).any(|at| tail.is_char_boundary(at) && matches(rest, &tail[at..]))),
+    }
+}
+
+/// Text as YAML, whatever is in it.
+fn quoted(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => out.extend(['\\', c]),
+            ' '..='~' => out.push(c),
+            c => out.push_str(&format!("\\U{:08X}", u32::from(c))),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// A value as YAML on one line.
+fn written(value: &Value) -> String {
+    match value {
+        Value::String(text) => quoted(text),
+        Value::Array(items) => format!("[{}]", items.iter().map(written).collect::<Vec<_>>().join(", ")),
+        Value::Object(map) => {
+            let entry = |(key, value): (&String, &Value)| format!("{}: {}", quoted(key), written(value));
+            format!("{{{}}}", map.iter().map(entry).collect::<Vec<_>>().join(", "))
+        }
+        plain => plain.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_survives_the_way_through_yaml() {
+        for text in
+            ["r'1\"", "a\nb", "$(reboot)", "../x", "# no: [comment", "\u{85}\u{2028}\u{1f916}", "", "null", "1e3", "tab\there"]
+        {
+            let (node, troubles) = crate::yaml::parse(&quoted(text));
+            assert!(troubles.is_empty(), "{text:?}: {troubles:?}");
+            assert_eq!(node.and_then(|node| node.text()).as_deref(), Some(text));
+        }
+    }
+
+    #[test]
+    fn a_star_stands_for_anything() {
+        let like = |pattern: &str| matches(pattern, "cell-4 r7");
+        assert!(like("*") && like("cell-*") && like("*r7") && like("c*4*7") && like("cell-4 r7"));
+        assert!(!like("cell") && !like("*r8") && !like("r7*"));
+    }
+}

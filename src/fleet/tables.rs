@@ -1,0 +1,158 @@
+//! Records -> the fleet's tables and page, published as any other: equal records give equal tables.
+
+use super::Fleet;
+use super::ledger::{Ending, Ledger, Record};
+use super::recalibration::{self, Limits};
+use crate::error::Result;
+use crate::report::fleet as page;
+use crate::store::{Account, KEY_FORMAT, Product, StageKey, TableRef};
+use crate::table::{Changes, Findings, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict};
+use rayon::prelude::*;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// The stage's id and name in keys and paths.
+const STAGE: &str = "fleet";
+
+/// What a fleet came to.
+pub struct Told {
+    pub fleet: FleetTable,
+    pub changes: FleetChanges,
+    /// Where people find the tables and the page.
+    pub tables: Vec<PathBuf>,
+    pub page: PathBuf,
+}
+
+/// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.
+pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Result<Told> {
+    let earlier = recalibration::Earlier::find(fleet, ledger)?;
+    let read: Vec<Read> = records.par_iter().map(|record| Read::of(ledger, record.as_ref())).collect::<Result<_>>()?;
+    let changes: Vec<(&str, &Changes)> = (fleet.roster.0.iter().zip(&read))
+        .filter_map(|(robot, read)| Some((robot.name.as_str(), read.changes.as_ref()?)))
+        .collect();
+    let alpha = fleet.file.previous.as_ref().map_or(1.0, |previous| previous.alpha);
+    let changes = recalibration::with_limits(&changes, &Limits { alpha });
+    let mut table = FleetTable::default();
+    for ((robot, record), read) in fleet.roster.0.iter().zip(records).zip(&read) {
+        let mut row = read.row(robot, record.as_ref());
+        if let (Some(earlier), Some(_)) = (&earlier, record.as_ref().filter(|record| record.ending == Ending::Done)) {
+            let findings = read.findings.as_ref();
+            let flags = earlier.flags(ledger, &robot.name, &changes, findings)?;
+            row.changes = Some(changes.0.iter().filter(|change| change.robot == robot.name && change.flagged).count() as i64);
+            row.flags = (!flags.is_empty()).then(|| flags.join("; "));
+        }
+        table.0.push(row);
+    }
+    let links: BTreeMap<String, String> = (fleet.roster.0.iter().zip(records))
+        .filter_map(|(robot, record)| {
+            let record = record.as_ref()?;
+            let document = record.documents.first()?;
+            Some((robot.name.clone(), format!("../{}.{}/{document}", fleet.name(), record.handle)))
+        })
+        .collect();
+    let html = page::html(fleet.name(), &table, &changes, &links)?;
+    let key = key(fleet, &table, records);
+    let products = vec![
+        ("fleet".to_string(), Product::Frame(table.to_frame()?)),
+        ("fleet_changes".into(), Product::Frame(changes.to_frame()?)),
+    ];
+    let published = ledger.store.publish(&key, products, Account::default())?;
+    let mut tables = Vec::new();
+    for (port, made) in &published.record.tables {
+        tables.push(ledger.store.expose(fleet.name(), STAGE, port, made)?);
+    }
+    let page = ledger.store.expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
+    Ok(Told { fleet: table, changes, tables, page })
+}
+
+/// What the tables were made of: the settings and the robots' own tables.
+fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<Record>]) -> StageKey {
+    let robots = fleet.roster.0.iter().zip(&table.0).zip(records).map(|((robot, row), record)| {
+        let tables = record.iter().flat_map(|record| &record.tables).map(|made| made.table.table_hash.to_string());
+        json!([robot.name, robot.groups, row.status, row.reason, row.flags, tables.collect::<Vec<_>>()])
+    });
+    let alpha = fleet.file.previous.as_ref().map(|previous| previous.alpha);
+    StageKey {
+        key_format: KEY_FORMAT,
+        id: STAGE.into(),
+        stage: STAGE.into(),
+        implementation: 1,
+        settings: json!({ "robots": robots.collect::<Vec<_>>(), "alpha": alpha }),
+        reads: BTreeMap::new(),
+        files: BTreeMap::new(),
+        schemas: BTreeMap::new(),
+        seed: 0,
+    }
+}
+
+/// The tables of a robot that the fleet's row is made of.
+#[derive(Default)]
+struct Read {
+    statistics: Option<Statistics>,
+    verdict: Option<Verdict>,
+    findings: Option<Findings>,
+    changes: Option<Changes>,
+}
+
+impl Read {
+    fn of(ledger: &Ledger, record: Option<&Record>) -> Result<Self> {
+        let Some(record) = record else { return Ok(Self::default()) };
+        Ok(Self {
+            statistics: load(ledger, record.last(Statistics::KIND))?,
+            verdict: load(ledger, record.last(Verdict::KIND))?,
+            findings: load(ledger, record.last(Findings::KIND))?,
+            changes: load(ledger, record.last(Changes::KIND))?,
+        })
+    }
+
+    fn row(&self, robot: &super::Robot, record: Option<&Record>) -> FleetRow {
+        let rows = self.statistics.as_ref().map(told_rows).unwrap_or_default();
+        let (first, last) = (rows.first().copied(), rows.last().copied());
+        let verdict = self.verdict.as_ref().and_then(|verdict| verdict.0.first());
+        // A pipeline that does not predict with what it found still says how much better that is.
+        let diagnosed = verdict.filter(|_| last.is_none());
+        let course = rows.iter().map(|row| format!("{:.4}", row.rms_mm)).collect::<Vec<_>>().join(" ");
+        FleetRow {
+            robot: robot.name.clone(),
+            model: robot.groups.model.clone(),
+            plant: robot.groups.plant.clone(),
+            campaign: robot.groups.campaign.clone(),
+            status: record.map_or("missing", |record| record.ending.name()).into(),
+            reason: record.and_then(|record| record.reason.clone()),
+            points: last.map(|row| row.points),
+            held_out: last.map(|row| row.held_out),
+            before_mean_mm: first.map(|row| row.mean_mm).or(diagnosed.and_then(|v| v.before_mean_mm)),
+            before_rms_mm: first.map(|row| row.rms_mm).or(diagnosed.and_then(|v| v.before_rms_mm)),
+            before_max_mm: first.map(|row| row.max_mm).or(diagnosed.and_then(|v| v.before_max_mm)),
+            after_mean_mm: last.map(|row| row.mean_mm).or(diagnosed.and_then(|v| v.after_mean_mm)),
+            after_rms_mm: last.map(|row| row.rms_mm).or(diagnosed.and_then(|v| v.after_rms_mm)),
+            after_max_mm: last.map(|row| row.max_mm).or(diagnosed.and_then(|v| v.after_max_mm)),
+            floor_mm: verdict.map(|v| v.noise_floor_mm).or(last.map(|row| row.noise_rms_mm)),
+            course: (!course.is_empty()).then_some(course),
+            verdict: verdict.map(|v| v.verdict.clone()),
+            findings: self.findings.as_ref().map(|findings| findings.0.len() as i64),
+            causes: self.findings.as_ref().map(causes).filter(|causes| !causes.is_empty()),
+            changes: None,
+            flags: None,
+        }
+    }
+}
+
+/// `effect at place`, strongest first.
+pub(super) fn causes(findings: &Findings) -> String {
+    findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect::<Vec<_>>().join("; ")
+}
+
+pub(super) fn load<T: Table>(ledger: &Ledger, table: Option<&TableRef>) -> Result<Option<T>> {
+    table.map(|table| T::from_frame(&ledger.store.load(table)?)).transpose()
+}
+
+/// One row a step, in pipeline order: of held-out points where the last step has some, of the set with most of them.
+fn told_rows(statistics: &Statistics) -> Vec<&StatisticsRow> {
+    let Some(last) = statistics.0.iter().map(|row| row.order).max() else { return Vec::new() };
+    let of = |order: i64, held_out: bool| statistics.0.iter().filter(move |row| row.order == order && row.held_out == held_out);
+    let held_out = of(last, true).next().is_some();
+    let Some(set) = of(last, held_out).max_by_key(|row| row.points).map(|row| row.set.as_str()) else { return Vec::new() };
+    (0..=last).filter_map(|order| of(order, held_out).find(|row| row.set == set)).collect()
+}

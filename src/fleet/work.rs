@@ -1,0 +1,170 @@
+//! One robot: its plan, its key, its run and its record.
+
+use super::Fleet;
+use super::ledger::{Ending, LATER, Ledger, Made, Record};
+use super::roster::Robot;
+use crate::error::{Error, Result};
+use crate::pipeline::{Observer, Plan, RunOptions, Selection, StageReport, Surroundings, run};
+use crate::stage::STAGES;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Whoever watches a fleet: bars on a terminal, lines in a log.
+pub trait Watcher: Sync {
+    /// A worker (from 0) begins a robot.
+    fn begins(&self, worker: usize, robot: &str);
+    /// The robot's pipeline comes to a stage.
+    fn stage(&self, worker: usize, stage: &str);
+    /// The robot is recorded; `fresh` where this worker computed it.
+    fn ends(&self, worker: usize, record: &Record, fresh: bool);
+}
+
+/// What a visit to a robot came to.
+pub enum Visit {
+    /// Its record stood already.
+    Recorded(Record),
+    /// It was computed now.
+    Made(Record),
+    /// Another living process has it in hand.
+    Busy,
+}
+
+/// Where robots are computed.
+pub struct Workshop<'a> {
+    pub fleet: &'a Fleet,
+    pub ledger: Ledger<'a>,
+    /// Fresh for every run.
+    pub surroundings: &'a (dyn Fn() -> Surroundings + Sync),
+    /// E.g. the host.
+    pub name: String,
+    /// Where this process' own words go, among the fleet's logs.
+    pub log: Option<String>,
+    /// Threads inside one robot's run; no result depends on it.
+    pub threads: usize,
+}
+
+/// Longer reasons are cut; the run's manifest has them whole.
+const REASON: usize = 2000;
+
+impl Workshop<'_> {
+    /// The robot's plan with all that is set for it.
+    pub fn plan(&self, robot: &Robot) -> Result<Plan> {
+        if let Some(reason) = &robot.unreadable {
+            return Err(Error::data("", reason.clone()));
+        }
+        let mut plan = Plan::parse(&self.fleet.pipeline, self.fleet.text.clone(), &robot.sets, STAGES)?;
+        // Tables and documents of every robot have a folder of their own.
+        plan.name = format!("{}.{}", self.fleet.name(), robot.handle());
+        Ok(plan)
+    }
+
+    /// The plan, or why there is none, and the key of the robot's record.
+    fn prepared(&self, robot: &Robot) -> (Result<Plan>, String) {
+        let plan = self.plan(robot).and_then(|plan| plan.identity().map(|identity| (plan, identity)));
+        let (plan, content) = match plan {
+            Ok((plan, identity)) => (Ok(plan), identity),
+            // With the reason mended it is another key.
+            Err(error) => {
+                let text = error.to_string();
+                (Err(error), text)
+            }
+        };
+        let whole = serde_json::json!([robot.name, content]).to_string();
+        (plan, blake3::hash(whole.as_bytes()).to_hex().to_string())
+    }
+
+    /// The key of the robot's record.
+    pub fn key(&self, robot: &Robot) -> String {
+        self.prepared(robot).1
+    }
+
+    /// The robot's record, where there is one for its settings and data as they are.
+    pub fn record(&self, robot: &Robot) -> Result<Option<Record>> {
+        self.ledger.find(&self.prepared(robot).1)
+    }
+
+    /// Computes a robot unless it is recorded. Fails where the store does.
+    pub fn visit(&self, robot: &Robot, worker: usize, watcher: &dyn Watcher) -> Result<Visit> {
+        let (plan, key) = self.prepared(robot);
+        let standing = |ledger: &Ledger| ledger.find(&key).map(|found| found.filter(|record| record.exit_code != LATER));
+        if let Some(record) = standing(&self.ledger)? {
+            watcher.ends(worker, &record, false);
+            return Ok(Visit::Recorded(record));
+        }
+        let Some(claim) = self.ledger.claim(&key)? else { return Ok(Visit::Busy) };
+        if let Some(record) = standing(&self.ledger)? {
+            watcher.ends(worker, &record, false);
+            return Ok(Visit::Recorded(record));
+        }
+        // What may work now is tried again.
+        self.ledger.forget(&key)?;
+        watcher.begins(worker, &robot.name);
+        let record = self.compute(robot, plan, key, worker, watcher);
+        let record = self.ledger.put(record)?;
+        drop(claim);
+        watcher.ends(worker, &record, true);
+        Ok(Visit::Made(record))
+    }
+
+    fn compute(&self, robot: &Robot, plan: Result<Plan>, key: String, worker: usize, watcher: &dyn Watcher) -> Record {
+        let surroundings = (self.surroundings)();
+        let begun = (surroundings.now)();
+        let mut record = Record::blank(robot, key, &format!("{}/{worker}", self.name));
+        record.log.clone_from(&self.log);
+        let observer = Relay { worker, watcher };
+        let options = RunOptions { selection: Selection::default(), jobs: self.threads };
+        let result = plan.and_then(|plan| {
+            record.run = Some(surroundings.run_id.clone());
+            let body = || run(&plan, self.ledger.store, &options, &surroundings, &observer);
+            catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|_| Err(Error::Bug("the run panicked".into())))
+        });
+        let ended = (surroundings.now)();
+        record.wall_seconds = ended.duration_since(begun).unwrap_or_default().as_secs_f64();
+        record.ended = jiff::Timestamp::try_from(ended).map(|time| format!("{time:.3}")).unwrap_or_default();
+        match result {
+            Ok(outcome) => {
+                record.documents = outcome
+                    .documents
+                    .iter()
+                    .filter_map(|path| path.file_name())
+                    .map(|name| name.to_string_lossy().into_owned())
+                    .collect();
+                for stage in outcome.manifest.stages {
+                    let made = stage.outputs.into_iter().map(|output| Made {
+                        stage: stage.id.clone(),
+                        port: output.port,
+                        kind: output.kind,
+                        table: output.table,
+                    });
+                    record.tables.extend(made);
+                }
+            }
+            Err(error) => {
+                record.ending = match &error {
+                    Error::Spec(_) | Error::Data(_) => Ending::Rejected,
+                    Error::Store(_) | Error::Bug(_) => Ending::Failed,
+                };
+                // A setting that one robot's data do not bear is a fault of its data, as the pipeline serves others.
+                record.exit_code = if record.ending == Ending::Rejected { 10 } else { error.exit_code() };
+                record.reason = Some(error.to_string().chars().take(REASON).collect());
+            }
+        }
+        record
+    }
+}
+
+/// Passes on what a person sees of a robot among thousands: the stage it is at. The rest is in the run's manifest.
+struct Relay<'a> {
+    worker: usize,
+    watcher: &'a dyn Watcher,
+}
+
+impl Observer for Relay<'_> {
+    fn stage_begins(&self, id: &str, _uses: &str, _reason: &str) {
+        self.watcher.stage(self.worker, id);
+    }
+    fn stage_ends(&self, _report: &StageReport) {}
+    fn begin(&self, _id: &str, _what: &str, _total: Option<u64>, _unit: &str) {}
+    fn advance(&self, _id: &str, _done: u64, _message: &str) {}
+    fn note(&self, _id: &str, _line: &str) {}
+    fn warn(&self, _id: &str, _line: &str) {}
+}

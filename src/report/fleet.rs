@@ -1,0 +1,155 @@
+//! A fleet as one self-contained page: every robot a row, sorted and filtered in the browser without a request.
+
+use crate::error::{Error, Result};
+use crate::report::svg::Svg;
+use crate::table::{FleetChanges, FleetRow, FleetTable};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+#[derive(Serialize)]
+struct Page<'a> {
+    name: &'a str,
+    version: &'static str,
+    style: &'static str,
+    script: &'static str,
+    counts: Vec<(String, usize)>,
+    robots: Vec<Row<'a>>,
+    changes: Vec<Change<'a>>,
+    flagged: usize,
+    diagnosed: bool,
+    compared: bool,
+    grouped: bool,
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    name: String,
+    link: Option<&'a str>,
+    group: String,
+    status: &'a str,
+    reason: Option<&'a str>,
+    before: Option<Figure>,
+    after: Option<Figure>,
+    largest: Option<Figure>,
+    floor: Option<Figure>,
+    held_out: bool,
+    spark: Option<String>,
+    verdict: Option<String>,
+    causes: Option<&'a str>,
+    flags: Option<&'a str>,
+}
+
+/// A figure as people read it and as the page sorts it.
+#[derive(Serialize)]
+struct Figure {
+    shown: String,
+    value: f64,
+}
+
+#[derive(Serialize)]
+struct Change<'a> {
+    robot: String,
+    effect: &'a str,
+    place: &'a str,
+    parameter: &'a str,
+    change: String,
+    sigma: String,
+    limit: String,
+    unit: &'a str,
+}
+
+/// The page; `links` are the robots' own reports, relative to it.
+pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTreeMap<String, String>) -> Result<String> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for row in &fleet.0 {
+        *counts.entry(&row.status).or_default() += 1;
+    }
+    let page = Page {
+        name,
+        version: env!("CARGO_PKG_VERSION"),
+        style: include_str!("fleet.css"),
+        script: include_str!("fleet.js"),
+        counts: counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect(),
+        robots: fleet.0.iter().map(|row| self::row(row, links)).collect(),
+        changes: changes.0.iter().filter(|row| row.flagged).map(change).collect(),
+        flagged: fleet.0.iter().filter(|row| row.flags.is_some()).count(),
+        diagnosed: fleet.0.iter().any(|row| row.verdict.is_some()),
+        compared: fleet.0.iter().any(|row| row.changes.is_some()),
+        grouped: fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
+    };
+    let mut environment = minijinja::Environment::new();
+    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
+    environment
+        .add_template("fleet.html", include_str!("fleet.html"))
+        .and_then(|()| environment.get_template("fleet.html")?.render(minijinja::value::Serde(&page)))
+        .map_err(|error| Error::Bug(format!("the fleet's page: {error}")))
+}
+
+fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Row<'a> {
+    let figure = |value: Option<f64>| value.map(|value| Figure { shown: format!("{value:.3}"), value });
+    let group: Vec<&str> = [&row.model, &row.plant, &row.campaign].into_iter().filter_map(|group| group.as_deref()).collect();
+    Row {
+        name: visible(&row.robot),
+        link: links.get(&row.robot).map(String::as_str),
+        group: group.join(", "),
+        status: &row.status,
+        reason: row.reason.as_deref(),
+        before: figure(row.before_rms_mm),
+        after: figure(row.after_rms_mm),
+        largest: figure(row.after_max_mm),
+        floor: figure(row.floor_mm),
+        held_out: row.held_out.unwrap_or(true),
+        spark: row.course.as_deref().and_then(|course| spark(course, row.floor_mm)),
+        verdict: row.verdict.as_ref().map(|verdict| verdict.replace('_', " ")),
+        causes: row.causes.as_deref(),
+        flags: row.flags.as_deref(),
+    }
+}
+
+fn change(row: &crate::table::FleetChangeRow) -> Change<'_> {
+    let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
+    let show = |value: f64| format!("{:.3e}", value * factor);
+    Change {
+        robot: visible(&row.robot),
+        effect: &row.effect,
+        place: &row.place,
+        parameter: &row.parameter,
+        change: show(row.change),
+        sigma: show(row.sigma),
+        limit: show(row.limit),
+        unit,
+    }
+}
+
+/// A name with what cannot be seen made visible.
+fn visible(name: &str) -> String {
+    let hidden =
+        |c: char| c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    name.chars().map(|c| if hidden(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+}
+
+/// Width and height of a sparkline.
+const SIZE: [f64; 2] = [72.0, 18.0];
+
+/// The error after every step on a logarithmic scale, with the noise as a line below.
+fn spark(course: &str, floor: Option<f64>) -> Option<String> {
+    let values: Vec<f64> = course.split(' ').filter_map(|value| value.parse::<f64>().ok()).filter(|value| *value > 0.0).collect();
+    if values.len() < 2 {
+        return None;
+    }
+    let floor = floor.filter(|floor| *floor > 0.0);
+    let all = || values.iter().copied().chain(floor);
+    let (low, high) = (all().fold(f64::INFINITY, f64::min).ln(), all().fold(0.0, f64::max).ln());
+    let height = |value: f64| 1.0 + (SIZE[1] - 2.0) * (high - value.ln()) / (high - low).max(1e-9);
+    let step = (SIZE[0] - 4.0) / (values.len() - 1) as f64;
+    let points: Vec<[f64; 2]> = values.iter().enumerate().map(|(i, value)| [2.0 + step * i as f64, height(*value)]).collect();
+    let mut svg = Svg::new(SIZE[0], SIZE[1]);
+    if let Some(floor) = floor {
+        svg.line("floor", [0.0, height(floor)], [SIZE[0], height(floor)]);
+    }
+    svg.path("course", &points);
+    if let Some(last) = points.last() {
+        svg.circle("end", *last, 1.5);
+    }
+    Some(svg.finish(&format!("rms error after each step, mm: {course}")))
+}

@@ -1,0 +1,180 @@
+//! `compare`: what changed on the robot since an earlier recording of it; the earlier model is the prior and the comparison.
+
+use crate::effect::{BaseFrame, Load};
+use crate::error::Result;
+use crate::estimate::{FitOptions, Fitted, Model, Prior, Session, align, changes};
+use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::stage::repeated::Repeatability;
+use crate::stage::screened::fit_rows;
+use crate::stage::{Context, RawFile, Stage, reads, writes};
+use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
+use crate::units::Unit;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+
+/// Settings of `compare`. A fleet file with `previous` fills the files in; without them the table is empty.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Compare {
+    /// Table `parameters` of the earlier model, Parquet.
+    pub previous_parameters: Option<RawFile>,
+    /// Table `recording` that it was fitted to, Parquet.
+    pub previous_recording: Option<RawFile>,
+    /// The tracker's noise.
+    pub tracker: Instrument,
+    /// How well joints come back to a pose, as in `identify`.
+    pub repeatability: Repeatability,
+}
+
+reads! {
+    /// Input ports of [`Compare`].
+    pub struct CompareReads {
+        robot: Robot,
+        recording: Recording,
+        split: Split,
+    }
+}
+writes! {
+    pub struct CompareWrites {
+        changes: Changes,
+    }
+}
+
+impl Stage for Compare {
+    const NAME: &'static str = "compare";
+    const SUMMARY: &'static str = "Tests which parameters changed since an earlier recording of the same robot";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = CompareReads;
+    type Writes = CompareWrites;
+
+    fn check(&self) -> Vec<crate::error::Fault> {
+        let fault = |place: &str, message: &str| crate::error::Fault::new(place, message);
+        let one = self.previous_parameters.is_some() != self.previous_recording.is_some();
+        let missing = one.then(|| fault("previous_recording", "`previous_parameters` and `previous_recording` go together"));
+        missing
+            .into_iter()
+            .chain(self.tracker.fault().map(|text| fault("tracker", text)))
+            .chain(self.repeatability.fault())
+            .collect()
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        let files = [("previous_parameters", &self.previous_parameters), ("previous_recording", &self.previous_recording)];
+        files.into_iter().filter_map(|(place, file)| Some((place.to_string(), file.clone()?))).collect()
+    }
+
+    fn run(&self, reads: CompareReads, context: &Context) -> Result<CompareWrites> {
+        let (Some(parameters), Some(recording)) = (&self.previous_parameters, &self.previous_recording) else {
+            context.services.note("no earlier model to compare with".into());
+            return Ok(CompareWrites { changes: Changes::default() });
+        };
+        let earlier: Parameters = table(context, parameters)?;
+        let recording: Recording = table(context, recording)?;
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let first = self.session(&robot, &earlier, &recording, None, context)?;
+        let second = self.session(&robot, &earlier, &reads.recording, Some(&reads.split), context)?;
+        let specs = first.model.stack.specs();
+        let precedence = |k: usize| ORDER.iter().position(|name| specs[k].name.starts_with(name)).unwrap_or(ORDER.len());
+        let found = changes(&first.as_session(), &second.as_session(), precedence);
+        let mut rows = Vec::new();
+        for change in found {
+            let spec = &specs[change.parameter];
+            let Some(before) = earlier.0.iter().find(|row| row.name == spec.name) else { continue };
+            let show = |value: f64| spec.unit.from_si(value);
+            if let Some(rank) = change.rank {
+                context.services.note(format!(
+                    "{rank}. {} {}: {} by {:.4e} +- {:.1e} {}",
+                    effect(&before.effect),
+                    spec.place,
+                    spec.name,
+                    show(change.step),
+                    show(change.sigma),
+                    spec.unit.symbol()
+                ));
+            }
+            rows.push(ChangeRow {
+                name: spec.name.clone(),
+                effect: effect(&before.effect).into(),
+                place: spec.place.clone(),
+                unit: spec.unit.symbol().into(),
+                previous: before.value,
+                change: show(change.step),
+                sigma: show(change.sigma),
+                p_value: change.p_value,
+                rank: change.rank.map(|rank| rank as i64),
+            });
+        }
+        rows.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(CompareWrites { changes: Changes(rows) })
+    }
+}
+
+/// What changes by itself on a robot, the commonest first: a zero after a collision, a tool, wear of a drive.
+const ORDER: [&str; 4] = ["joint_offset.", "tool_offset.", "joint_compliance.", "link_geometry."];
+
+/// The effect that a change of a parameter is.
+fn effect(name: &str) -> &str {
+    match name {
+        "joint_offset" => "zero_shift",
+        "tool_offset" => "tool_shift",
+        other => other,
+    }
+}
+
+fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
+    let mut source = context.services.open(file)?;
+    let mut bytes = Vec::new();
+    source.reader.read_to_end(&mut bytes).map_err(|error| crate::error::Error::data(&source.label, error.to_string()))?;
+    from_parquet(&source.label, bytes)
+}
+
+/// A recording with its fit.
+struct Fit {
+    data: Measurements,
+    rows: Vec<usize>,
+    model: Model,
+    fitted: Fitted,
+}
+
+impl Fit {
+    fn as_session(&self) -> Session<'_> {
+        Session { data: &self.data, rows: &self.rows, model: &self.model, fitted: &self.fitted }
+    }
+}
+
+impl Compare {
+    /// The earlier model fitted anew to a recording, from its values and held near them.
+    fn session(
+        &self,
+        robot: &RobotModel,
+        earlier: &Parameters,
+        recording: &Recording,
+        split: Option<&Split>,
+        context: &Context,
+    ) -> Result<Fit> {
+        let mut data = recording.measurements(&self.tracker);
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        let mut placed = earlier.clone();
+        let base = align(robot, &data, &rows);
+        let (translation, rotation) = (base.translation, base.rotation_vector());
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
+                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
+                placed.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
+            }
+        }
+        let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;
+        for (k, spec) in model.stack.specs().iter().enumerate().filter(|(_, spec)| !spec.name.starts_with(BaseFrame::NAME)) {
+            let prior = Prior { mean: model.x[k], sigma: spec.prior_sigma };
+            model.known.entry(k).or_default().prior = Some(prior);
+        }
+        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        self.repeatability.apply(&model, &mut data, &rows, context);
+        let whole = Split::default();
+        let options = FitOptions { rows: &rows, candidates: &candidates };
+        let (fitted, screening) = fit_rows(&mut model, &data, &options, split.unwrap_or(&whole), split.is_some());
+        let rows = if split.is_some() { screening.kept } else { rows };
+        Ok(Fit { data, rows, model, fitted })
+    }
+}

@@ -1,0 +1,69 @@
+//! Notes below the store that are no tables: small JSON files and parts of inputs, put in place whole.
+
+use serde::Serialize;
+use serde_json::Value;
+use std::fs;
+use std::path::PathBuf;
+
+use super::Store;
+use super::disk::{component, put_if_absent, refused, replace, write_synced};
+use crate::error::{Error, Result};
+
+impl Store {
+    /// Where a note lies; fails where a part of its place cannot be a file name.
+    pub fn place_of_note(&self, place: &[&str], name: &str) -> Result<PathBuf> {
+        let mut path = self.root().to_path_buf();
+        for part in place.iter().chain([&name]) {
+            path.push(component(part)?);
+        }
+        Ok(path)
+    }
+
+    /// A note, where there is one. A torn one is none.
+    pub fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
+        let path = self.place_of_note(place, name)?;
+        match fs::read(&path) {
+            Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(refused(&path, "read", &error)),
+        }
+    }
+
+    /// Writes a note over what may be there.
+    pub fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
+        self.put_file(place, name, &text(note)?)
+    }
+
+    /// Writes a note if there is none; false where one stands.
+    pub fn put_note_once(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<bool> {
+        let path = self.place_of_note(place, name)?;
+        let aside = self.workspace()?.fresh();
+        write_synced(&aside, &text(note)?)?;
+        let fresh = put_if_absent(&aside, &path)?;
+        let _ = fs::remove_file(&aside);
+        Ok(fresh)
+    }
+
+    /// Writes a file over what may be there.
+    pub fn put_file(&self, place: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.place_of_note(place, name)?;
+        let aside = self.workspace()?.fresh();
+        write_synced(&aside, bytes)?;
+        replace(&aside, &path)
+    }
+
+    /// Takes a note away; nothing where there is none.
+    pub fn drop_note(&self, place: &[&str], name: &str) -> Result<()> {
+        let path = self.place_of_note(place, name)?;
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(refused(&path, "remove", &error)),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn text(note: &impl Serialize) -> Result<Vec<u8>> {
+    let mut text = serde_json::to_vec_pretty(note).map_err(|error| Error::Bug(error.to_string()))?;
+    text.push(b'\n');
+    Ok(text)
+}

@@ -1,0 +1,161 @@
+//! Fleets: many robots through one pipeline, whatever their names, whoever is killed.
+
+mod browser;
+mod killed;
+mod names;
+mod recalibrated;
+mod rosters;
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn pipeline() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/fleet/pipeline.yaml")
+}
+
+fn calib(words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_calib"));
+    command.args(words);
+    command
+}
+
+fn fleet(verb: &str, file: &Path, store: &Path) -> Command {
+    let mut command = calib(&["fleet", verb]);
+    command.arg(file).arg("--store").arg(store);
+    command
+}
+
+fn output(command: &mut Command) -> (Output, String) {
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output, said)
+}
+
+/// The document of a run that ends with a code.
+fn run(file: &Path, store: &Path, code: i32) -> Value {
+    let (output, said) = output(fleet("run", file, store).args(["--json", "--quiet"]));
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Recordings of different robots: `DIR/recordings/c0001`.
+fn recordings(folder: &Path, cases: usize) {
+    let (output, said) = output(calib(&["simulate", "conceal", "--points", "40", "--robot", "compact6", "--nulls", "1"]).args([
+        "--cases",
+        &cases.to_string(),
+        "--out",
+        folder.to_str().unwrap(),
+    ]));
+    assert!(output.status.success(), "{said}");
+}
+
+fn write(path: PathBuf, text: &str) -> PathBuf {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+/// A fleet file beside its recordings.
+fn file(folder: &Path, name: &str, rest: &str) -> PathBuf {
+    let text = format!("calib: 1\nname: {name}\npipeline: {}\n{rest}", pipeline().display());
+    write(folder.join(format!("{name}.yaml")), &text)
+}
+
+/// Hash of the fleet's tables by port.
+fn tables(store: &Path, name: &str) -> BTreeMap<String, String> {
+    let folder = store.join("tables").join(name);
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap().flatten() {
+        let bytes = std::fs::read(entry.path()).unwrap();
+        found.insert(entry.file_name().into_string().unwrap(), blake3::hash(&bytes).to_hex().to_string());
+    }
+    assert_eq!(found.keys().collect::<Vec<_>>(), ["fleet.fleet.parquet", "fleet.fleet_changes.parquet"]);
+    found
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().flatten() {
+        std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+    }
+}
+
+#[test]
+fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
+    recordings(&cases, 5);
+    let recordings = cases.join("recordings");
+    std::fs::write(recordings.join("c0002/tracker.csv"), "point_id,x_mm\n1,wrong\n").unwrap();
+    std::fs::remove_file(recordings.join("c0003/robot.json")).unwrap();
+    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let (result, said) = output(&mut fleet("run", &file, &store));
+    assert_eq!(result.status.code(), Some(10), "{said}");
+    for line in ["error: 2 faults", "c0002: rejected: ", "c0003: rejected: ", "robot.json"] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    let told = run(&file, &store, 10);
+    assert_eq!((told["done"].as_u64(), told["rejected"].as_u64(), told["computed"].as_u64()), (Some(3), Some(2), Some(0)));
+    assert!(told["robots"][0]["after_rms_mm"].as_f64().unwrap() < told["robots"][0]["before_rms_mm"].as_f64().unwrap());
+
+    // Mended data are other data: the same command takes them up.
+    copy(&recordings.join("c0001"), &recordings.join("c0003"));
+    let told = run(&file, &store, 10);
+    assert_eq!((told["done"].as_u64(), told["computed"].as_u64()), (Some(4), Some(1)));
+    // Asked for, what was rejected is tried again.
+    let (result, said) = output(fleet("retry", &file, &store).args(["--failed", "--json", "--quiet"]));
+    assert_eq!(result.status.code(), Some(10), "{said}");
+    let told: Value = serde_json::from_slice(&result.stdout).unwrap();
+    assert_eq!(told["computed"].as_u64(), Some(1));
+    let (result, _) = output(fleet("status", &file, &store).args(["--robot", "c0002"]));
+    let text = String::from_utf8(result.stdout).unwrap();
+    assert!(text.starts_with("c0002: rejected\n") && text.contains("manifest.json"), "{text}");
+}
+
+#[test]
+fn a_cancelled_run_stops_and_the_next_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
+    recordings(&cases, 12);
+    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let mut command = fleet("run", &file, &store);
+    command.args(["--quiet", "-j", "1"]).stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let begun = std::time::Instant::now();
+    while killed::records(&store, "line").is_empty() {
+        assert!(begun.elapsed().as_secs() < 25 && child.try_wait().unwrap().is_none(), "no record");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let (result, said) = output(&mut fleet("cancel", &file, &store));
+    assert!(result.status.success(), "{said}");
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let stood = killed::records(&store, "line").len();
+    assert!(stood < 12, "{stood}");
+    let told = run(&file, &store, 0);
+    assert_eq!((told["done"].as_u64(), told["computed"].as_u64()), (Some(12), Some(12 - stood as u64)));
+}
+
+#[test]
+fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("store");
+    let text = "calib: 2\nname: a b\npipeline: none.yaml\nrobots:\n  - folder: x\n  - {folders: 'y*', list: z.csv}\npriors: 1\n";
+    let path = write(folder.path().join("FLEET.yaml"), text);
+    let (result, said) = output(&mut fleet("run", &path, &store));
+    assert_eq!(result.status.code(), Some(2));
+    for part in ["5:5: robots[0].folder: unknown key; did you mean `folders`?", "7:1: priors: unknown key; did you mean `prior`?"]
+    {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let text = text.replace("folder: x", "list: none.csv").replace("priors: 1\n", "");
+    let path = write(folder.path().join("FLEET.yaml"), &text);
+    let (_, said) = output(&mut fleet("run", &path, &store));
+    for part in ["calib: format 2", "2:7: name: expected letters", "robots[1]: expected exactly one"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let file = file(folder.path(), "sound", "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n");
+    let (_, said) = output(&mut fleet("run", &file, &store));
+    assert!(said.contains("robots[0].folders: no folder matches") && said.contains("overrides[0].robots[0]: no robot"), "{said}");
+}

@@ -1,0 +1,75 @@
+//! A fleet killed three times ends as an undisturbed one, and nothing recorded is computed again.
+
+use super::{file, fleet, recordings, run, tables};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+/// The records of a fleet.
+pub fn records(store: &Path, name: &str) -> Vec<PathBuf> {
+    let folder = store.join("fleets").join(name).join("records");
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        found.extend(std::fs::read_dir(entry.path()).into_iter().flatten().flatten().map(|entry| entry.path()));
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_fleet_killed_three_times_ends_as_an_undisturbed_one() {
+    const ROBOTS: usize = 16;
+    let folder = tempfile::tempdir().unwrap();
+    let cases = folder.path().join("cases");
+    recordings(&cases, ROBOTS);
+    std::fs::remove_file(cases.join("recordings/c0004/tracker.csv")).unwrap();
+    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let undisturbed = folder.path().join("undisturbed");
+    run(&file, &undisturbed, 10);
+
+    let store = folder.path().join("killed");
+    let mut stood: Vec<(PathBuf, std::time::SystemTime)> = Vec::new();
+    for kill in 1..=3 {
+        let mut child = fleet("run", &file, &store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let begun = Instant::now();
+        while records(&store, "line").len() < kill * ROBOTS / 5 {
+            assert!(begun.elapsed() < Duration::from_secs(25) && child.try_wait().unwrap().is_none(), "kill {kill}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(7 * kill as u64));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // What stood before stands untouched.
+        for (path, modified) in &stood {
+            assert_eq!(path.metadata().unwrap().modified().unwrap(), *modified);
+        }
+        stood = records(&store, "line")
+            .into_iter()
+            .map(|path| (path.clone(), path.metadata().unwrap().modified().unwrap()))
+            .collect();
+        assert!(stood.len() < ROBOTS, "killed too late to say anything");
+    }
+    let told = run(&file, &store, 10);
+    assert_eq!(told["computed"].as_u64(), Some((ROBOTS - stood.len()) as u64));
+    for (path, modified) in &stood {
+        assert_eq!(path.metadata().unwrap().modified().unwrap(), *modified);
+    }
+    assert_eq!(tables(&store, "line"), tables(&undisturbed, "line"));
+    assert_eq!(run(&file, &store, 10)["computed"].as_u64(), Some(0));
+}
+
+#[test]
+fn two_runs_at_once_share_the_robots() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
+    recordings(&cases, 8);
+    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    let start = || fleet("run", &file, &store).args(["--json", "--quiet", "-j", "1"]).stdout(Stdio::piped()).spawn().unwrap();
+    let computed = [start(), start()].map(|child| {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success());
+        let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        told["computed"].as_u64().unwrap()
+    });
+    assert_eq!(computed[0] + computed[1], 8, "{computed:?}");
+}
