@@ -23,6 +23,10 @@ pub(super) fn why(store: &Store, plan: &Plan, key: &StageKey, found: &Lookup, fo
 
 /// The key that a stage of this pipeline had when it was last seen.
 fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKey>> {
+    // Among the thousands of runs of a fleet, most stages are new: their tables were never shown.
+    if !store.shown(pipeline, stage) {
+        return Ok(None);
+    }
     for id in store.runs()?.iter().rev().take(HISTORY) {
         // A manifest that cannot be read explains nothing; it must not stop a run.
         let Ok(manifest) = store.manifest(id) else { continue };

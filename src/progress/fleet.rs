@@ -95,10 +95,11 @@ impl FleetProgress {
         let rate = state.fresh as f64 / minutes.max(1e-9);
         let left = self.total.saturating_sub(state.over) as f64 / rate.max(1e-9);
         let bad = if state.bad > 0 { format!("; {} not done", state.bad) } else { String::new() };
-        let pace = if state.fresh > 0 {
-            format!("{rate:.0} a minute, about {} left", duration(left * 60.0))
-        } else {
-            "no new one yet".into()
+        let pace = match (state.fresh, state.over) {
+            (0, over) if over == self.total => "all recorded before".to_string(),
+            (0, _) => "no new one yet".into(),
+            (_, over) if over == self.total => format!("{rate:.0} a minute"),
+            _ => format!("{rate:.0} a minute, about {} left", duration(left * 60.0)),
         };
         if let Some(bars) = &self.bars {
             bars.total.set_position(state.over as u64);

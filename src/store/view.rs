@@ -1,11 +1,11 @@
 //! The stable human paths: the latest table of every port, and the latest documents, under names that people can open.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Store;
 use super::actions::TableRef;
-use super::disk::{component, refused, replace, write_synced};
+use super::disk::{component, make_dir, refused, replace, write_synced};
 use crate::error::Result;
 
 impl Store {
@@ -18,8 +18,16 @@ impl Store {
         if fs::hard_link(&object, &aside).is_err() {
             fs::copy(&object, &aside).map_err(|e| refused(&aside, "copy", &e))?;
         }
-        replace(&aside, &path)?;
+        // Not synced: after a power cut the next run shows it again, and a sync of every name is a third of a small run's time.
+        show(&aside, &path)?;
         Ok(path)
+    }
+
+    /// Whether a table of a stage was ever shown.
+    pub fn shown(&self, pipeline: &str, stage: &str) -> bool {
+        let opening = format!("{stage}.");
+        let entries = fs::read_dir(self.root().join("tables").join(pipeline)).into_iter().flatten().flatten();
+        entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with(&opening))
     }
 
     /// Writes a document (a report) as `documents/<pipeline>/<name>`.
@@ -30,4 +38,13 @@ impl Store {
         replace(&aside, &path)?;
         Ok(path)
     }
+}
+
+/// Gives a file its name for people, atomically.
+fn show(aside: &Path, path: &Path) -> Result<()> {
+    path.parent().map_or(Ok(()), make_dir)?;
+    fs::rename(aside, path).map_err(|e| refused(path, "put the file in place", &e))?;
+    // Renaming one name of a file over another name of the same file does nothing, by POSIX.
+    let _ = fs::remove_file(aside);
+    Ok(())
 }

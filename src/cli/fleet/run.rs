@@ -143,7 +143,8 @@ fn run(fleet: &Fleet, store: &Store, place: &Place, how: &How, command_line: &[O
     } else {
         emit(&text(&all, computed, seconds, &told))?;
     }
-    verdict(fleet, &all)
+    let asked: Vec<Option<Record>> = chosen.iter().map(|index| all[*index].clone()).collect();
+    verdict(fleet, &asked)
 }
 
 /// Fails with the pipeline's faults where not a single robot could be planned: then they are not the robots'.

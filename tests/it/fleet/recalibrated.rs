@@ -84,3 +84,24 @@ fn changed_robots_are_flagged_with_the_joint_and_the_others_are_not() {
         assert!((value - by).abs() < 0.2 * by.abs(), "{reason}: {by}");
     }
 }
+
+#[test]
+fn robots_with_few_points_borrow_from_those_of_their_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    pipeline(folder);
+    for name in ["many", "plain", "pooled"] {
+        list(folder, name, usize::from(name != "many"), |_, _| 0.0);
+    }
+    campaign(folder, "many", "2026-04-01", "");
+    let few = "set: {simulate.blocks: [{usage: fit, points: 20}, {usage: validate, points: 40}]}\n";
+    let prior = "prior: {fleet: many, stage: joint, by: model, effects: [joint_offset, link_geometry, tool_offset]}\n";
+    let rms = |told: Value| -> Vec<f64> {
+        told["robots"].as_array().unwrap().iter().map(|robot| robot["after_rms_mm"].as_f64().unwrap()).collect()
+    };
+    let plain = rms(campaign(folder, "plain", "2026-10-01", few));
+    let pooled = rms(campaign(folder, "pooled", "2026-10-01", &format!("{few}{prior}")));
+    let better = plain.iter().zip(&pooled).filter(|(plain, pooled)| pooled < plain).count();
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(better * 3 > ROBOTS * 2 && mean(&pooled) < mean(&plain), "{better} of {ROBOTS}: {plain:?} {pooled:?}");
+}
