@@ -79,12 +79,17 @@ impl Earlier {
         Ledger::new(ledger.store, &self.fleet).find(key)
     }
 
-    /// Why a person should look at a robot: parameters beyond their limits, and another diagnosis than before.
-    pub fn flags(&self, ledger: &Ledger, robot: &str, all: &FleetChanges, findings: Option<&Findings>) -> Result<Vec<String>> {
+    /// Why a person should look at a robot: `changed` beyond their limits, and another diagnosis than before.
+    pub fn flags(
+        &self,
+        ledger: &Ledger,
+        robot: &str,
+        mut changed: Vec<&FleetChangeRow>,
+        findings: Option<&Findings>,
+    ) -> Result<Vec<String>> {
         let Some(record) = self.record(ledger, robot)? else { return Ok(vec!["not in the campaign before".into()]) };
         let member = self.note.robots.iter().find(|member| member.name == robot);
         let since = member.and_then(|member| member.groups.campaign.as_deref()).unwrap_or(&self.fleet);
-        let mut changed: Vec<&FleetChangeRow> = all.0.iter().filter(|row| row.robot == robot && row.flagged).collect();
         changed.sort_by_key(|row| row.rank);
         let mut flags: Vec<String> = changed.into_iter().map(|row| sentence(row, since)).collect();
         if let (Some(now), Some(before)) = (findings, load::<Findings>(ledger, record.last(Findings::KIND))?) {

@@ -6,7 +6,9 @@ use super::recalibration::{self, Limits};
 use crate::error::Result;
 use crate::report::fleet as page;
 use crate::store::{Account, KEY_FORMAT, Product, StageKey, TableRef};
-use crate::table::{Changes, Findings, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict};
+use crate::table::{
+    Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict,
+};
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -33,13 +35,17 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Re
         .collect();
     let alpha = fleet.file.previous.as_ref().map_or(1.0, |previous| previous.alpha);
     let changes = recalibration::with_limits(&changes, &Limits { alpha });
+    let mut flagged: BTreeMap<&str, Vec<&FleetChangeRow>> = BTreeMap::new();
+    for change in changes.0.iter().filter(|change| change.flagged) {
+        flagged.entry(&change.robot).or_default().push(change);
+    }
     let mut table = FleetTable::default();
     for ((robot, record), read) in fleet.roster.0.iter().zip(records).zip(&read) {
         let mut row = read.row(robot, record.as_ref());
         if let (Some(earlier), Some(_)) = (&earlier, record.as_ref().filter(|record| record.ending == Ending::Done)) {
-            let findings = read.findings.as_ref();
-            let flags = earlier.flags(ledger, &robot.name, &changes, findings)?;
-            row.changes = Some(changes.0.iter().filter(|change| change.robot == robot.name && change.flagged).count() as i64);
+            let changed = flagged.remove(robot.name.as_str()).unwrap_or_default();
+            row.changes = Some(changed.len() as i64);
+            let flags = earlier.flags(ledger, &robot.name, changed, read.findings.as_ref())?;
             row.flags = (!flags.is_empty()).then(|| flags.join("; "));
         }
         table.0.push(row);
