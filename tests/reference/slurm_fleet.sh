@@ -13,7 +13,7 @@ finish() {
   for node in n1 n2; do [ -f "$D/slurmd.$node.pid" ] && kill "$(cat "$D/slurmd.$node.pid")" 2>/dev/null; done
   [ -f "$D/slurmctld.pid" ] && kill "$(cat "$D/slurmctld.pid")" 2>/dev/null
   [ -f "$D/munged.pid" ] && kill "$(cat "$D/munged.pid")" 2>/dev/null
-  [ -n "${KEEP:-}" ] || rm -rf "$D"
+  sleep 2; [ -n "${KEEP:-}" ] || rm -rf "$D"
 }
 trap finish EXIT
 fail() { echo "FAILED: $*"; for f in "$D"/*.log; do echo "== $f"; tail -5 "$f"; done; exit 1; }
