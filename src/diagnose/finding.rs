@@ -79,11 +79,16 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
     for (i, k) in set.iter().enumerate() {
         let form = &pool.hypotheses[*k].form;
-        let waves = matches!(form, Form::JointTable(_)) && is_wavy(&last.model.x[ranges[i].clone()]);
-        let name = if waves { "gear_cyclic" } else { form.name() };
+        let values = &last.model.x[ranges[i].clone()];
+        let name = match form {
+            Form::JointTable(_) if is_wavy(values) => "gear_cyclic",
+            Form::JointHardening(law) if law.is_lost_motion(values, looked.survey.load(law.joint())) => "backlash",
+            _ => form.name(),
+        };
         groups.entry((name, form.place().to_string())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
+    wobbles(pool, &mut groups, set);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
     let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
     for place in hard {
@@ -127,7 +132,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         }
         let forms: Vec<Form> = members.iter().map(|i| last.chosen[*i].form.clone()).collect();
         let mut rivals = rivals(pool, &rest, &own, bic, (effect, &place));
-        exact(&forms, &place, &mut rivals);
+        exact(effect, &forms, &place, &mut rivals);
         rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
         let effect_rms = size(pool, &own, &whole, &sorted);
         let evidence = Evidence {
@@ -207,6 +212,25 @@ fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>
         if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
             let members = groups.remove(small).unwrap_or_default();
             groups.entry(main.clone()).or_default().extend(members);
+        }
+    }
+}
+
+/// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
+fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
+    let by = |i: &usize| match &pool.hypotheses[set[*i]].form {
+        Form::Unknown(unknown) => match unknown.signature() {
+            Signature::Periodic { by, .. } => Some(("axis_wobble", Place::Joint(by).to_string())),
+            _ => None,
+        },
+        _ => None,
+    };
+    let unknown: Vec<(&'static str, String)> = groups.keys().filter(|key| key.0 == "unknown").cloned().collect();
+    for key in unknown {
+        let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
+        if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {
+            let members = groups.remove(&key).unwrap_or_default();
+            groups.entry(wobble).or_default().extend(members);
         }
     }
 }
@@ -306,7 +330,7 @@ fn rivals(pool: &Pool, rest: &[usize], own: &[usize], bic: f64, named: (&str, &s
 }
 
 /// Identities of kinematics and statics, whatever the data.
-fn exact(forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
+fn exact(effect: &str, forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
     let mut add = |effect: &'static str, place: &str| {
         if !rivals.iter().any(|rival| rival.effect == effect && rival.place == place) {
             rivals.push(Rival { effect, place: place.to_string(), delta_bic: 0.0 });
@@ -316,11 +340,13 @@ fn exact(forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
         match form {
             Form::ZeroShift(_) if place == "joint 1" => add("base_shift", "base"),
             Form::GearCyclic(gear) if gear.order() == 1 => add("counterbalance", place),
-            Form::Unknown(unknown) => {
-                if let Signature::Periodic { by, .. } = unknown.signature() {
-                    add("axis_wobble", &Place::Joint(by).to_string());
-                }
-            }
+            Form::Unknown(unknown) => match unknown.signature() {
+                Signature::Periodic { by, .. } => add("axis_wobble", &Place::Joint(by).to_string()),
+                // A hose that two joints bend does the same where no motor current tells of its pull.
+                Signature::Product { .. } | Signature::Surface { .. } if place.starts_with("joint") => add("cable_drag", place),
+                _ => (),
+            },
+            Form::JointHardening(_) if effect == "backlash" => add("joint_hardening", place),
             // The torque of a link about its own joint is of first order in that joint's angle, as a balancer's.
             Form::Counterbalance(_) => {
                 add("gear_cyclic", place);

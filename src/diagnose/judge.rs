@@ -4,6 +4,7 @@ use super::pool::Pool;
 use super::{ALIKE, Chosen, Course, Question, fitted, start_of};
 use crate::effect::{Effect, Form, Placed};
 use crate::robot::Measurements;
+use std::collections::BTreeMap;
 
 /// Causes of one effect and place, as positions among the chosen; what the held-out rms (m) falls by with them.
 #[derive(Debug, Clone)]
@@ -13,21 +14,38 @@ pub(crate) struct Worth {
     pub gain: f64,
 }
 
-/// A model that is worse on held-out rows by this share is worse.
+/// A model that is worse on held-out rows by this share, and by so many standard errors, is worse.
 const WORSE: f64 = 0.03;
+const CLEARLY: f64 = 2.0;
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
 
-/// Rms error (m) of held-out rows that belong.
-fn held_out(now: &Course, data: &Measurements, question: &Question) -> Option<f64> {
-    let aside = |row: &usize| now.screening.suspects.iter().any(|s| s.row == *row && !s.used());
-    let rows: Vec<usize> = question.validate.iter().copied().filter(|row| !aside(row)).collect();
-    if rows.is_empty() {
-        return None;
+/// Squared errors (m2) of held-out rows that belong, by row.
+struct HeldOut(BTreeMap<usize, f64>);
+
+impl HeldOut {
+    /// `None` where no row is held out.
+    fn of(now: &Course, data: &Measurements, question: &Question) -> Option<Self> {
+        let aside = |row: &usize| now.screening.suspects.iter().any(|s| s.row == *row && !s.used());
+        let predicted = now.model.predict(data);
+        let rows = question.validate.iter().filter(|row| !aside(row));
+        let squares: BTreeMap<usize, f64> =
+            rows.map(|row| (*row, (data.position[*row] - predicted[*row]).norm_squared())).collect();
+        (!squares.is_empty()).then_some(Self(squares))
     }
-    let predicted = now.model.predict(data);
-    let squares: f64 = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm_squared()).sum();
-    Some((squares / rows.len() as f64).sqrt())
+
+    fn rms(&self) -> f64 {
+        (self.0.values().sum::<f64>() / self.0.len() as f64).sqrt()
+    }
+
+    /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
+    fn is_better_than(&self, other: &Self) -> bool {
+        let falls: Vec<f64> = self.0.iter().filter_map(|(row, own)| Some(other.0.get(row)? - own)).collect();
+        let count = falls.len() as f64;
+        let mean = falls.iter().sum::<f64>() / count;
+        let variance = falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        self.rms() < other.rms() * (1.0 - WORSE) && mean > CLEARLY * (variance / count).sqrt()
+    }
 }
 
 /// Exchanges or drops causes that make held-out rows worse; `set` holds the chosen causes' positions in the pool, in their order.
@@ -40,7 +58,7 @@ pub(crate) fn judge(
     data: &Measurements,
     question: &Question,
 ) -> (Course, Vec<Worth>) {
-    let Some(mut rms) = held_out(&now, data, question) else { return (now, Vec::new()) };
+    let Some(mut seen) = HeldOut::of(&now, data, question) else { return (now, Vec::new()) };
     let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(free), chosen, data, question);
     let mut worths = Vec::new();
     let mut at = 0;
@@ -61,8 +79,8 @@ pub(crate) fn judge(
         let rest: Vec<usize> = set.iter().copied().filter(|k| !is_own(k)).collect();
         let others: Vec<Chosen> = set.iter().zip(&all).filter(|(k, _)| !is_own(k)).map(|(_, cause)| cause.clone()).collect();
         let without = refit(&now, &others);
-        let bare = held_out(&without, data, question).unwrap_or(rms);
-        let mut best = (rms * (1.0 - WORSE), None);
+        let Some(bare) = HeldOut::of(&without, data, question) else { return (now, worths) };
+        let mut best: Option<(HeldOut, usize, Course)> = None;
         let bic = pool.bic(set);
         let mut sorted = rest.clone();
         sorted.sort_unstable();
@@ -81,25 +99,26 @@ pub(crate) fn judge(
             let mut chosen = others.clone();
             chosen.push(start(pool, &other, *h, rival));
             let course = refit(&now, &chosen);
-            if let Some(other) = held_out(&course, data, question).filter(|other| *other < best.0) {
-                best = (other, Some((*h, course)));
+            let Some(other) = HeldOut::of(&course, data, question).filter(|other| other.is_better_than(&seen)) else { continue };
+            if best.as_ref().is_none_or(|(best, ..)| other.rms() < best.rms()) {
+                best = Some((other, *h, course));
             }
         }
         match best {
-            (other, Some((h, course))) => {
+            Some((other, h, course)) => {
                 *set = rest;
                 set.push(h);
-                worths.push(worth(&pool.hypotheses[h].form, bare - other));
-                (now, rms) = (course, other);
+                worths.push(worth(&pool.hypotheses[h].form, bare.rms() - other.rms()));
+                (now, seen) = (course, other);
                 at = 0;
             }
-            _ if bare < rms * (1.0 - WORSE) => {
+            None if bare.is_better_than(&seen) => {
                 *set = rest;
-                (now, rms) = (without, bare);
+                (now, seen) = (without, bare);
                 at = 0;
             }
-            _ => {
-                worths.push(Worth { effect: group.0, place: group.1, gain: bare - rms });
+            None => {
+                worths.push(Worth { effect: group.0, place: group.1, gain: bare.rms() - seen.rms() });
                 at += 1;
             }
         }

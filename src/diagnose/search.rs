@@ -96,7 +96,26 @@ impl<'a, 'b> Search<'a, 'b> {
         if best.len() >= self.options.most {
             last = self.gate(&best);
         }
-        Found { set: best, first: first.unwrap_or(last), last }
+        let set = self.simplest(best);
+        Found { set, first: first.unwrap_or(last), last }
+    }
+
+    /// Of two laws of one wind-up that explain alike the simpler stands: proportional to the load.
+    fn simplest(&self, mut set: Vec<usize>) -> Vec<usize> {
+        for h in set.clone() {
+            let Form::JointHardening(law) = &self.pool.hypotheses[h].form else { continue };
+            let place = law.place();
+            let linear = |other: &Hypothesis| matches!(&other.form, Form::JointCompliance(form) if form.place() == place);
+            let Some(simple) = self.pool.hypotheses.iter().position(linear).filter(|simple| !set.contains(simple)) else {
+                continue;
+            };
+            let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
+            let other = with(&rest, simple);
+            if self.pool.bic(&other) < self.pool.bic(&set) + super::ALIKE {
+                set = other;
+            }
+        }
+        set
     }
 
     /// Sets with one cause more, best first; refined shapes among them.

@@ -37,7 +37,13 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
                 Some(Side::Mixed { threshold_nm }) => {
                     format!("to the side of approach under loads below about {threshold_nm:.0} Nm, above to that of the load")
                 }
-                _ => "by the direction from which it came".to_string(),
+                Some(Side::Approach) => "by the direction from which it came".to_string(),
+                None => {
+                    return format!(
+                        "{place} has lost motion to the side that its load pushes it ({:.0} um rms at the tool).",
+                        rms * 1e6
+                    );
+                }
             };
             format!("{place} has lost motion: half a gap of {} {by}", arcsec(first))
         }

@@ -1,4 +1,5 @@
-//! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two.
+//! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
+//! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
 use super::form::parameters;
 use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
@@ -13,6 +14,8 @@ pub struct AxisWobble {
     order: u32,
     /// The direction across the axis (0 or 1) about which it tilts; both if none.
     about: Option<usize>,
+    /// Whether the plane turns with the joint.
+    turning: bool,
 }
 
 /// No bearing lets an axis tilt further, rad (100 arcsec).
@@ -23,9 +26,10 @@ impl AxisWobble {
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let last = survey.joints() - 1;
         let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| {
-            [1, 2].into_iter().flat_map(move |order| [None, Some(0), Some(1)].map(|about| Self { joint, order, about }))
+            let orders = [1, 2].into_iter().flat_map(|order| [(order, true), (order, false)]);
+            orders.flat_map(move |(order, turning)| [None, Some(0), Some(1)].map(|about| Self { joint, order, about, turning }))
         });
-        forms.map(|form| Hypothesis::new(form, 6).charged(4.0).within(LARGEST)).collect()
+        forms.map(|form| Hypothesis::new(form, 12).charged(4.0).within(LARGEST)).collect()
     }
 }
 
@@ -43,11 +47,12 @@ impl Effect for AxisWobble {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let (sine, cosine) = libm::sincos(f64::from(self.order) * state.q[self.joint]);
         let normals = robot.normals(self.joint).iter().enumerate();
+        let station = if self.turning { self.joint + 1 } else { self.joint };
         let chosen = normals.filter(|(k, _)| self.about.is_none_or(|about| about == *k)).map(|(_, normal)| normal);
         for (k, (_, normal)) in chosen.enumerate() {
             let tilt = screw(normal, robot.point(self.joint));
-            out.shift(2 * k, p, self.joint + 1, tilt * sine);
-            out.shift(2 * k + 1, p, self.joint + 1, tilt * cosine);
+            out.shift(2 * k, p, station, tilt * sine);
+            out.shift(2 * k + 1, p, station, tilt * cosine);
         }
     }
 }
@@ -58,6 +63,6 @@ impl Placed for AxisWobble {
     }
 
     fn variant(&self) -> String {
-        format!("order{}", self.order)
+        format!("order{}{}", self.order, if self.turning { "" } else { "_fixed" })
     }
 }

@@ -30,10 +30,17 @@ pub struct JointHardening {
 
 /// Cosines of a free curve.
 const CURVE: usize = 6;
+/// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
+const SHARP: f64 = 0.15;
+const FLAT: f64 = 0.1;
 
 impl JointHardening {
     pub fn law(&self) -> Law {
         self.law
+    }
+
+    pub fn joint(&self) -> usize {
+        self.joint
     }
 
     /// Every loaded joint with several laws each.
@@ -50,6 +57,17 @@ impl JointHardening {
             out.push(Hypothesis::new(Self { joint, law: Law::Curve { low_nm: low, high_nm: high } }, 1).charged(4.0));
         }
         out
+    }
+
+    /// Whether coefficients `p` make a wind-up that does not grow with the load beyond a small one: lost motion to the side of the
+    /// load. `most` is the largest torque, Nm.
+    pub fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
+        match (self.law, p) {
+            (Law::Saturating { at_nm } | Law::SoftZone { at_nm } | Law::Knee { at_nm }, [linear, bend]) => {
+                at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs()
+            }
+            _ => false,
+        }
     }
 
     /// f and its slope.
