@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::{Outcome, Selection};
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
-use crate::table::{FindingNumbers, Findings, Rivals, Table, Verdict, VerdictRow};
+use crate::table::{FindingNumbers, Findings, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow};
 use clap::Args;
 use serde_json::{Value, json};
 use std::ffi::OsString;
@@ -49,7 +49,11 @@ struct Told {
     findings: Findings,
     numbers: FindingNumbers,
     rivals: Rivals,
+    shares: Shares,
 }
+
+/// Places and variables that are shown.
+const SHOWN: usize = 5;
 
 fn table<T: Table + Default>(outcome: &Outcome, store: &Store) -> Result<T> {
     let last = outcome.tables(T::KIND).last();
@@ -61,7 +65,16 @@ impl Told {
         let verdict: Verdict = table(outcome, store)?;
         let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
         let (findings, numbers) = (table(outcome, store)?, table(outcome, store)?);
-        Ok(Self { verdict, findings, numbers, rivals: table(outcome, store)? })
+        Ok(Self { verdict, findings, numbers, rivals: table(outcome, store)?, shares: table(outcome, store)? })
+    }
+
+    /// What could explain the most of the residual before the findings, more than chance, largest first.
+    fn located(&self, by: &str) -> Vec<&ShareRow> {
+        let all = self.shares.0.iter().filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
+        let mut all: Vec<&ShareRow> = all.collect();
+        all.sort_by(|a, b| b.share.total_cmp(&a.share));
+        all.truncate(SHOWN);
+        all
     }
 
     fn document(&self) -> Value {
@@ -96,6 +109,7 @@ impl Told {
             "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
             "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
             "held_out": v.held_out,
+            "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
             "findings": findings.collect::<Vec<_>>(),
             "not_observable": lines(&v.not_observable),
             "leftover": {
@@ -104,6 +118,11 @@ impl Told {
             "next_measurements": v.next_measurements.as_deref().map(lines),
             "noise": { "repeatability_rad": v.repeatability_rad, "repeats": v.repeats },
         })
+    }
+
+    fn located_json(&self, by: &str) -> Vec<Value> {
+        let one = |row: &&ShareRow| json!({ "name": row.name, "share": row.share, "delta_bic": row.delta_bic });
+        self.located(by).iter().map(one).collect()
     }
 
     fn text(&self) -> String {
@@ -119,6 +138,16 @@ impl Told {
             text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
         }
         text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
+        for (by, what) in [("place", "where"), ("variable", "goes with")] {
+            let all = self.located(by);
+            let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
+            if !all.is_empty() {
+                text.push_str(&format!("{what:9}  {}\n", all.join(", ")));
+            }
+        }
+        if !self.shares.0.is_empty() {
+            text.push_str("           (of the squared residual, what one cause there could explain at most)\n\n");
+        }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
             let rivals: Vec<String> = (self.rivals.0.iter().filter(|rival| rival.rank == finding.rank))

@@ -9,6 +9,7 @@ mod finding;
 mod gate;
 mod judge;
 mod lens;
+mod locate;
 mod noise;
 mod pool;
 mod search;
@@ -17,6 +18,7 @@ mod statement;
 mod verdict;
 
 pub use finding::{Evidence, Finding, Number, Rival};
+pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
@@ -91,6 +93,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     tell(format!("{} rows, {} numbers of the base model estimated", now.screening.kept.len(), free.len()));
     let mut asked_residual = false;
     let mut first = None;
+    let mut located = None;
     let mut round = 0;
     loop {
         round += 1;
@@ -101,6 +104,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let torque = lens.torques();
         let survey = Survey::new(robot, &data, &looked_at, &torque, &yielding);
         let mut pool = pool_of(&lens, &now, &free, &survey);
+        located.get_or_insert_with(|| locate::locate(&pool, &pool.state(&[]), &survey));
         let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
         let mut search = Search::new(&mut pool, &survey, &pose, options);
         let start: Vec<usize> = now.chosen.iter().map(|cause| search.position(Hypothesis::new(cause.form.clone(), 1))).collect();
@@ -141,7 +145,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             let mut set = found.set;
             let (last, worths) = judge::judge(next, &mut set, search.pool, &free, rigid, &data, question);
             let first = first.unwrap_or(1.0);
-            let looked = verdict::Looked { pool: search.pool, set, first, last: found.last, survey: &survey, worths };
+            let located = located.unwrap_or_default();
+            let looked = verdict::Looked { pool: search.pool, set, first, last: found.last, survey: &survey, worths, located };
             return verdict::conclude(question, &data, &before, &last, repeatability, looked);
         }
         drop(pool);

@@ -2,6 +2,7 @@
 
 use super::finding::{Finding, findings};
 use super::judge::Worth;
+use super::locate::{Located, locate};
 use super::noise::Repeatability;
 use super::pool::Pool;
 use super::statement::{next, not_observable};
@@ -75,6 +76,9 @@ pub struct Diagnosis {
     pub gate_first: f64,
     pub gate_last: f64,
     pub repeatability: Repeatability,
+    /// Where the residual sits before and after the findings.
+    pub located_before: Located,
+    pub located_after: Located,
     /// The corrected model and its fit.
     pub model: Model,
     pub fitted: Fitted,
@@ -91,6 +95,8 @@ pub(crate) struct Looked<'a, 'b> {
     pub first: f64,
     pub last: f64,
     pub worths: Vec<Worth>,
+    /// Where the residual of the base model sits.
+    pub located: Located,
     pub survey: &'b Survey<'a>,
 }
 
@@ -165,6 +171,9 @@ pub(crate) fn conclude(
         Verdict::Explained
     };
     let next_measurements = next(&findings);
+    let mut set = looked.set.clone();
+    set.sort_unstable();
+    let located_after = locate(looked.pool, &looked.pool.state(&set), looked.survey);
     Diagnosis {
         verdict,
         noise_floor,
@@ -181,6 +190,8 @@ pub(crate) fn conclude(
         gate_first: looked.first,
         gate_last: looked.last,
         repeatability,
+        located_before: looked.located,
+        located_after,
         model: last.model.clone(),
         fitted: last.fitted.clone(),
         kept: kept.clone(),

@@ -5,7 +5,9 @@ use crate::error::{Error, Fault, Result};
 use crate::estimate::Suspect;
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
-use crate::table::{FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Split, Suspects, Verdict};
+use crate::table::{
+    FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +46,8 @@ crate::stage::writes! {
         findings: Findings,
         finding_numbers: FindingNumbers,
         rivals: Rivals,
+        shares: Shares,
+        spectrum: Spectrum,
         parameters: Parameters,
         prediction: Prediction,
         suspects: Suspects,
@@ -53,7 +57,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -91,6 +95,8 @@ impl Stage for Diagnose {
             findings: Findings::of(&diagnosis),
             finding_numbers: FindingNumbers::of(&diagnosis),
             rivals: Rivals::of(&diagnosis),
+            shares: Shares::of(&diagnosis),
+            spectrum: Spectrum::of(&diagnosis),
             parameters: Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside),

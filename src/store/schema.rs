@@ -34,6 +34,8 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/scoreboard.json"),
     include_str!("../../schemas/search_course.json"),
     include_str!("../../schemas/searches.json"),
+    include_str!("../../schemas/shares.json"),
+    include_str!("../../schemas/spectrum.json"),
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),

@@ -53,6 +53,7 @@ mod findings;
 mod fit;
 mod fleet;
 mod intake;
+mod located;
 mod network;
 mod observability;
 mod parameters;
@@ -75,6 +76,7 @@ pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, Rival
 pub use fit::{Fit, FitRow};
 pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
 pub use intake::{Intake, IntakeRow};
+pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
 pub use network::{Network, NetworkRow};
 pub use observability::{Beside, Observability, ObservabilityRow};
 pub use parameters::{ParameterRow, Parameters};
@@ -113,6 +115,8 @@ pub const TABLES: &[&str] = &[
     Scoreboard::KIND,
     SearchCourse::KIND,
     Searches::KIND,
+    Shares::KIND,
+    Spectrum::KIND,
     Split::KIND,
     Statistics::KIND,
     Suspects::KIND,
