@@ -160,7 +160,7 @@ impl<'a> Pool<'a> {
         !set.iter().any(|k| self.borrowed[*k]) || set.iter().any(yields)
     }
 
-    /// Bayesian information criterion of a set with the prior's charges; implausible signs are charged too.
+    /// Bayesian information criterion of a set with the prior's charges; implausible signs and sizes are charged too.
     pub fn bic(&self, set: &[usize]) -> f64 {
         if let Some(score) = lock(&self.scores).get(set) {
             return *score;
@@ -181,9 +181,10 @@ impl<'a> Pool<'a> {
     /// Charge for every coefficient that has the wrong sign or is too large, by more than two standard errors.
     fn sign_charge(&self, set: &[usize], solution: &super::state::Solution) -> f64 {
         let columns = set.iter().flat_map(|k| (self.first[*k]..self.first[*k + 1]).map(move |_| *k));
-        let wrong = columns
-            .zip(solution.coefficients.iter().zip(&solution.errors))
-            .filter(|(k, (value, error))| self.hypotheses[*k].positive && **value < -2.0 * **error);
+        let wrong = columns.zip(solution.coefficients.iter().zip(&solution.errors)).filter(|(k, (value, error))| {
+            let Hypothesis { positive, largest, .. } = &self.hypotheses[*k];
+            (*positive && **value < -2.0 * **error) || value.abs() - 2.0 * **error > *largest
+        });
         IMPLAUSIBLE * wrong.count() as f64
     }
 }
@@ -193,7 +194,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// -2 ln of the odds of a sign that physics forbids.
+/// -2 ln of the odds of a sign or size that physics forbids.
 const IMPLAUSIBLE: f64 = 40.0;
 
 /// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.

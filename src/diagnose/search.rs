@@ -33,6 +33,8 @@ const WIDE: usize = 60;
 /// Levels of refinement, and how many may bring nothing.
 const LEVELS: i32 = 10;
 const IDLE: usize = 3;
+/// Candidates in place of a single member.
+const SINGLE: usize = 8;
 /// Families of shapes that are refined before candidates are compared.
 const FAMILIES: usize = 5;
 
@@ -242,7 +244,8 @@ impl<'a, 'b> Search<'a, 'b> {
             for gone in gone {
                 let rest: Vec<usize> = set.iter().copied().filter(|k| !gone.contains(k)).collect();
                 let state = self.pool.state(&rest);
-                let candidates = best(self.pool, &state, 3 + gone.len()).into_iter().filter(|h| !gone.contains(h));
+                let many = if gone.len() == 1 { SINGLE } else { 3 + gone.len() };
+                let candidates = best(self.pool, &state, many).into_iter().filter(|h| !gone.contains(h));
                 let candidates: Vec<Vec<usize>> = candidates.map(|h| with(&rest, h)).collect();
                 // One may stand in for two.
                 if gone.len() == 1 && self.stands_in(gone[0]) {
