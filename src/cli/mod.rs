@@ -4,6 +4,7 @@ mod check;
 mod compensate;
 mod diagnose;
 mod diff;
+mod effects;
 mod fleet;
 mod identified;
 mod pipeline_arguments;
@@ -35,6 +36,7 @@ enum Verb {
     Check(check::CheckArguments),
     Compensate(Box<compensate::CompensateArguments>),
     Diagnose(diagnose::DiagnoseArguments),
+    Effects(effects::EffectsArguments),
     Diff(diff::DiffArguments),
     Fleet(fleet::FleetArguments),
     Poses(poses::PosesArguments),
@@ -60,6 +62,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Run(verb) => run::main(&verb, &arguments),
         Verb::Check(verb) => check::main(&verb),
         Verb::Compensate(verb) => compensate::main(&verb, &arguments),
+        Verb::Effects(verb) => effects::main(&verb),
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Diff(verb) => return diff::main(&verb),
         Verb::Fleet(verb) => fleet::main(&verb, &arguments),

@@ -7,6 +7,7 @@ mod axis_wobble;
 mod backlash;
 mod base_compliance;
 mod base_frame;
+mod catalogue;
 mod counterbalance;
 mod coupling_ratio;
 mod deflection;
@@ -35,6 +36,7 @@ mod zero_shift;
 
 pub use backlash::{Backlash, Side};
 pub use base_frame::BaseFrame;
+pub use catalogue::{About, CATALOGUE};
 pub use counterbalance::Counterbalance;
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};

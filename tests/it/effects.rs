@@ -1,7 +1,7 @@
 //! The laws that every effect obeys: zero parameters are the nominal robot, partials are derivatives, order is irrelevant.
 
 use crate::fixture;
-use calib::effect::{CAUSES, EFFECTS, Effect, EffectStack, Load, ParameterSpec, Setting};
+use calib::effect::{CATALOGUE, CAUSES, EFFECTS, Effect, EffectStack, Load, ParameterSpec, Setting};
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
@@ -160,4 +160,16 @@ fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     lower[1] = 1e-3 * torque[1].signum();
     assert!(robot.forward(&lower).translation.z < robot.forward(&[0.0; 6]).translation.z);
     assert!(torque[0].abs() < 1e-12, "gravity has no moment about a vertical axis");
+}
+
+#[test]
+fn the_catalogue_has_every_effect_once() {
+    let mut names: Vec<&str> = CATALOGUE.iter().map(|about| about.name).collect();
+    for name in EFFECTS.iter().map(|entry| entry.name).chain(CAUSES.iter().map(|cause| cause.name)) {
+        assert!(names.contains(&name), "{name}");
+    }
+    names.sort_unstable();
+    let all = names.len();
+    names.dedup();
+    assert_eq!(names.len(), all);
 }

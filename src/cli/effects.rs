@@ -1,0 +1,52 @@
+//! `calib effects`: the library of effects, in words.
+
+use super::{emit, emit_json};
+use crate::effect::{About, CATALOGUE};
+use crate::error::{Error, Result};
+use clap::Args;
+use serde_json::json;
+
+/// List the effects that calib knows: formula, usual size, what each is easily taken for, and what a recording needs to show it.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib effects
+  calib effects backlash
+  calib effects --json")]
+pub(super) struct EffectsArguments {
+    /// One effect by its name
+    #[arg(value_name = "EFFECT")]
+    name: Option<String>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
+    let chosen: Vec<&About> = match &arguments.name {
+        None => CATALOGUE.iter().collect(),
+        Some(name) => vec![CATALOGUE.iter().find(|about| about.name == name).ok_or_else(|| unknown(name))?],
+    };
+    if arguments.json {
+        let one = |about: &&About| {
+            json!({
+                "name": about.name, "place": about.place, "formula": about.formula, "size": about.size,
+                "confounded": about.confounded, "needs": about.needs,
+            })
+        };
+        return emit_json(&json!(chosen.iter().map(one).collect::<Vec<_>>()));
+    }
+    let text: Vec<String> = chosen.iter().map(|about| entry(about)).collect();
+    emit(&text.join("\n"))
+}
+
+fn entry(about: &About) -> String {
+    format!(
+        "{} ({})\n  formula     {}\n  usual size  {}\n  taken for   {}\n  needs       {}\n",
+        about.name, about.place, about.formula, about.size, about.confounded, about.needs
+    )
+}
+
+fn unknown(name: &str) -> Error {
+    let names: Vec<&str> = CATALOGUE.iter().map(|about| about.name).collect();
+    Error::spec("EFFECT", format!("no effect `{name}`; allowed: {}", names.join(", ")))
+}
