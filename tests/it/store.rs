@@ -88,6 +88,7 @@ fn the_content_hash_sees_a_moved_border_between_texts_and_a_null() {
         }
         frame.push("status", Arc::new(StringArray::from(vec!["free", "held"])));
         frame.push("remark", Arc::new(StringArray::from(vec![None, Some("")])));
+        frame.push("form", Arc::new(StringArray::from(vec![None::<&str>, None])));
         frame.push("nominal", Arc::new(Float64Array::from(vec![0.0, 0.0])));
         frame.push("value", Arc::new(Float64Array::from(vec![0.0, 1.0])));
         frame.push("change", Arc::new(Float64Array::from(vec![0.0, 1.0])));
