@@ -3,15 +3,18 @@
 mod columns;
 mod correct;
 mod parquet;
+mod program;
 mod text;
 
 use super::identified::{Identified, ModelArguments};
 use crate::compensate::Arm;
 use crate::error::{Error, Fault, Result};
+use crate::robot::RobotModel;
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use columns::Units;
 use correct::{Corrector, Manner};
+use program::Language;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
@@ -25,6 +28,10 @@ use text::Layout;
 /// _rad, _mm), the robot's joint names; x_mm, y_mm, z_mm, with qw, qx, qy, qz or a_deg, b_deg, c_deg (about z, y', x''); payload_kg, temp_c,
 /// time_s, dir1 (+1: the joint comes from below), i1_a. Joints are replaced in place, all other columns stay byte for byte, and what is
 /// known of each target is appended.
+///
+/// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
+/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, near the
+/// posture of the target before (or --start); status and turn are not read.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CompensateArguments {
@@ -90,6 +97,7 @@ const EXAMPLES: &str = "Examples:
   calib compensate pipeline.yaml targets.csv > corrected.csv
   calib compensate latest targets.parquet --out corrected.parquet
   calib compensate pipeline.yaml poses.csv --target pose --payload 120 --out corrected.csv
+  calib compensate pipeline.yaml weld.src --payload 80 --out weld_corrected.src
   calib compensate parameters.parquet --robot robot.yaml --angle deg < program.csv";
 
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
@@ -173,8 +181,35 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
+fn language(targets: &Path) -> Option<Language> {
+    Language::of(&targets.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+/// A controller's program, whole: targets that cannot be reached are refused, since a program has no place for a remark.
+fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+    let program =
+        std::fs::read(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
+    let robot = RobotModel::new(layout.robot.clone());
+    let (text, warnings) = program::corrected(layout.place, &program, language, &robot, corrector)?;
+    let warnings: String = warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
+    let _ = std::io::stderr().write_all(warnings.as_bytes());
+    let (place, written) = match &arguments.out {
+        Some(out) => (out.display().to_string(), std::fs::write(out, text)),
+        None => ("stdout".into(), std::io::stdout().write_all(&text)),
+    };
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::store(place, format!("cannot be written: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Reads, corrects and writes; a file appears only when it is whole.
 fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+    if let Some(language) = language(&arguments.targets) {
+        return rewritten(arguments, language, layout, corrector);
+    }
     let Some(out) = &arguments.out else {
         return convert(&arguments.targets, std::io::stdout(), has_ending(&arguments.targets, "parquet"), layout, corrector);
     };

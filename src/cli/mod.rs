@@ -5,13 +5,16 @@ mod compensate;
 mod diagnose;
 mod diff;
 mod effects;
+mod export;
 mod fleet;
 mod identified;
+mod init;
 mod pipeline_arguments;
 mod poses;
 mod run;
 mod schema;
 mod searches;
+mod shell;
 mod simulate;
 mod surroundings;
 mod tables;
@@ -39,9 +42,13 @@ enum Verb {
     Effects(effects::EffectsArguments),
     Diff(diff::DiffArguments),
     Fleet(fleet::FleetArguments),
+    Export(export::ExportArguments),
+    Init(init::InitArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
     Simulate(simulate::SimulateArguments),
+    Completions(shell::CompletionsArguments),
+    Man(shell::ManArguments),
 }
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
@@ -66,7 +73,11 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
         Verb::Diff(verb) => return diff::main(&verb),
         Verb::Fleet(verb) => fleet::main(&verb, &arguments),
+        Verb::Export(verb) => export::main(&verb, &arguments),
+        Verb::Init(verb) => init::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
+        Verb::Completions(verb) => shell::completions(&verb),
+        Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb, &arguments),
     };

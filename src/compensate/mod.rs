@@ -8,6 +8,7 @@
 mod arm;
 mod coverage;
 mod inverse;
+mod rigid;
 mod solve;
 mod uncertainty;
 
@@ -15,5 +16,6 @@ pub use arm::{Arm, Circumstance, LONG_AFTER, Reach, silent};
 pub use coverage::Coverage;
 pub(crate) use coverage::beyond_limits;
 pub use inverse::inverse;
+pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use solve::{Chain, Found, Nominal, SETTLED, Wanted, least_change, one_step};
 pub use uncertainty::Uncertainty;

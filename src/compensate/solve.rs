@@ -115,6 +115,8 @@ pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home
     let mut damping = 0.0;
     let mut trial = q.clone();
     let mut iterations = 0;
+    // Whether the chain stands at `q` and not at a step that was refused.
+    let mut placed = true;
     while iterations < MOST && (error.norm() > SETTLED) {
         let Some(step) = step(&jacobian, damping, (&error, wanted.oriented), &q, home) else {
             damping = harder(damping);
@@ -126,7 +128,8 @@ pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home
         }
         let next = wanted.error(&chain.place(&trial));
         iterations += 1;
-        if next.norm() < error.norm() || next.norm() <= SETTLED {
+        placed = next.norm() < error.norm() || next.norm() <= SETTLED;
+        if placed {
             (error, damping) = (next, if damping > 1e-9 { damping * 0.1 } else { 0.0 });
             jacobian.copy_from_slice(chain.velocities());
             std::mem::swap(&mut q, &mut trial);
@@ -136,7 +139,9 @@ pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home
             damping = harder(damping);
         }
     }
-    chain.place(&q);
+    if !placed {
+        chain.place(&q);
+    }
     Found::of(q, &before, &error, iterations)
 }
 

@@ -165,5 +165,8 @@ fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
         ("training", of(tables.training.iter().map(|t| t.0.len()).collect())),
         ("prediction", of(tables.prediction.iter().map(|t| t.0.len()).collect())),
         ("statistics", of(vec![tables.statistics.0.len()])),
+        ("suspects", of(tables.suspects.iter().map(|t| t.0.len()).collect())),
+        ("findings", of(tables.findings.iter().map(|t| t.0.len()).collect())),
+        ("curves", of(vec![tables.curves.0.len()])),
     ]
 }

@@ -7,16 +7,25 @@ mod course;
 mod data;
 mod distribution;
 mod errors;
+mod findings;
 mod fits;
 pub mod fleet;
+mod json;
+mod limits;
 mod number;
 mod parameters;
 mod svg;
 mod workspace;
 
+pub use limits::Limits;
+
 use crate::error::{Error, Result};
-use crate::table::{Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Robot, Split, Statistics, Training};
+use crate::table::{
+    Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot,
+    Split, Statistics, Suspects, Training, Verdict,
+};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
 pub struct Tables {
@@ -31,6 +40,12 @@ pub struct Tables {
     pub fit: Vec<Fit>,
     pub observability: Vec<Observability>,
     pub training: Vec<Training>,
+    pub verdict: Vec<Verdict>,
+    pub findings: Vec<Findings>,
+    pub finding_numbers: Vec<FindingNumbers>,
+    pub rivals: Vec<Rivals>,
+    pub suspects: Vec<Suspects>,
+    pub curves: Curves,
 }
 
 /// What the person who asked for the report chose.
@@ -38,6 +53,11 @@ pub struct Wishes<'a> {
     pub title: Option<&'a str>,
     /// The held-out set of the first sentence; else the one with most points.
     pub set: Option<&'a str>,
+    pub limits: Limits,
+    /// Who, with what, where and when: shown as it was given.
+    pub identity: &'a BTreeMap<String, String>,
+    /// Content hashes of the tables that the report rests on.
+    pub hashes: Vec<(String, String)>,
 }
 
 #[derive(Serialize)]
@@ -46,7 +66,11 @@ struct Page<'a> {
     style: &'static str,
     version: &'static str,
     robot: String,
+    judgement: Option<&'a limits::Judgement>,
+    identity: Vec<(&'a String, &'a String)>,
+    hashes: &'a [(String, String)],
     errors: errors::Errors,
+    diagnosis: Option<findings::Section>,
     workspace: Option<errors::Workspace>,
     parameters: parameters::Section,
     fits: fits::Section,
@@ -54,12 +78,25 @@ struct Page<'a> {
     choices: Vec<(&'static str, &'a str)>,
 }
 
-/// The report as HTML; fails where `wishes.set` is no held-out set.
-pub fn html(tables: &Tables, wishes: &Wishes) -> Result<String> {
+/// The report as HTML and as JSON.
+pub struct Pages {
+    pub html: String,
+    pub json: String,
+}
+
+/// The report; fails where `wishes.set` is no held-out set.
+pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
     let steps = errors::Steps::new(&tables.statistics);
     let robot = data::robot_name(&tables.robot);
+    let judgement = limits::Judgement::new(&tables.statistics, &wishes.limits, wishes.set);
+    let title = wishes.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
+    let json = json::document(tables, wishes, &title, judgement.as_ref())?;
     let page = Page {
-        title: wishes.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned),
+        title,
+        judgement: judgement.as_ref(),
+        identity: wishes.identity.iter().collect(),
+        hashes: &wishes.hashes,
+        diagnosis: findings::Section::new(tables),
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
         errors: errors::Errors::new(tables, &steps, wishes.set)?,
@@ -76,8 +113,9 @@ pub fn html(tables: &Tables, wishes: &Wishes) -> Result<String> {
     let mut environment = minijinja::Environment::new();
     // A name in the template that does not exist is a bug, not an empty cell.
     environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    environment
+    let html = environment
         .add_template("report.html", include_str!("report.html"))
         .and_then(|()| environment.get_template("report.html")?.render(minijinja::value::Serde(&page)))
-        .map_err(|e| Error::Bug(format!("report template: {e:#}")))
+        .map_err(|e| Error::Bug(format!("report template: {e:#}")))?;
+    Ok(Pages { html, json })
 }

@@ -2,6 +2,7 @@
 
 mod advice;
 mod compare;
+mod curves;
 mod diagnose;
 mod identified;
 mod identify;

@@ -1,14 +1,17 @@
 //! `report`: everything the earlier stages found, as one HTML file that a person reads, prints and files.
 
+use crate::effect::Load;
 use crate::error::{Error, Fault, Result};
-use crate::report::{Tables, Wishes, html};
-use crate::stage::{Context, Labelled, Stage, reads, writes};
+use crate::report::{Limits, Tables, Wishes, pages};
+use crate::robot::{Instrument, RobotModel};
+use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Document, DocumentRow, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Robot, Split, Statistics,
-    Training,
+    Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording,
+    Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Writes `report.html`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
@@ -18,6 +21,20 @@ pub struct Report {
     pub title: Option<String>,
     /// The held-out set that the first sentence speaks of; without it, the one with most points after the last step.
     pub set: Option<String>,
+    /// What is accepted: of the held-out points after the last step.
+    pub limits: Accepted,
+    /// Who, with what, where and when, e.g. {operator: A. Meier, tracker: AT960 no. 123, date: 2026-11-21}; shown as given.
+    pub identity: BTreeMap<String, String>,
+}
+
+/// Largest errors that are accepted, mm; each may be left out.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Accepted {
+    pub mean_mm: Option<f64>,
+    /// 95 % of the points.
+    pub p95_mm: Option<f64>,
+    pub max_mm: Option<f64>,
 }
 
 reads! {
@@ -33,22 +50,31 @@ reads! {
         fit: Vec<Labelled<Fit>>,
         observability: Vec<Labelled<Observability>>,
         training: Vec<Labelled<Training>>,
+        models: Vec<Labelled<Parameters>>,
+        verdict: Vec<Labelled<Verdict>>,
+        findings: Vec<Labelled<Findings>>,
+        finding_numbers: Vec<Labelled<FindingNumbers>>,
+        rivals: Vec<Labelled<Rivals>>,
+        suspects: Vec<Labelled<Suspects>>,
     }
 }
 writes! {
     pub struct ReportWrites {
         document: Document,
+        curves: Curves,
     }
 }
 
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
+        let curves = self.curves(&reads)?;
+        let hashes = hashes(&reads)?;
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
@@ -61,12 +87,59 @@ impl Stage for Report {
             fit: unlabelled(reads.fit),
             observability: unlabelled(reads.observability),
             training: unlabelled(reads.training),
+            verdict: unlabelled(reads.verdict),
+            findings: unlabelled(reads.findings),
+            finding_numbers: unlabelled(reads.finding_numbers),
+            rivals: unlabelled(reads.rivals),
+            suspects: unlabelled(reads.suspects),
+            curves,
         };
-        let wishes = Wishes { title: self.title.as_deref(), set: self.set.as_deref() };
-        let content = html(&tables, &wishes).map_err(|error| placed(error, context.id))?;
-        let document = DocumentRow { name: "report.html".into(), media_type: "text/html".into(), content };
-        Ok(ReportWrites { document: Document(vec![document]) })
+        let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
+        let limits = Limits { mean_mm, p95_mm, max_mm };
+        let (title, set) = (self.title.as_deref(), self.set.as_deref());
+        let wishes = Wishes { title, set, limits, identity: &self.identity, hashes };
+        let pages = pages(&tables, &wishes).map_err(|error| placed(error, context.id))?;
+        let document =
+            |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };
+        let html = document("report.html", "text/html", pages.html);
+        let json = document("report.json", "application/json", pages.json);
+        Ok(ReportWrites { document: Document(vec![html, json]), curves: tables.curves })
     }
+
+    fn check(&self) -> Vec<Fault> {
+        let limits = [("mean_mm", self.limits.mean_mm), ("p95_mm", self.limits.p95_mm), ("max_mm", self.limits.max_mm)];
+        let wrong = limits.into_iter().filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
+        wrong.map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm")).collect()
+    }
+}
+
+impl Report {
+    /// Curves of the last diagnosis' findings; none without a diagnosis.
+    fn curves(&self, reads: &ReportReads) -> Result<Curves> {
+        let Some(findings) = reads.findings.last().filter(|findings| !findings.table.0.is_empty()) else {
+            return Ok(Curves::default());
+        };
+        let parameters = reads.models.iter().find(|model| model.stage == findings.stage);
+        let prediction = reads.prediction.iter().find(|prediction| prediction.stage == findings.stage);
+        let (Some(parameters), Some(prediction)) = (parameters, prediction) else { return Ok(Curves::default()) };
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let model = parameters.table.model(robot, &[], Load::GravityTorque)?;
+        let data = reads.recording.measurements(&Instrument::default());
+        curves::curves(&findings.table, &parameters.table, &model, &reads.recording, &data, &prediction.table)
+    }
+}
+
+/// The identity of what the report rests on.
+fn hashes(reads: &ReportReads) -> Result<Vec<(String, String)>> {
+    let mut out = vec![
+        ("robot".to_string(), reads.robot.to_frame()?.table_hash().to_string()),
+        ("recording".to_string(), reads.recording.to_frame()?.table_hash().to_string()),
+        ("split".to_string(), reads.split.to_frame()?.table_hash().to_string()),
+    ];
+    for model in &reads.models {
+        out.push((format!("parameters of {}", model.stage), model.table.to_frame()?.table_hash().to_string()));
+    }
+    Ok(out)
 }
 
 fn unlabelled<T>(tables: Vec<Labelled<T>>) -> Vec<T> {

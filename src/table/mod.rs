@@ -48,6 +48,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 mod changes;
+mod curves;
 mod document;
 mod findings;
 mod fit;
@@ -71,6 +72,7 @@ mod truth;
 mod verdict;
 
 pub use changes::{ChangeRow, Changes};
+pub use curves::{CurveRow, Curves};
 pub use document::{Document, DocumentRow};
 pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
 pub use fit::{Fit, FitRow};
@@ -97,6 +99,7 @@ pub use verdict::{Verdict, VerdictRow};
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
     Changes::KIND,
+    Curves::KIND,
     Document::KIND,
     FindingNumbers::KIND,
     Findings::KIND,

@@ -79,7 +79,7 @@ fn nothing_to_validate_is_an_error_of_the_pipeline() {
 
 fn html(settings: Report, reads: ReportReads) -> String {
     let document = settings.run(reads, &context()).expect("a report").document;
-    assert_eq!(document.0.len(), 1);
+    assert_eq!(document.0.len(), 2);
     assert_eq!(document.0[0].name, "report.html");
     assert_eq!(document.0[0].media_type, "text/html");
     document.0[0].content.clone()
@@ -124,13 +124,13 @@ fn the_first_sentence_states_the_held_out_means_of_the_statistics() {
     let expected = |set: &str| format!("The mean position error fell from {} mm to {} mm on", mean(0, set), mean(3, set));
     let (largest, wished) = (expected("check"), expected("unloaded_check"));
     assert!(html(Report::default(), tables("Heavy 6R, cell 4")).contains(&largest), "{largest}");
-    let settings = Report { set: Some("unloaded_check".into()), title: None };
+    let settings = Report { set: Some("unloaded_check".into()), ..Report::default() };
     assert!(html(settings, tables("Heavy 6R, cell 4")).contains(&wished), "{wished}");
 }
 
 #[test]
 fn a_wished_set_that_is_not_held_out_is_refused_with_the_allowed_ones() {
-    let settings = Report { set: Some("learn".into()), title: None };
+    let settings = Report { set: Some("learn".into()), ..Report::default() };
     let error = settings.run(tables("Heavy 6R, cell 4"), &context()).err().expect("refused");
     assert_eq!(error.exit_code(), 2);
     let text = error.to_string();
@@ -157,7 +157,7 @@ fn hostile_names_are_shown_and_not_run() {
     reads.rejected[0].table.0[0].text = HOSTILE.into();
     reads.intake[0].table.0[0].file = HOSTILE.into();
     reads.split.0[0].set = HOSTILE.into();
-    let page = html(Report { title: Some(HOSTILE.into()), set: None }, reads);
+    let page = html(Report { title: Some(HOSTILE.into()), ..Report::default() }, reads);
     assert!(!page.contains("<script"), "markup from a name came through");
     assert!(!page.contains("\" onmouseover=\""), "an attribute from a name came through");
     assert!(page.contains("&lt;script&gt;alert(1)"));

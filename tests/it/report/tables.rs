@@ -126,6 +126,63 @@ fn parameters() -> Parameters {
     Parameters(rows)
 }
 
+fn diagnosed<T>(table: T) -> Vec<Labelled<T>> {
+    vec![Labelled { stage: "diagnose".into(), table }]
+}
+
+fn verdict() -> Verdict {
+    Verdict(vec![VerdictRow {
+        step: "diagnose".into(),
+        verdict: "explained".into(),
+        noise_floor_mm: 0.035,
+        held_out: true,
+        before_mean_mm: Some(0.31),
+        before_rms_mm: Some(0.36),
+        before_max_mm: Some(0.9),
+        after_mean_mm: Some(0.034),
+        after_rms_mm: Some(0.037),
+        after_max_mm: Some(0.08),
+        leftover_rms_mm: 0.034,
+        chi_square: 1.02,
+        p_before: 1e-12,
+        p_after: 0.4,
+        repeatability_rad: 2e-6,
+        repeats: 0,
+        points: 300,
+        not_observable: "temperature: none was recorded\ntracker_scale: <measure> a scale bar".into(),
+        signature: None,
+        next_measurements: None,
+    }])
+}
+
+fn findings() -> Findings {
+    Findings(vec![FindingRow {
+        rank: 1,
+        effect: "gear_cyclic".into(),
+        place: "joint 2".into(),
+        statement: "joint 2 turns unevenly, twice a turn by 25 arcsec <b>".into(),
+        f_statistic: Some(812.0),
+        p_value: Some(1e-40),
+        delta_bic: Some(330.0),
+        heldout_gain_mm: Some(0.3),
+        effect_rms_mm: Some(0.28),
+        valid_joint: Some(2),
+        valid_from_rad: Some(-0.8),
+        valid_to_rad: Some(1.1),
+        forms: "[]".into(),
+    }])
+}
+
+fn numbers() -> FindingNumbers {
+    let number =
+        |name: &str, value| FindingNumberRow { rank: 1, name: name.into(), value, unit: "arcsec".into(), sigma: Some(0.4) };
+    FindingNumbers(vec![number("amplitude", 25.1), number("phase", 3.2)])
+}
+
+fn rivals() -> Rivals {
+    Rivals(vec![RivalRow { rank: 1, effect: "joint_table".into(), place: "joint 2".into(), delta_bic: 4.0 }])
+}
+
 fn robot(name: &str) -> Robot {
     let body = |body: i64, name: &str, kind: &str, axis: [f64; 3], point: [f64; 3]| RobotRow {
         body,
@@ -263,5 +320,11 @@ pub fn tables(name: &str) -> ReportReads {
         fit: fits(),
         observability: observability(),
         training: training(),
+        models: Vec::new(),
+        verdict: diagnosed(verdict()),
+        findings: diagnosed(findings()),
+        finding_numbers: diagnosed(numbers()),
+        rivals: diagnosed(rivals()),
+        suspects: Vec::new(),
     }
 }

@@ -1,0 +1,241 @@
+//! What a recording's columns seem to hold, by their names and first values: a proposal that a person checks.
+
+use super::quoted;
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Bytes and lines that are looked at.
+const LOOKED: u64 = 1 << 20;
+const LINES: usize = 400;
+
+/// A delimited text, as far as it was understood.
+pub(super) struct Found {
+    delimiter: char,
+    comma: bool,
+    /// Lines above the header.
+    skip: usize,
+    pub joints: Vec<String>,
+    /// Whether the joints' values go beyond what radians can be.
+    degrees: bool,
+    /// Whether the name says the unit.
+    joint_unit: Option<&'static str>,
+    pub id: Option<String>,
+    /// A column that says what a row is for, e.g. fit or validate.
+    pub usage: Option<String>,
+    /// Quantities of each joint, by pattern: motor currents, directions of approach.
+    patterns: Vec<(&'static str, &'static str, Option<&'static str>)>,
+    /// x, y, z.
+    point: Vec<String>,
+    /// Quantity, column, unit, whether the unit was in the name.
+    others: Vec<(&'static str, String, &'static str, bool)>,
+    unused: Vec<String>,
+    /// Largest coordinate found.
+    farthest: f64,
+}
+
+impl Found {
+    pub fn read(path: &Path) -> Result<Self> {
+        let place = path.display().to_string();
+        let file = File::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+        let mut lines = Vec::new();
+        for line in BufReader::new(file.take(LOOKED)).split(b'\n').take(LINES) {
+            let line = line.map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
+            lines.push(String::from_utf8_lossy(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+        }
+        let delimiter =
+            [';', '\t', ',', ' '].into_iter().max_by_key(|c| lines.iter().filter(|line| line.matches(*c).count() >= 3).count());
+        let delimiter = delimiter.unwrap_or(',');
+        let cells = |line: &String| -> Vec<String> {
+            line.split(delimiter)
+                .map(|cell| cell.trim().trim_matches('"').to_string())
+                .filter(|cell| delimiter != ' ' || !cell.is_empty())
+                .collect()
+        };
+        let number = |text: &String| {
+            text.parse::<f64>().ok().or_else(|| (delimiter != ',').then(|| text.replacen(',', ".", 1).parse().ok())?)
+        };
+        let numeric = |line: &Vec<String>| line.iter().filter(|cell| number(cell).is_some()).count();
+        let rows: Vec<Vec<String>> = lines.iter().map(cells).collect();
+        // The header is the line of names above the first line of numbers as wide as itself.
+        let header = (0..rows.len().saturating_sub(1)).find(|k| {
+            let (here, next) = (&rows[*k], &rows[*k + 1]);
+            here.len() >= 3 && here.len() == next.len() && numeric(here) == 0 && 2 * numeric(next) >= next.len()
+        });
+        let Some(skip) = header else {
+            return Err(Error::data(
+                place,
+                "no header found: expected a line of column names above the numbers; put one there, or describe the columns by number in the pipeline",
+            ));
+        };
+        let names = rows[skip].clone();
+        let body: Vec<&Vec<String>> = rows[skip + 1..].iter().filter(|row| row.len() == names.len()).collect();
+        let values = |column: usize| body.iter().filter_map(move |row| number(&row[column]));
+        let largest = |column: usize| values(column).map(f64::abs).fold(0.0, f64::max);
+        let comma =
+            delimiter != ',' && body.iter().flat_map(|row| row.iter()).any(|cell| cell.contains(',') && number(cell).is_some());
+        let mut found = Self {
+            delimiter,
+            comma,
+            skip,
+            joints: Vec::new(),
+            degrees: false,
+            joint_unit: None,
+            id: None,
+            usage: None,
+            patterns: Vec::new(),
+            point: Vec::new(),
+            others: Vec::new(),
+            unused: Vec::new(),
+            farthest: 0.0,
+        };
+        let mut taken = vec![false; names.len()];
+        for n in 1.. {
+            let Some(column) = names.iter().position(|name| joint_number(name) == Some(n)) else { break };
+            taken[column] = true;
+            found.degrees |= largest(column) > 6.5;
+            found.joint_unit = unit_in(&names[column], &["deg", "rad"]);
+            found.joints.push(names[column].clone());
+        }
+        for axis in ["x", "y", "z"] {
+            let column = names
+                .iter()
+                .position(|name| stem(name) == axis)
+                .or_else(|| names.iter().position(|name| stem(name).ends_with(&format!("_{axis}"))));
+            if let Some(column) = column.filter(|column| !taken[*column]) {
+                taken[column] = true;
+                found.farthest = found.farthest.max(largest(column));
+                found.point.push(names[column].clone());
+            }
+        }
+        for (quantity, pattern, unit) in [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None)] {
+            let column = |n: usize| names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
+            let columns: Vec<usize> = (1..).map_while(column).collect();
+            if !columns.is_empty() && columns.len() == found.joints.len() {
+                columns.iter().for_each(|column| taken[*column] = true);
+                found.patterns.push((quantity, pattern, unit));
+            }
+        }
+        for (column, name) in names.iter().enumerate().filter(|(column, _)| !taken[*column]) {
+            let lower = stem(name);
+            let is = |words: &[&str]| words.iter().any(|word| lower == *word || lower.starts_with(&format!("{word}_")));
+            if found.id.is_none() && is(&["point", "point_id", "id", "name", "pose", "nr", "no", "punkt", "index"]) {
+                found.id = Some(name.clone());
+            } else if found.usage.is_none() && is(&["use", "usage", "set"]) {
+                found.usage = Some(name.clone());
+            } else if is(&["payload", "load", "mass"]) {
+                found.others.push(("payload", name.clone(), "kg", unit_in(name, &["kg"]).is_some()));
+            } else if is(&["temp", "temperature"]) {
+                found.others.push(("temperature", name.clone(), "C", unit_in(name, &["c"]).is_some()));
+            } else if is(&["time", "t", "timestamp"]) && values(column).count() == body.len() {
+                found.others.push(("time", name.clone(), "s", unit_in(name, &["s"]).is_some()));
+            } else {
+                found.unused.push(name.clone());
+            }
+        }
+        Ok(found)
+    }
+
+    /// What was found, for the terminal.
+    pub fn account(&self) -> String {
+        let mut parts = Vec::new();
+        if !self.joints.is_empty() {
+            parts.push(format!("{} joints ({} to {})", self.joints.len(), self.joints[0], self.joints[self.joints.len() - 1]));
+        }
+        if self.point.len() == 3 {
+            parts.push(format!("the point ({})", self.point.join(", ")));
+        }
+        parts.extend(self.id.iter().map(|id| format!("names ({id})")));
+        parts.extend(self.usage.iter().map(|usage| format!("usage ({usage})")));
+        parts.extend(self.patterns.iter().map(|(quantity, pattern, _)| format!("{quantity} ({pattern})")));
+        parts.extend(self.others.iter().map(|(quantity, column, ..)| format!("{quantity} ({column})")));
+        if !self.unused.is_empty() {
+            parts.push(format!("not used: {}", self.unused.join(", ")));
+        }
+        parts.join("; ")
+    }
+
+    /// The settings of this file under `files`.
+    pub fn yaml(&self) -> String {
+        let mut out = String::new();
+        if self.delimiter != ',' {
+            out.push_str(&format!("          delimiter: {}\n", quoted(&self.delimiter.to_string())));
+        }
+        if self.comma {
+            out.push_str("          decimal: comma\n");
+        }
+        if self.skip > 0 {
+            out.push_str(&format!("          skip: {}                 # lines above the header\n", self.skip));
+        }
+        out.push_str("          columns:\n");
+        let mut put = |quantity: &str, column: &str, unit: Option<&str>, check: &str| {
+            let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
+            let check = if check.is_empty() { String::new() } else { format!("   # CHECK: {check}") };
+            out.push_str(&format!("            {quantity}: {{column: {}{unit}}}{check}\n", quoted(column)));
+        };
+        if let Some(id) = &self.id {
+            put("point_id", id, None, "");
+        }
+        if let Some(first) = self.joints.first() {
+            let pattern = first.replacen('1', "{j}", 1);
+            let (unit, why) = match self.joint_unit {
+                Some(unit) => (unit, String::new()),
+                None if self.degrees => ("deg", "values beyond 6.5 cannot be radians".to_string()),
+                None => ("rad", "no value is beyond 6.5; are these degrees?".to_string()),
+            };
+            put("q", &pattern, Some(unit), &why);
+        }
+        if let Some(usage) = &self.usage {
+            put("usage", usage, None, "");
+        }
+        for (quantity, pattern, unit) in &self.patterns {
+            put(quantity, pattern, *unit, "");
+        }
+        for (axis, column) in ["x", "y", "z"].iter().zip(&self.point) {
+            let named = unit_in(column, &["mm", "m", "um", "in"]);
+            let (unit, why) = match named {
+                Some(unit) => (unit, ""),
+                None if self.farthest > 50.0 => ("mm", "by the size of the numbers"),
+                None => ("m", "by the size of the numbers"),
+            };
+            put(axis, column, Some(unit), why);
+        }
+        for (quantity, column, unit, named) in &self.others {
+            put(quantity, column, Some(unit), if *named { "" } else { "the unit" });
+        }
+        for column in &self.unused {
+            out.push_str(&format!("            # not used: {}\n", quoted(column)));
+        }
+        out
+    }
+}
+
+/// A name in small letters without its unit.
+fn stem(name: &str) -> String {
+    let lower = name.trim().to_lowercase();
+    for ending in [
+        "_mm", "_m", "_um", "_in", "_deg", "_rad", "_kg", "_c", "_s", " [mm]", " [m]", " [deg]", " [kg]", " [s]", " (mm)",
+        " (m)", " (deg)",
+    ] {
+        if let Some(stem) = lower.strip_suffix(ending).filter(|stem| !stem.is_empty()) {
+            return stem.trim().to_string();
+        }
+    }
+    lower
+}
+
+fn unit_in(name: &str, units: &[&'static str]) -> Option<&'static str> {
+    let lower = name.trim().to_lowercase();
+    units.iter().copied().find(|unit| {
+        lower.ends_with(&format!("_{unit}")) || lower.ends_with(&format!("[{unit}]")) || lower.ends_with(&format!("({unit})"))
+    })
+}
+
+/// The joint (from 1) that a column is named after: `q1`, `A1_deg`, `joint_3`, `J4 [deg]`.
+fn joint_number(name: &str) -> Option<usize> {
+    let stem = stem(name);
+    ["q", "a", "j", "joint", "axis", "theta", "joint_", "axis_", "q_", "j_"]
+        .iter()
+        .find_map(|prefix| stem.strip_prefix(prefix)?.parse().ok())
+}

@@ -1,0 +1,106 @@
+//! The rigid part of an identified model as a robot description of its own: what other programs can take over.
+//!
+//! Lengths, twists, zeros and the tool are constants on the chain, so that the screws at the corrected zero pose hold them exactly.
+
+use super::arm::Arm;
+use super::solve::Chain;
+use crate::estimate::Model;
+use crate::robot::description::RobotDescription;
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Twist;
+use nalgebra::{Matrix3, Vector3};
+
+/// Effects that a description holds.
+const RIGID: [&str; 4] = ["base_frame", "tool_offset", "link_geometry", "joint_offset"];
+
+/// What a rigid description leaves out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOut {
+    /// Canonical name of the effect.
+    pub effect: String,
+    pub place: String,
+    /// What the point moves without it, m, rms and at most, over the poses.
+    pub rms: f64,
+    pub most: f64,
+}
+
+/// The robot with the identified geometry in place of the nominal; base frame as identified.
+pub fn rigid(model: &Model) -> RobotDescription {
+    let kept = |effect: &str| RIGID.contains(&effect);
+    let arm = Arm::new(only(model, |effect, _| kept(effect)), None);
+    let nominal = &model.robot;
+    let mut reach = arm.reach();
+    let tool = reach.place(&vec![0.0; nominal.joints()]);
+    let mut out = nominal.description().clone();
+    for (j, (joint, velocity)) in out.joints.iter_mut().zip(reach.velocities()).enumerate() {
+        let (v, w): (Vector3<f64>, Vector3<f64>) = parts(velocity);
+        if nominal.is_revolute(j) {
+            // Of the axis the point nearest to the nominal one.
+            let near = tool.translation + w.cross(&v);
+            joint.axis = w.into();
+            joint.point = (near + w * w.dot(&(nominal.point(j) - near))).into();
+        } else {
+            joint.axis = v.into();
+        }
+    }
+    out.tool = tool.translation.into();
+    let rotation: &Matrix3<f64> = &tool.rotation;
+    out.tool_rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|k| rotation[(i, k)]));
+    out
+}
+
+fn parts(twist: &Twist) -> (Vector3<f64>, Vector3<f64>) {
+    (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into())
+}
+
+/// The model with the parameters that `keep` refuses (by effect and place) at zero.
+fn only(model: &Model, keep: impl Fn(&str, &str) -> bool) -> Model {
+    let mut out = model.clone();
+    let specs = model.stack.specs();
+    for (effect, range) in model.stack.effects() {
+        for k in range.filter(|k| !keep(effect.name(), &specs[*k].place)) {
+            out.x[k] = 0.0;
+        }
+    }
+    out
+}
+
+/// Every effect at every place that [`rigid`] leaves out, with what it does to the point over the rows of `data`; the largest first.
+pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
+    let whole = model.predict(data);
+    let specs = model.stack.specs();
+    let mut places: Vec<(String, String)> = Vec::new();
+    for (effect, range) in model.stack.effects().filter(|(effect, _)| !RIGID.contains(&effect.name())) {
+        for k in range.filter(|k| model.x[*k] != 0.0) {
+            let key = (effect.name().to_string(), specs[k].place.clone());
+            if !places.contains(&key) {
+                places.push(key);
+            }
+        }
+    }
+    let mut out: Vec<LeftOut> = (places.into_iter())
+        .map(|(effect, place)| {
+            let without = only(model, |e, p| e != effect || p != place).predict(data);
+            let (rms, most) = apart(whole.iter().zip(&without).map(|(a, b)| (a - b).norm()));
+            LeftOut { effect, place, rms, most }
+        })
+        .collect();
+    out.sort_by(|a, b| b.rms.total_cmp(&a.rms));
+    out
+}
+
+/// Rms and maximum (m) of how far `description` puts the tool from where the model does, over the rows of `data`.
+pub fn distance(model: &Model, description: &RobotDescription, data: &Measurements) -> (f64, f64) {
+    let robot = RobotModel::new(description.clone());
+    let base = model.base();
+    let whole = model.predict(data);
+    apart(whole.iter().enumerate().map(|(row, point)| (base.point(&robot.forward(data.q(row)).translation) - point).norm()))
+}
+
+fn apart(lengths: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut sum, mut count, mut most) = (0.0, 0.0, 0.0f64);
+    for length in lengths {
+        (sum, count, most) = (sum + length * length, count + 1.0, most.max(length));
+    }
+    (if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }, most)
+}

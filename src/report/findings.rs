@@ -1,0 +1,185 @@
+//! What was left out of the simulation: the diagnosis' verdict, its findings with their curves, what it could not see.
+
+use super::Tables;
+use super::axis::{Area, Scale, baseline, label, name_x, name_y};
+use super::number::{count, mm, significant};
+use super::svg::Svg;
+use crate::table::{CurveRow, FindingRow, VerdictRow};
+use crate::units::Unit;
+use serde::Serialize;
+
+/// Points drawn in one picture: more would hide each other.
+const DRAWN: usize = 700;
+
+#[derive(Serialize)]
+pub(super) struct Section {
+    kind: &'static str,
+    sentence: String,
+    /// Name, mean, rms, max.
+    errors: Vec<(&'static str, [String; 3])>,
+    facts: Vec<(&'static str, String)>,
+    findings: Vec<Finding>,
+    not_observable: Vec<String>,
+    next: Vec<String>,
+    signature: Option<String>,
+    suspects: Vec<[String; 5]>,
+}
+
+#[derive(Serialize)]
+struct Finding {
+    rank: String,
+    effect: String,
+    place: String,
+    statement: String,
+    /// Name, value, sigma, unit.
+    numbers: Vec<[String; 4]>,
+    /// What, figure, what it means.
+    evidence: Vec<(&'static str, String, &'static str)>,
+    rivals: Vec<String>,
+    valid: Option<String>,
+    pictures: Vec<(String, String)>,
+}
+
+impl Section {
+    /// None where the pipeline made no diagnosis.
+    pub fn new(tables: &Tables) -> Option<Self> {
+        let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
+        let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
+        let three = |a: Option<f64>, b: Option<f64>, c: Option<f64>| [a, b, c].map(|v| v.map_or_else(|| "\u{2013}".into(), mm));
+        let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
+        Some(Self {
+            kind: match verdict.verdict.as_str() {
+                "explained" | "nothing_missing" => "better",
+                _ => "unknown",
+            },
+            sentence: sentence(verdict),
+            errors: vec![
+                (
+                    "before: geometry, zeros and ratios identified",
+                    three(verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
+                ),
+                ("after: with the findings", three(verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm)),
+            ],
+            facts: vec![
+                ("noise of one point, rms", format!("{} mm", mm(verdict.noise_floor_mm))),
+                ("left over at fitted rows, rms", format!("{} mm", mm(verdict.leftover_rms_mm))),
+                ("chance that what is left is noise", significant(verdict.p_after, 2)),
+                ("chance that what the simulation leaves is noise", significant(verdict.p_before, 2)),
+                (
+                    "repeatability of the joints",
+                    format!("{} arcsec", significant(Unit::Arcsecond.from_si(verdict.repeatability_rad), 2)),
+                ),
+                ("rows fitted", count(verdict.points)),
+            ],
+            findings: tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect(),
+            not_observable: lines(&verdict.not_observable),
+            next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
+            signature: verdict.signature.clone(),
+            suspects: suspects
+                .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
+                .collect(),
+        })
+    }
+}
+
+fn sentence(verdict: &VerdictRow) -> String {
+    match verdict.verdict.as_str() {
+        "explained" => "What was found brings the error of held-out points down to the noise.".into(),
+        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.".into(),
+        _ => "Something is left that the findings do not explain.".into(),
+    }
+}
+
+fn finding(row: &FindingRow, tables: &Tables) -> Finding {
+    let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
+    let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
+    let evidence = [
+        ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
+        ("p", row.p_value.map(|v| significant(v, 2)), "chance of such a gain from noise alone"),
+        ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),
+        ("held-out gain", row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))), "rms of unseen points without it minus with it"),
+        ("size", row.effect_rms_mm.map(|v| format!("{} mm", mm(v))), "rms of the whole effect at the tool"),
+    ];
+    let valid = match (row.valid_joint, row.valid_from_rad, row.valid_to_rad) {
+        (Some(joint), Some(from), Some(to)) => {
+            Some(format!("joint {joint} from {:.1} to {:.1} deg", from.to_degrees(), to.to_degrees()))
+        }
+        _ => None,
+    };
+    let curve: Vec<&CurveRow> = tables.curves.0.iter().filter(|point| point.rank == row.rank).collect();
+    Finding {
+        rank: row.rank.to_string(),
+        effect: row.effect.clone(),
+        place: row.place.clone(),
+        statement: row.statement.clone(),
+        numbers: numbers
+            .map(|n| {
+                let sigma = n.sigma.map(|sigma| significant(sigma, 2)).unwrap_or_default();
+                [n.name.clone(), significant(n.value, 5), sigma, n.unit.clone()]
+            })
+            .collect(),
+        evidence: evidence.into_iter().filter_map(|(name, value, meaning)| Some((name, value?, meaning))).collect(),
+        rivals: rivals.map(|r| format!("{} at {} (BIC {} from it)", r.effect, r.place, significant(r.delta_bic, 2))).collect(),
+        valid,
+        pictures: pictures(row, &curve),
+    }
+}
+
+/// Before with the fitted curve and its band, and after on the same scales.
+fn pictures(finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(String, String)> {
+    let Some(first) = curve.first() else { return Vec::new() };
+    // People read degrees and arcsec.
+    let (x_unit, x_scale) = if first.x_unit == "rad" { ("deg", 1f64.to_degrees()) } else { (first.x_unit.as_str(), 1.0) };
+    let (y_unit, y_scale) = if first.unit == "rad" { ("arcsec", Unit::Arcsecond.from_si(1.0)) } else { ("mm", 1.0) };
+    let every = curve.len().div_ceil(DRAWN).max(1);
+    let mut rows: Vec<&CurveRow> = curve.iter().step_by(every).copied().collect();
+    rows.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let (x0, x1) = range(&mut rows.iter().map(|row| row.x * x_scale));
+    let (y0, y1) = range(&mut rows.iter().flat_map(|row| [row.without, row.with, row.fitted]).map(|value| value * y_scale));
+    let margin = 0.06 * (y1 - y0).max(1e-9);
+    let area = Area { left: 52.0, top: 26.0, right: 406.0, bottom: 230.0 };
+    let x = Scale::linear(x0, x1).over(area.left, area.right);
+    let y = Scale::linear(y0 - margin, y1 + margin).over(area.bottom, area.top);
+    let draw = |title: &str, before: bool| {
+        let mut svg = Svg::new(420.0, area.bottom + 38.0);
+        x.grid_x(&mut svg, area, 6);
+        y.grid_y(&mut svg, area, 6);
+        if before {
+            for row in &rows {
+                if let Some(band) = row.band {
+                    let at = x.at(row.x * x_scale);
+                    let ends = [row.fitted - 2.0 * band, row.fitted + 2.0 * band].map(|value| y.at(value * y_scale));
+                    svg.line("whisker", [at, ends[0]], [at, ends[1]]);
+                }
+            }
+        }
+        for row in &rows {
+            let value = if before { row.without } else { row.with };
+            let class = if row.held_out { "dot s0" } else { "dot s0 fitted" };
+            svg.circle(class, [x.at(row.x * x_scale), y.at(value * y_scale)], 1.9);
+        }
+        if before {
+            for row in &rows {
+                svg.circle("dot s-last", [x.at(row.x * x_scale), y.at(row.fitted * y_scale)], 1.3);
+            }
+        }
+        svg.line("zero", [area.left, y.at(0.0)], [area.right, y.at(0.0)]);
+        baseline(&mut svg, area);
+        name_x(&mut svg, area, &format!("{}, {x_unit}", first.over));
+        name_y(&mut svg, area, &format!("residual, {y_unit}"));
+        svg.finish(&format!("{title}: {} at {}, from {} to {} {x_unit}", finding.effect, finding.place, label(x0), label(x1)))
+    };
+    let what = if first.unit == "rad" { "about the joint" } else { "along the effect's displacement" };
+    vec![
+        (
+            draw("Without the finding", true),
+            format!(
+                "Without the finding: residual {what} (grey; pale: fitted rows), the fitted effect (blue) and two standard deviations of it."
+            ),
+        ),
+        (draw("With the finding", false), "With it, on the same scale: what is left.".into()),
+    ]
+}

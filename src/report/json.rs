@@ -1,0 +1,57 @@
+//! `report.json`: what the report says, for other programs. Every figure is a column of a table.
+
+use super::limits::Judgement;
+use super::{Tables, Wishes};
+use crate::error::{Error, Result};
+use serde_json::{Value, json};
+
+/// The document; `judgement` is that of the page.
+pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement: Option<&Judgement>) -> Result<String> {
+    let statistics = tables.statistics.0.iter().map(|row| {
+        json!({
+            "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points, "mean_mm": row.mean_mm, "std_mm": row.std_mm,
+            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm, "noise_rms_mm": row.noise_rms_mm,
+        })
+    });
+    let findings = tables.findings.iter().flat_map(|table| &table.0).map(|row| {
+        let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
+        let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
+        json!({
+            "rank": row.rank, "effect": row.effect, "where": row.place, "statement": row.statement,
+            "numbers": numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma })).collect::<Vec<_>>(),
+            "evidence": { "f_statistic": row.f_statistic, "p_value": row.p_value, "delta_bic": row.delta_bic, "heldout_gain_mm": row.heldout_gain_mm },
+            "rivals": rivals.map(|r| json!({ "effect": r.effect, "where": r.place, "delta_bic": r.delta_bic })).collect::<Vec<_>>(),
+        })
+    });
+    let parameters = tables.parameters.0.iter().map(|row| {
+        json!({ "name": row.name, "where": row.place, "unit": row.unit, "nominal": row.nominal, "value": row.value, "sigma": row.sigma, "status": row.status })
+    });
+    let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
+        json!({ "step": row.step, "verdict": row.verdict, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
+            "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>() })
+    });
+    let limits = judgement.map(|judgement| {
+        let lines = judgement.lines.iter().map(|(name, found, limit, kept)| json!({ "figure": name, "found_mm": number(found), "limit_mm": number(limit), "kept": kept }));
+        json!({ "kept": judgement.kept, "figures": lines.collect::<Vec<_>>() })
+    });
+    let document = json!({
+        "calib_report": 1,
+        "title": title,
+        "robot": super::data::robot_name(&tables.robot),
+        "calib": env!("CARGO_PKG_VERSION"),
+        "identity": wishes.identity,
+        "limits": limits,
+        "statistics": statistics.collect::<Vec<_>>(),
+        "diagnosis": diagnosis,
+        "findings": findings.collect::<Vec<_>>(),
+        "parameters": parameters.collect::<Vec<_>>(),
+        "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
+        "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),
+        "tables": wishes.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
+    });
+    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
+}
+
+fn number(text: &str) -> Value {
+    text.parse::<f64>().map_or(Value::Null, Value::from)
+}

@@ -1,0 +1,60 @@
+//! The verdict against the user's limits: figures of the held-out points after the last step, each beside what it may be.
+
+use crate::table::{Statistics, StatisticsRow};
+use serde::Serialize;
+
+/// What the user accepts, mm; of held-out points after the last step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Limits {
+    pub mean_mm: Option<f64>,
+    pub p95_mm: Option<f64>,
+    pub max_mm: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Judgement {
+    /// `better` where all are kept, else `worse`.
+    kind: &'static str,
+    sentence: String,
+    /// Figure, found, allowed, whether it is kept.
+    pub lines: Vec<(&'static str, String, String, bool)>,
+    pub kept: bool,
+}
+
+/// The row that is judged: of `set`, else of the held-out set with most points, after the last step.
+pub(super) fn judged<'a>(statistics: &'a Statistics, set: Option<&str>) -> Option<&'a StatisticsRow> {
+    let last = statistics.0.iter().map(|row| row.order).max()?;
+    let rows = statistics.0.iter().filter(|row| row.held_out && row.order == last);
+    let rows = rows.filter(|row| set.is_none_or(|set| row.set == set));
+    rows.max_by_key(|row| row.points)
+}
+
+impl Judgement {
+    /// None where there are no limits.
+    pub fn new(statistics: &Statistics, limits: &Limits, set: Option<&str>) -> Option<Self> {
+        let asked = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
+        if asked.iter().all(|(_, limit)| limit.is_none()) {
+            return None;
+        }
+        let Some(row) = judged(statistics, set) else {
+            let sentence = "The limits cannot be judged: no points were held out.".into();
+            return Some(Self { kind: "worse", sentence, lines: Vec::new(), kept: false });
+        };
+        let found = [row.mean_mm, row.p95_mm, row.max_mm];
+        let lines: Vec<_> = (asked.iter().zip(found))
+            .filter_map(|((name, limit), found)| {
+                let limit = (*limit)?;
+                Some((*name, super::number::mm(found), super::number::mm(limit), found <= limit))
+            })
+            .collect();
+        let kept = lines.iter().all(|line| line.3);
+        let sentence = format!(
+            "{} the limits at {} held-out points of set {}, step {}.",
+            if kept { "Accepted: within" } else { "Not accepted: beyond" },
+            row.points,
+            row.set,
+            row.step
+        );
+        Some(Self { kind: if kept { "better" } else { "worse" }, sentence, lines, kept })
+    }
+}

@@ -1,0 +1,130 @@
+//! Findings as curves, from the corrected model: each effect is taken out once, and what the residual then shows is put over the
+//! quantity that reveals it. A joint's effect is shown as an angle about the joint (residual along its motion over its lever), all
+//! others as millimetres along their own displacement.
+
+use crate::error::Result;
+use crate::estimate::Model;
+use crate::robot::Measurements;
+use crate::table::{CurveRow, Curves, FindingRow, Findings, Parameters, Prediction, Recording};
+use crate::units::Unit;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use std::collections::BTreeMap;
+
+/// m: a joint whose lever is shorter turns the point too little to be seen.
+const LEVER: f64 = 0.05;
+
+/// Share of the largest displacement below which a row's own direction is noise.
+const SMALL: f64 = 0.05;
+
+/// The curves of all findings that a model has; `prediction` is that of the same step.
+pub(super) fn curves(
+    findings: &Findings,
+    parameters: &Parameters,
+    model: &Model,
+    recording: &Recording,
+    data: &Measurements,
+    prediction: &Prediction,
+) -> Result<Curves> {
+    let specs = model.stack.specs();
+    let mut sigma = BTreeMap::new();
+    for row in &parameters.0 {
+        if let (Some(value), Some(unit)) = (row.sigma, Unit::parse(&row.unit)) {
+            sigma.insert(row.name.as_str(), unit.to_si(value));
+        }
+    }
+    let shown: Vec<usize> = (0..data.rows().min(prediction.0.len())).filter(|row| !prediction.0[*row].suspect).collect();
+    let whole = model.predict(data);
+    let mut out = Vec::new();
+    for finding in &findings.0 {
+        let own: Vec<usize> = (model.stack.effects())
+            .filter(|(effect, _)| effect.name() == finding.effect)
+            .flat_map(|(_, range)| range.filter(|k| specs[*k].place == finding.place).collect::<Vec<_>>())
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let mut without = model.clone();
+        own.iter().for_each(|k| without.x[*k] = 0.0);
+        let bare = without.predict(data);
+        let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
+        let joint = joint_of(finding).filter(|joint| *joint < data.joints);
+        let principal = principal(&shift);
+        let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let mut scratch = model.stack.scratch(&model.robot);
+        for &row in &shown {
+            let sight = model.stack.sight(&model.robot, data, row, &model.x, &mut scratch);
+            let turn = joint.filter(|j| model.robot.is_revolute(*j));
+            // To the column's unit: rad about the joint, or mm.
+            let (direction, scale) = match turn {
+                Some(joint) if sight.by_joint[joint].norm() > LEVER => {
+                    (sight.by_joint[joint] / sight.by_joint[joint].norm_squared(), 1.0)
+                }
+                Some(_) => continue,
+                None if shift[row].norm() > SMALL * largest => (shift[row].normalize(), 1e3),
+                None => (principal, 1e3),
+            };
+            let along = |v: &Vector3<f64>| direction.dot(v) * scale;
+            let mut by: BTreeMap<usize, f64> = BTreeMap::new();
+            model.stack.derivatives(&model.robot, data, row, &model.x, &mut scratch, |k, derivative| {
+                if own.contains(&k) {
+                    *by.entry(k).or_default() += along(&derivative);
+                }
+            });
+            let variance: Option<f64> =
+                own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
+            let residual = data.position[row] - whole[row];
+            let (over, x_unit, x) = abscissa(finding, joint, data, row, &sight.posture.torque);
+            let fitted = along(&shift[row]);
+            out.push(CurveRow {
+                rank: finding.rank,
+                sequence: recording.sequence[row],
+                over,
+                x_unit: x_unit.symbol().into(),
+                x: x_unit.from_si(x),
+                unit: if turn.is_some() { "rad".into() } else { "mm".into() },
+                without: along(&residual) + fitted,
+                with: along(&residual),
+                fitted,
+                band: variance.map(f64::sqrt).filter(|band| band.is_finite()),
+                held_out: prediction.0[row].held_out,
+            });
+        }
+    }
+    Ok(Curves(out))
+}
+
+/// The joint (from 0) at which a finding sits.
+fn joint_of(finding: &FindingRow) -> Option<usize> {
+    let number = finding.place.strip_prefix("joint ")?;
+    number.parse::<usize>().ok()?.checked_sub(1)
+}
+
+/// What reveals the effect, its stored unit, and its value in SI.
+fn abscissa(finding: &FindingRow, joint: Option<usize>, data: &Measurements, row: usize, torque: &[f64]) -> (String, Unit, f64) {
+    let time = || ("time".to_string(), Unit::Second, data.time(row));
+    match (finding.effect.as_str(), joint) {
+        ("zero_shift" | "base_shift" | "tool_shift" | "tracker_drift", _) => time(),
+        ("thermal_growth", _) => match data.temperature(row) {
+            Some(now) => ("temperature".into(), Unit::Celsius, now),
+            None => time(),
+        },
+        ("joint_compliance" | "joint_hardening" | "counterbalance", Some(joint)) => {
+            (format!("load torque of joint {}", joint + 1), Unit::NewtonMetre, torque[joint])
+        }
+        ("joint_log_lag", Some(joint)) => (format!("last move of joint {}", joint + 1), Unit::Radian, data.last_move(row, joint)),
+        ("payload_error", _) => ("payload".into(), Unit::Kilogram, data.payload[row]),
+        (_, Some(joint)) => (format!("joint {}", joint + 1), Unit::Radian, data.q(row)[joint]),
+        // Links and the base bend with the load of the shoulder.
+        _ if torque.len() > 1 => ("load torque of joint 2".into(), Unit::NewtonMetre, torque[1]),
+        _ => time(),
+    }
+}
+
+/// The direction in which most of the displacement lies.
+fn principal(shift: &[Vector3<f64>]) -> Vector3<f64> {
+    let sum: Matrix3<f64> = shift.iter().map(|v| v * v.transpose()).sum();
+    let eigen = SymmetricEigen::new(sum);
+    let direction: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
+    let sense: f64 = shift.iter().map(|v| v.dot(&direction)).sum();
+    if sense < 0.0 { -direction } else { direction }
+}

@@ -1,0 +1,68 @@
+//! `init` writes what `check` accepts and `run` runs, and overwrites nothing; completions and manual pages are made.
+
+use crate::compensate::calib;
+use std::fmt::Write;
+
+#[test]
+fn what_init_writes_is_understood_and_never_overwrites() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut controller = String::from("Controller log\n\nPoint;A1;A2;A3;A4;A5;A6;load;remark\n");
+    let mut tracker = String::from("name,X,Y,Z\n");
+    for k in 0..40 {
+        let q: Vec<String> = (0..6).map(|j| format!("{:.2}", 50.0 * f64::from(k * 7 + j).sin()).replace('.', ",")).collect();
+        writeln!(controller, "P{k};{};10,0;ok", q.join(";")).expect("text");
+        writeln!(tracker, "P{k},{}.5,-200,900", 1500 + k).expect("text");
+    }
+    std::fs::write(folder.path().join("controller.csv"), controller).expect("a file");
+    std::fs::write(folder.path().join("tracker.csv"), tracker).expect("a file");
+    let arguments = ["init", ".", "--data", "controller.csv", "tracker.csv"];
+    let output = calib(folder.path(), &arguments, "");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(said.contains("6 joints (A1 to A6)") && said.contains("not used: remark"), "{said}");
+    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    for part in [
+        "file: \"controller.csv\"",
+        "delimiter: \";\"",
+        "decimal: comma",
+        "skip: 2",
+        "q: {column: \"A{j}\", unit: deg}",
+        "join: {by: id}",
+    ] {
+        assert!(pipeline.contains(part), "{part} in\n{pipeline}");
+    }
+    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
+    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
+    let ingest = calib(folder.path(), &["run", "pipeline.yaml", "--until", "split", "--quiet"], "");
+    assert!(ingest.status.success(), "{}", String::from_utf8_lossy(&ingest.stderr));
+    let again = calib(folder.path(), &arguments, "");
+    assert_eq!(again.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&again.stderr).contains("is already there"));
+    let seven = calib(folder.path(), &["init", "other", "--data", "controller.csv", "--robot", "seven"], "");
+    assert!(String::from_utf8_lossy(&seven.stderr).contains("seven has 7 joints, the recording 6"));
+}
+
+#[test]
+fn every_kind_of_robot_that_init_writes_is_read() {
+    for kind in ["spherical6", "offset6", "seven", "dh6"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let output = calib(folder.path(), &["init", "--robot", kind], "");
+        assert!(output.status.success());
+        let text = std::fs::read_to_string(folder.path().join("robot.yaml")).expect("a robot file");
+        let file = calib::robot::import::Text { label: "robot.yaml", text: &text };
+        calib::robot::import::read_calib(file, None).unwrap_or_else(|error| panic!("{kind}: {error}"));
+    }
+}
+
+#[test]
+fn shells_and_readers_of_manuals_are_served() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        let output = calib(folder.path(), &["completions", shell], "");
+        assert!(String::from_utf8_lossy(&output.stdout).contains("compensate"), "{shell}");
+    }
+    let page = calib(folder.path(), &["man", "compensate"], "");
+    assert!(String::from_utf8_lossy(&page.stdout).contains(".TH calib-compensate"));
+    let wrong = calib(folder.path(), &["man", "compensat"], "");
+    assert_eq!(wrong.status.code(), Some(2));
+}
