@@ -2,6 +2,7 @@
 
 mod check;
 mod compensate;
+mod corrections;
 mod diagnose;
 mod diff;
 mod effects;

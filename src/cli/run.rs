@@ -1,7 +1,7 @@
 //! `calib run`: runs what is not already done.
 
 use super::pipeline_arguments::PipelineArguments;
-use super::{emit, emit_json, searches, tables};
+use super::{corrections, emit, emit_json, searches, tables};
 use crate::error::Result;
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
@@ -69,6 +69,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
         return emit_json(&document(&outcome, &store)?);
     }
     let mut text = tables::statistics(&outcome, &store)?;
+    text.push_str(&corrections::corrections(&outcome, &store)?);
     text.push_str(&searches::searches(&outcome, &store)?);
     text.push_str(&tables::rejected(&outcome));
     for path in &outcome.documents {
@@ -130,6 +131,7 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "seed": manifest.seed,
         "stages": stages,
         "statistics": tables::statistics_json(outcome, store)?,
+        "corrections": corrections::corrections_json(outcome, store)?,
         "searches": searches::searches_json(outcome, store)?,
         "rejected_rows": tables::rejected_rows(outcome),
         "report": outcome.documents.first(),

@@ -1,14 +1,19 @@
-//! `learn`: neural networks for what the identified model leaves over (Wang et al. 2020, section 5).
+//! `learn`: what corrects best what the identified model leaves over, if anything does (Wang et al. 2020, section 5, and rivals).
 //!
-//! Joints -> position residual, by networks started by a beetle swarm and trained by gradient. Cross-validation within the training
-//! rows decides the decay and whether the correction is kept at all: if the gain is not clear, the table `network` stays empty and
-//! the prediction is what it was. Outside the range of its training rows the correction fades to zero.
+//! Cross-validation within the training rows compares the rivals, "no correction" among them; the best is kept if its gain is clear,
+//! else the table `network` stays empty and the prediction is what it was. The table `corrections` says how all of them did.
+//! Outside the region of its training rows a correction fades to zero.
+
+mod told;
 
 use crate::error::{Error, Fault, Result};
 use crate::estimate::network::correction::features;
-use crate::estimate::network::{Activation, Course, OUTPUTS, Phase, Recipe, Samples, Verdict, judge, train};
+use crate::estimate::network::rivals::{Contest, fits, learn};
+use crate::estimate::network::{Activation, Arm, OUTPUTS, Recipe, Rival, Samples, Start, compare};
+use crate::estimate::swarm::Algorithm;
+use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, reads, writes};
-use crate::table::{Network, Prediction, PredictionRow, Recording, Split, Training, TrainingRow};
+use crate::table::{Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +21,9 @@ use serde::{Deserialize, Serialize};
 const FEWEST: usize = 30;
 /// Rows whose residual is so many times the median are mistakes in the recording, not what a smooth correction is for.
 const FAR: f64 = 6.0;
-/// Decays to choose from.
+/// Decays, and sizes of the hidden layer, to choose from.
 const DECAYS: [f64; 5] = [0.1, 0.3, 1.0, 3.0, 10.0];
+const HIDDEN: [usize; 3] = [6, 12, 24];
 /// Generations of the swarm in each fold of the cross-validation: the start matters less there than the time.
 const FOLD_GENERATIONS: usize = 40;
 /// Rows times iterations times networks that the cross-validation may cost: about 20 s on one core in the dev profile. Long
@@ -31,17 +37,21 @@ const FOLD_ITERATIONS: usize = 60;
 pub struct Learn {
     /// Sets of the split to train on.
     pub on: Vec<String>,
-    /// What the networks see.
+    /// What is compared; "no correction" always is.
+    pub rivals: Vec<RivalSetting>,
+    /// Where the training of networks starts, each a rival.
+    pub starts: Vec<StartSetting>,
+    /// What networks and the Gaussian process see.
     pub inputs: Inputs,
     /// Whether they also see the payload; the recording must have it in every row to train on.
     pub payload: bool,
-    /// Neurons of the hidden layer.
-    pub hidden: usize,
+    /// Neurons of the hidden layer; chosen by cross-validation if not given.
+    pub hidden: Option<usize>,
     /// Activation of the hidden layer.
     pub activation: ActivationSetting,
     /// Networks whose mean is the correction.
     pub ensemble: usize,
-    /// Beetles of the swarm that finds where the gradient training starts.
+    /// Beetles of the swarm that finds where the gradient training starts; other swarms may spend as much.
     pub beetles: usize,
     /// Generations of the swarm.
     pub generations: usize,
@@ -61,9 +71,11 @@ impl Default for Learn {
     fn default() -> Self {
         Self {
             on: vec!["fit".into()],
+            rivals: vec![RivalSetting::Ridge, RivalSetting::GaussianProcess, RivalSetting::Curves, RivalSetting::Mlp],
+            starts: vec![StartSetting::Random, StartSetting::Bso],
             inputs: Inputs::Joints,
             payload: false,
-            hidden: 12,
+            hidden: None,
             activation: ActivationSetting::Sigmoid,
             ensemble: 8,
             beetles: 50,
@@ -73,6 +85,51 @@ impl Default for Learn {
             keep_back: 0.0,
             folds: 5,
         }
+    }
+}
+
+/// A kind of correction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RivalSetting {
+    /// Harmonics of the joints, alone and two by two, along the tracker's axes.
+    Ridge,
+    /// A smooth function of the inputs with a length for each.
+    GaussianProcess,
+    /// A curve for each joint, small motions of links and wind-up by weight, through the Jacobian.
+    Curves,
+    /// Networks with one hidden layer.
+    Mlp,
+}
+
+/// Where the training of networks starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StartSetting {
+    /// Anywhere.
+    Random,
+    /// At what beetle antennae search found.
+    Bas,
+    /// At what a beetle swarm found, as in the paper.
+    Bso,
+    /// At what a particle swarm found.
+    Pso,
+    /// At what a genetic algorithm found.
+    Ga,
+    /// At what a bee colony found.
+    Abc,
+}
+
+impl From<StartSetting> for Start {
+    fn from(setting: StartSetting) -> Self {
+        Self::Swarm(match setting {
+            StartSetting::Random => return Self::Random,
+            StartSetting::Bas => Algorithm::Bas,
+            StartSetting::Bso => Algorithm::Bso,
+            StartSetting::Pso => Algorithm::Pso,
+            StartSetting::Ga => Algorithm::Ga,
+            StartSetting::Abc => Algorithm::Abc,
+        })
     }
 }
 
@@ -99,8 +156,10 @@ pub enum ActivationSetting {
 reads! {
     /// Input ports of [`Learn`].
     pub struct LearnReads {
+        robot: Option<Robot>,
         recording: Recording,
         split: Split,
+        parameters: Option<Parameters>,
         prediction: Prediction,
     }
 }
@@ -109,6 +168,7 @@ writes! {
     /// Output ports of [`Learn`].
     pub struct LearnWrites {
         network: Network,
+        corrections: Corrections,
         training: Training,
         prediction: Prediction,
     }
@@ -116,8 +176,8 @@ writes! {
 
 impl Stage for Learn {
     const NAME: &'static str = "learn";
-    const SUMMARY: &'static str = "learns what the model leaves over, and keeps the correction only where it helps";
-    const IMPLEMENTATION: u32 = 3;
+    const SUMMARY: &'static str = "learns what the model leaves over: rivals compared, the best kept, and only where it helps";
+    const IMPLEMENTATION: u32 = 4;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -127,7 +187,7 @@ impl Stage for Learn {
             faults.push(Fault::new("on", "expected at least one set, e.g. [learn]"));
         }
         let counts = [
-            ("hidden", self.hidden, 1, 200),
+            ("hidden", self.hidden.unwrap_or(1), 1, 200),
             ("ensemble", self.ensemble, 1, 100),
             ("beetles", self.beetles, 1, 1000),
             ("generations", self.generations, 0, 10_000),
@@ -138,6 +198,12 @@ impl Stage for Learn {
             if !(least..=most).contains(&value) {
                 faults.push(Fault::new(name, format!("expected a whole number from {least} to {most}, not {value}")));
             }
+        }
+        if self.rivals.is_empty() {
+            faults.push(Fault::new("rivals", "expected at least one of ridge, gaussian_process, curves, mlp"));
+        }
+        if self.starts.is_empty() && self.rivals.contains(&RivalSetting::Mlp) {
+            faults.push(Fault::new("starts", "expected at least one of random, bas, bso, pso, ga, abc"));
         }
         if !(0.0..0.5).contains(&self.keep_back) {
             faults.push(Fault::new("keep_back", format!("expected a share from 0 to below 0.5, not {}", self.keep_back)));
@@ -151,10 +217,14 @@ impl Stage for Learn {
     }
 
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {
-        let LearnReads { recording, split, prediction } = reads;
+        let LearnReads { robot, recording, split, parameters, prediction } = reads;
         if !prediction.0.iter().map(|row| row.sequence).eq(recording.sequence.iter().copied()) {
             return Err(Error::data("table prediction", "it belongs to another recording than the one beside it"));
         }
+        let arm = robot.zip(parameters).map(|(robot, parameters)| {
+            Ok::<Arm, Error>(Arm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
+        });
+        let arm = arm.transpose()?.filter(|arm| arm.hinges.len() == recording.joints);
         let rows = split.rows(&recording, &self.on)?;
         let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
@@ -162,8 +232,9 @@ impl Stage for Learn {
             sources: near.iter().map(|row| sources[*row].clone()).collect(),
             residual: near.iter().map(|row| residual(&prediction.0[*row])).collect(),
         };
-        let (network, training) = self.learn(&samples, &recording.prismatic, context);
-        Ok(LearnWrites { prediction: corrected(&prediction, &network, &recording, &sources, &rows, context)?, network, training })
+        let (network, corrections, training) = self.learn(&samples, arm.as_ref(), &recording.prismatic, context);
+        let prediction = corrected(&prediction, &network, &recording, &sources, &rows, context)?;
+        Ok(LearnWrites { prediction, network, corrections, training })
     }
 }
 
@@ -187,11 +258,12 @@ impl Learn {
         Recipe {
             joints: prismatic.len(),
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
-            hidden: self.hidden,
+            hidden: self.hidden.unwrap_or(HIDDEN[1]),
             activation: match self.activation {
                 ActivationSetting::Sigmoid => Activation::Sigmoid,
                 ActivationSetting::Tanh => Activation::Tanh,
             },
+            start: Start::Random,
             beetles: self.beetles,
             generations: self.generations,
             iterations: self.iterations,
@@ -203,44 +275,61 @@ impl Learn {
         }
     }
 
-    /// The correction as a table (empty if it does not help) and the course of its training.
-    fn learn(&self, samples: &Samples, prismatic: &[bool], context: &Context) -> (Network, Training) {
+    /// The correction as a table (empty if none helps), the rivals, and the course of a network's training.
+    fn learn(
+        &self,
+        samples: &Samples,
+        arm: Option<&Arm>,
+        prismatic: &[bool],
+        context: &Context,
+    ) -> (Network, Corrections, Training) {
         let services = context.services;
-        if samples.rows() < FEWEST {
-            services
-                .warn(format!("{} rows are too few to learn from, at least {FEWEST} are needed: no correction", samples.rows()));
-            return (Network::default(), Training::default());
+        let rows = samples.rows();
+        if rows < FEWEST {
+            services.warn(format!("{rows} rows are too few to learn from, at least {FEWEST} are needed: no correction"));
+            return (Network::default(), Corrections::default(), Training::default());
         }
+        let contest = self.contest(rows, arm, prismatic, context);
+        services.begin("comparing corrections", Some(fits(&contest) as u64), "fits");
+        let comparison = compare(samples, &contest, |done, what| services.advance(done as u64, what));
+        let kept = &comparison.judged[comparison.chosen];
+        services.begin("learning", Some(self.generations as u64 + 1), "generations");
+        let learnt = learn(samples, &contest, kept, |generation| {
+            services.advance(generation.index as u64 + 1, &format!("best {:.4}", generation.best));
+        });
+        let corrections = told::table(context.id, &contest, &comparison, learnt.is_some());
+        services.note(told::sentence(&comparison, learnt.is_some()));
+        match learnt {
+            Some((correction, course)) => (Network::of(&correction, prismatic), corrections, told::history(context.id, course)),
+            None => (Network::default(), corrections, Training::default()),
+        }
+    }
+
+    fn contest<'a>(&self, rows: usize, arm: Option<&'a Arm>, prismatic: &'a [bool], context: &Context) -> Contest<'a> {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
-        let generations = self.generations.min(FOLD_GENERATIONS);
-        let affordable = FOLD_WORK / (samples.rows() * decays.len() * self.folds);
+        let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
+        let affordable = FOLD_WORK / (rows * decays.len() * hidden.len() * self.folds);
         let members = (affordable / self.iterations).clamp(1, 3.min(self.ensemble));
         let iterations = affordable.max(FOLD_ITERATIONS).min(self.iterations);
-        let trial = Recipe { generations, members, iterations, ..recipe.clone() };
-        let total = self.folds * (generations + 1) + self.generations + 1;
-        services.begin("training the network", Some(total as u64), "generations");
-        let verdict = judge(samples, &trial, &decays, self.folds, |fold, generation| {
-            let done = fold * (generations + 1) + generation.index + 1;
-            services
-                .advance(done as u64, &format!("cross-validation {} of {}, best {:.4}", fold + 1, self.folds, generation.best));
-        });
-        if !verdict.helps() {
-            services.note(format!("the network was not kept: {}", sentence(&verdict)));
-            return (Network::default(), Training::default());
+        let trial = Recipe { generations: self.generations.min(FOLD_GENERATIONS), members, iterations, ..recipe.clone() };
+        let mut rivals: Vec<Rival> = Vec::new();
+        for rival in &self.rivals {
+            match rival {
+                RivalSetting::Ridge => rivals.push(Rival::Ridge),
+                RivalSetting::GaussianProcess => rivals.push(Rival::Process),
+                RivalSetting::Curves => rivals.push(Rival::Curves),
+                RivalSetting::Mlp => rivals.extend(self.starts.iter().map(|start| Rival::Network((*start).into()))),
+            }
         }
-        let recipe = Recipe { decay: verdict.decay, ..recipe };
-        let before = self.folds * (generations + 1);
-        let (correction, course) = train(samples, &recipe, |generation| {
-            services.advance((before + generation.index + 1) as u64, &format!("best {:.4}", generation.best));
-        });
-        services.note(format!("the network was kept: {}, decay {}", sentence(&verdict), verdict.decay));
-        (Network::of(&correction, prismatic), history(context.id, course))
+        let mut once: Vec<Rival> = Vec::new();
+        for rival in rivals {
+            if !once.contains(&rival) {
+                once.push(rival);
+            }
+        }
+        Contest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
     }
-}
-
-fn sentence(verdict: &Verdict) -> String {
-    format!("cross-validated error {:.3} -> {:.3} mm on its own training rows", verdict.before * 1e3, verdict.after * 1e3)
 }
 
 /// The rows whose residual is not absurdly far off.
@@ -294,27 +383,10 @@ fn corrected(
     }
     if fading + outside > 0 {
         context.services.note(format!(
-            "{} of {} rows lie outside the joint range or payload that the network saw: it fades out on {fading} and is silent on {outside}",
+            "{} of {} rows lie outside the region (joints, payload) that the correction saw: it fades out on {fading} and is silent on {outside}",
             fading + outside,
             rows.len()
         ));
     }
     Ok(Prediction(rows))
-}
-
-fn history(step: &str, course: Vec<Course>) -> Training {
-    let rows = course.into_iter().map(|record| TrainingRow {
-        step: step.into(),
-        phase: match record.phase {
-            Phase::Swarm => "swarm".into(),
-            Phase::Gradient => "gradient".into(),
-        },
-        member: record.member as i64,
-        generation: record.index as i64,
-        best: record.best,
-        train_rms_mm: record.train_rms * 1e3,
-        check_rms_mm: record.check_rms.map(|rms| rms * 1e3),
-        evaluations: record.evaluations as i64,
-    });
-    Training(rows.collect())
 }

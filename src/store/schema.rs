@@ -16,6 +16,7 @@ use crate::units::Unit;
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/changes.json"),
+    include_str!("../../schemas/corrections.json"),
     include_str!("../../schemas/curves.json"),
     include_str!("../../schemas/document.json"),
     include_str!("../../schemas/finding_numbers.json"),

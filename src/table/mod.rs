@@ -48,6 +48,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 mod changes;
+mod corrections;
 mod curves;
 mod document;
 mod findings;
@@ -72,6 +73,7 @@ mod truth;
 mod verdict;
 
 pub use changes::{ChangeRow, Changes};
+pub use corrections::{Corrections, CorrectionsRow};
 pub use curves::{CurveRow, Curves};
 pub use document::{Document, DocumentRow};
 pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
@@ -99,6 +101,7 @@ pub use verdict::{Verdict, VerdictRow};
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
     Changes::KIND,
+    Corrections::KIND,
     Curves::KIND,
     Document::KIND,
     FindingNumbers::KIND,

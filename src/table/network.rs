@@ -1,20 +1,24 @@
-//! A trained correction: networks with one hidden layer, their scaling, inputs and valid range.
+//! A learned correction of any kind (networks, a Gaussian process, or linear terms), its scaling, inputs and valid region.
 
-use crate::error::{Error, Result};
-use crate::estimate::network::correction::{Correction, Feature, Map, Scaling, Valid};
+mod numbers;
+mod reading;
+
+use crate::estimate::network::arm::Arm;
+use crate::estimate::network::basis::{Term, Wave, Way};
+use crate::estimate::network::correction::{Body, Correction, Dress, Feature, Map};
+use crate::estimate::network::linear::Linear;
+use crate::estimate::network::region::Region;
 use crate::estimate::network::{Activation, Shape};
-use std::collections::BTreeMap;
 
 crate::table::rows! { "network",
-    /// Numbers of the networks, one a row; key (`member`, `part`, `layer`, `to`, `from`). No rows: no correction.
+    /// Numbers of the learned correction, one a row; key (`member`, `part`, `layer`, `to`, `from`). No rows: no correction.
     ///
-    /// Joints and payload are sources: joint `j` is `j`, the payload one more than the number of joints.
+    /// To apply it: [`Network::correction`], then [`Correction::at`]. Joints and payload are sources: joint `j` is `j`, the payload
+    /// one more than the number of joints.
     pub struct Network of NetworkRow {
-        /// The network from 1; 0 for what all networks share.
+        /// The network, or the set of coefficients, from 1; 0 for what all share.
         member: i64,
-        /// `weight`, `bias`; shared: `input_value`, `input_sin`, `input_cos` (of source `from`), `input_mean`, `input_scale`,
-        /// `output_mean`, `output_scale`, `valid_lower`, `valid_upper`, `valid_margin` (of source `to`; the correction is gone one
-        /// margin beyond the range), `sigmoid`, `tanh`.
+        /// Which array; see the schema.
         part: String,
         layer: i64,
         to: i64,
@@ -30,129 +34,144 @@ const MILLI: f64 = 1e3;
 impl Network {
     /// The table of a correction; `prismatic` says which sources are lengths.
     pub fn of(correction: &Correction, prismatic: &[bool]) -> Self {
-        let mut rows = Vec::new();
-        let mut put = |member: usize, part: &str, layer: usize, to: usize, from: usize, value: f64| {
-            let number = |n: usize| i64::try_from(n).expect("a small number");
-            rows.push(NetworkRow {
-                member: number(member),
-                part: part.into(),
-                layer: number(layer),
-                to: number(to),
-                from: number(from),
-                value,
-            });
-        };
-        let shape = correction.shape;
-        put(0, activation_name(shape.activation), 0, 0, 0, 1.0);
-        for (i, (feature, scaling)) in correction.features.iter().zip(&correction.inputs).enumerate() {
-            let unit = unit_of(*feature, prismatic);
-            put(0, map_name(feature.map), 0, i + 1, feature.source + 1, 1.0);
-            put(0, "input_mean", 0, i + 1, 0, scaling.mean * unit);
-            put(0, "input_scale", 0, i + 1, 0, scaling.scale * unit);
-        }
-        for (k, scaling) in correction.outputs.iter().enumerate() {
-            put(0, "output_mean", 0, k + 1, 0, scaling.mean * MILLI);
-            put(0, "output_scale", 0, k + 1, 0, scaling.scale * MILLI);
-        }
-        for (source, valid) in correction.valid.iter().enumerate() {
-            let unit = unit_of(Feature { source, map: Map::Value }, prismatic);
-            put(0, "valid_lower", 0, source + 1, 0, valid.lower * unit);
-            put(0, "valid_upper", 0, source + 1, 0, valid.upper * unit);
-            put(0, "valid_margin", 0, source + 1, 0, valid.margin * unit);
-        }
-        for (m, parameters) in correction.members.iter().enumerate() {
-            for (index, value) in parameters.iter().enumerate() {
-                let (part, layer, to, from) = place(shape, index);
-                put(m + 1, part, layer, to, from, *value);
+        let mut table = Self(Vec::new());
+        table.put(0, "left", [0, 0, 0], correction.left * MILLI);
+        table.region(&correction.region, prismatic);
+        match &correction.body {
+            Body::Networks(dress, networks) => {
+                table.dress(dress, prismatic);
+                table.put(0, activation_name(networks.shape.activation), [0, 0, 0], 1.0);
+                for (m, parameters) in networks.members.iter().enumerate() {
+                    for (index, value) in parameters.iter().enumerate() {
+                        let (part, place) = place(networks.shape, index);
+                        table.put(m + 1, part, place, *value);
+                    }
+                }
             }
+            Body::Process(dress, process) => {
+                table.dress(dress, prismatic);
+                table.put(0, "signal", [0, 0, 0], process.signal);
+                table.put(0, "noise", [0, 0, 0], process.noise);
+                table.row("length", 0, 0, &process.lengths);
+                for (r, (row, alpha)) in process.rows.iter().zip(&process.alpha).enumerate() {
+                    table.row("row", 0, r + 1, row);
+                    table.row("alpha", 0, r + 1, alpha);
+                }
+            }
+            Body::Linear(linear) => table.linear(linear),
         }
-        Self(rows)
+        table
     }
 
-    /// The correction that the rows hold, or none where there are no rows. Fails where a number is missing or stands twice.
-    pub fn correction(&self, prismatic: &[bool]) -> Result<Option<Correction>> {
-        if self.0.is_empty() {
-            return Ok(None);
+    fn put(&mut self, member: usize, part: &str, place: [usize; 3], value: f64) {
+        let number = |n: usize| i64::try_from(n).expect("a small number");
+        let [layer, to, from] = place.map(number);
+        self.0.push(NetworkRow { member: number(member), part: part.into(), layer, to, from, value });
+    }
+
+    /// Values in a row of an array, `from` 1, 2, ...
+    fn row(&mut self, part: &str, layer: usize, to: usize, values: &[f64]) {
+        for (k, value) in values.iter().enumerate() {
+            self.put(0, part, [layer, to, k + 1], *value);
         }
-        let mut numbers = BTreeMap::new();
-        for row in &self.0 {
-            let key = (row.member, row.part.as_str(), row.layer, row.to, row.from);
-            if numbers.insert(key, row.value).is_some() {
-                return Err(Error::data("network", format!("{key:?} stands twice")));
+    }
+
+    fn region(&mut self, region: &Region, prismatic: &[bool]) {
+        for (source, valid) in region.ranges.iter().enumerate() {
+            let unit = source_unit(source, prismatic);
+            self.put(0, "valid_lower", [0, source + 1, 0], valid.lower * unit);
+            self.put(0, "valid_upper", [0, source + 1, 0], valid.upper * unit);
+            self.put(0, "valid_margin", [0, source + 1, 0], valid.margin * unit);
+        }
+        let Some(jointly) = &region.jointly else { return };
+        self.put(0, "joint_limit", [0, 0, 0], jointly.limit);
+        self.put(0, "joint_margin", [0, 0, 0], jointly.margin);
+        for (i, (mean, factor)) in jointly.mean.iter().zip(&jointly.factor).enumerate() {
+            self.put(0, "joint_mean", [0, i + 1, 0], mean * source_unit(i, prismatic));
+            for (j, value) in factor.iter().enumerate() {
+                self.put(0, "joint_factor", [0, i + 1, j + 1], value / source_unit(j, prismatic));
             }
         }
-        let count = |part: &str| self.0.iter().filter(|row| row.part == part).count();
-        let shared = |part: &str, to: usize| number(&numbers, 0, part, 0, to, 0);
-        let activation = [Activation::Sigmoid, Activation::Tanh].into_iter().find(|a| count(activation_name(*a)) == 1);
-        let activation = activation.ok_or_else(|| Error::data("network", "neither `sigmoid` nor `tanh`"))?;
-        let maps = [Map::Value, Map::Sin, Map::Cos];
-        let mut features = BTreeMap::new();
-        for row in &self.0 {
-            if let Some(map) = maps.into_iter().find(|map| map_name(*map) == row.part) {
-                let source = usize::try_from(row.from - 1).map_err(|_| Error::data("network", "an input without a source"))?;
-                features.insert(row.to, Feature { source, map });
+    }
+
+    fn dress(&mut self, dress: &Dress, prismatic: &[bool]) {
+        for (i, (feature, scaling)) in dress.features.iter().zip(&dress.inputs).enumerate() {
+            let unit = feature_unit(*feature, prismatic);
+            self.put(0, map_name(feature.map), [0, i + 1, feature.source + 1], 1.0);
+            self.put(0, "input_mean", [0, i + 1, 0], scaling.mean * unit);
+            self.put(0, "input_scale", [0, i + 1, 0], scaling.scale * unit);
+        }
+        for (k, scaling) in dress.outputs.iter().enumerate() {
+            self.put(0, "output_mean", [0, k + 1, 0], scaling.mean * MILLI);
+            self.put(0, "output_scale", [0, k + 1, 0], scaling.scale * MILLI);
+        }
+    }
+
+    fn linear(&mut self, linear: &Linear) {
+        self.put(0, "terms_noise", [0, 0, 0], linear.noise * MILLI);
+        if let Some(arm) = &linear.arm {
+            self.arm(arm);
+        }
+        for (t, term) in linear.terms.iter().enumerate() {
+            let (part, layer, from) = match term.way {
+                Way::Along(axis) => ("along", 0, axis),
+                Way::Turn(joint) => ("turn", 0, joint),
+                Way::Shift(station, axis) => ("shift", station, axis),
+                Way::Tilt(station, axis) => ("tilt", station, axis),
+            };
+            self.put(0, part, [layer, t + 1, from + 1], 1.0);
+            for wave in &term.waves {
+                let (part, layer, joint) = match *wave {
+                    Wave::Sin(joint, order) => ("sin", order, joint),
+                    Wave::Cos(joint, order) => ("cos", order, joint),
+                    Wave::Value(joint) => ("value", 0, joint),
+                    Wave::Torque(joint, body) => ("torque", body + 1, joint),
+                };
+                self.put(0, part, [layer, t + 1, joint + 1], 1.0);
+            }
+            for (m, member) in linear.members.iter().enumerate() {
+                self.put(m + 1, "coefficient", [0, t + 1, 0], member[t] * coefficient_unit(term));
             }
         }
-        let features: Vec<Feature> = features.into_values().collect();
-        let valid = (0..count("valid_lower"))
-            .map(|source| {
-                let unit = unit_of(Feature { source, map: Map::Value }, prismatic);
-                let bound = |part: &str| Ok::<f64, Error>(shared(part, source + 1)? / unit);
-                Ok(Valid { lower: bound("valid_lower")?, upper: bound("valid_upper")?, margin: bound("valid_margin")? })
-            })
-            .collect::<Result<Vec<Valid>>>()?;
-        if features.is_empty() || features.iter().any(|feature| feature.source >= valid.len()) {
-            return Err(Error::data("network", "an input without a valid range"));
+    }
+
+    fn arm(&mut self, arm: &Arm) {
+        for (j, hinge) in arm.hinges.iter().enumerate() {
+            self.row("axis", 0, j + 1, &hinge.axis);
+            self.row("point", 0, j + 1, &hinge.point.map(|value| value * MILLI));
+            self.put(0, "slides", [0, j + 1, 0], if hinge.slides { 1.0 } else { 0.0 });
         }
-        let scaling = |what: &str, to: usize, unit: f64| -> Result<Scaling> {
-            let scale = shared(&format!("{what}_scale"), to)? / unit;
-            Ok(Scaling { mean: shared(&format!("{what}_mean"), to)? / unit, scale })
-        };
-        let inputs = features.iter().enumerate().map(|(i, f)| scaling("input", i + 1, unit_of(*f, prismatic)));
-        let inputs = inputs.collect::<Result<Vec<Scaling>>>()?;
-        let outputs = [scaling("output", 1, MILLI)?, scaling("output", 2, MILLI)?, scaling("output", 3, MILLI)?];
-        let hidden = self.0.iter().filter(|row| row.member == 1 && row.part == "bias" && row.layer == 1).count();
-        let shape = Shape { inputs: features.len(), hidden, activation };
-        let last = self.0.iter().map(|row| row.member).max().unwrap_or(0);
-        let members = (1..=last)
-            .map(|member| {
-                (0..shape.parameters())
-                    .map(|index| {
-                        let (part, layer, to, from) = place(shape, index);
-                        number(&numbers, member, part, layer, to, from)
-                    })
-                    .collect()
-            })
-            .collect::<Result<Vec<Vec<f64>>>>()?;
-        Ok(Some(Correction { shape, features, inputs, outputs, valid, members }))
+        self.row("tool", 0, 0, &arm.tool.map(|value| value * MILLI));
+        self.row("down", 0, 0, &arm.down);
     }
 }
 
-type Numbers<'a> = BTreeMap<(i64, &'a str, i64, i64, i64), f64>;
-
-fn number(numbers: &Numbers, member: i64, part: &str, layer: usize, to: usize, from: usize) -> Result<f64> {
-    let key = (member, part, layer as i64, to as i64, from as i64);
-    numbers.get(&key).copied().ok_or_else(|| Error::data("network", format!("no row {key:?}")))
-}
-
-/// Where parameter `index` stands in the table: part, layer, to, from.
-fn place(shape: Shape, index: usize) -> (&'static str, usize, usize, usize) {
+/// Where parameter `index` of a network stands in the table: part, and layer, to, from.
+fn place(shape: Shape, index: usize) -> (&'static str, [usize; 3]) {
     if shape.hidden_weights().contains(&index) {
-        ("weight", 1, index / shape.inputs + 1, index % shape.inputs + 1)
+        ("weight", [1, index / shape.inputs + 1, index % shape.inputs + 1])
     } else if shape.hidden_biases().contains(&index) {
-        ("bias", 1, index - shape.hidden_biases().start + 1, 0)
+        ("bias", [1, index - shape.hidden_biases().start + 1, 0])
     } else if shape.output_weights().contains(&index) {
         let index = index - shape.output_weights().start;
-        ("weight", 2, index / shape.hidden + 1, index % shape.hidden + 1)
+        ("weight", [2, index / shape.hidden + 1, index % shape.hidden + 1])
     } else {
-        ("bias", 2, index - shape.output_biases().start + 1, 0)
+        ("bias", [2, index - shape.output_biases().start + 1, 0])
     }
 }
 
 /// Stored per SI: a length is stored in mm, everything else as it is.
-fn unit_of(feature: Feature, prismatic: &[bool]) -> f64 {
-    let length = feature.map == Map::Value && prismatic.get(feature.source).copied().unwrap_or(false);
-    if length { MILLI } else { 1.0 }
+fn source_unit(source: usize, prismatic: &[bool]) -> f64 {
+    if prismatic.get(source).copied().unwrap_or(false) { MILLI } else { 1.0 }
+}
+
+fn feature_unit(feature: Feature, prismatic: &[bool]) -> f64 {
+    if feature.map == Map::Value { source_unit(feature.source, prismatic) } else { 1.0 }
+}
+
+/// Shifts are stored in mm, turns in rad; per m of torque or travel where a wave is one.
+fn coefficient_unit(term: &Term) -> f64 {
+    if matches!(term.way, Way::Along(_) | Way::Shift(..)) { MILLI } else { 1.0 }
 }
 
 fn map_name(map: Map) -> &'static str {

@@ -37,4 +37,5 @@ mod store;
 mod suspects;
 mod swarm;
 mod tables;
+mod transfer;
 mod twin;

@@ -1,8 +1,15 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
-use calib::estimate::network::correction::{Scaling, Valid, features};
+use calib::estimate::network::arm::Arm;
+use calib::estimate::network::correction::{Body, Dress, Networks, Scaling, features};
 use calib::estimate::network::perceptron::{Batch, Loss, Scratch};
-use calib::estimate::network::{Activation, Correction, Recipe, Samples, Shape, judge, train};
+use calib::estimate::network::region::Region;
+use calib::estimate::network::rivals::{Comparison, Contest, learn};
+use calib::estimate::network::{Activation, Correction, Recipe, Rival, Samples, Shape, Start, compare, train};
+use calib::estimate::swarm::Algorithm;
+use calib::robot::RobotModel;
+use calib::robot::import::{Text, read_calib};
+use calib::spatial::Pose;
 use calib::table::{Network, Table};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -13,6 +20,7 @@ fn recipe(joints: usize) -> Recipe {
         features: features(&vec![false; joints], false, false),
         hidden: 12,
         activation: Activation::Sigmoid,
+        start: Start::Swarm(Algorithm::Bso),
         beetles: 20,
         generations: 30,
         iterations: 200,
@@ -108,48 +116,126 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
     assert_eq!(course.iter().filter(|c| c.member == 0).count(), 31);
 }
 
+/// The SR210D, its base turned and shifted in the tracker's frame.
+fn sr210d() -> Arm {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let text = std::fs::read_to_string(file).unwrap();
+    let robot = RobotModel::new(read_calib(Text { label: "robot.yaml", text: &text }, None).unwrap().robot);
+    Arm::of(&robot, &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()))
+}
+
+/// Poses of that arm whose joints 1 and 2 have encoders with waves of 90 and 60 urad, plus `noise` m per axis.
+fn waves(rows: usize, arm: &Arm, noise: f64, seed: u64) -> Samples {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut samples = Samples::default();
+    for _ in 0..rows {
+        let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
+        let stance = arm.stance(&q);
+        let moved = stance.turn(0) * (90e-6 * (11.0 * q[0] + 0.4).sin()) + stance.turn(1) * (60e-6 * (5.0 * q[1]).cos());
+        samples.residual.push(std::array::from_fn(|k| moved[k] + noise * normal(&mut rng)));
+        samples.sources.push(q);
+    }
+    samples
+}
+
+fn contest<'a>(arm: Option<&'a Arm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> Contest<'a> {
+    Contest {
+        rivals: rivals.to_vec(),
+        arm,
+        prismatic: &[false; 6],
+        recipe: cheap.clone(),
+        trial: Recipe { members: 2, ..cheap.clone() },
+        decays: vec![0.5, 5.0],
+        hidden: vec![8],
+        folds,
+    }
+}
+
+const ALL: [Rival; 5] =
+    [Rival::Ridge, Rival::Process, Rival::Curves, Rival::Network(Start::Random), Rival::Network(Start::Swarm(Algorithm::Bso))];
+
+fn error(comparison: &Comparison, rival: Rival) -> f64 {
+    comparison.judged.iter().find(|judged| judged.rival == Some(rival)).unwrap().mean()
+}
+
 #[test]
 fn training_is_the_same_on_one_thread_and_on_three() {
     let samples = arm(90, 1.0, 0.2e-3, 3);
-    let on = |jobs| train(&samples, &Recipe { jobs, ..recipe(6) }, |_| {});
-    let judged = |jobs| judge(&samples, &Recipe { jobs, members: 2, ..recipe(6) }, &[0.5, 5.0], 3, |_, _| {});
-    assert_eq!(on(1), on(3));
+    for start in [Start::Random, Start::Swarm(Algorithm::Bas), Start::Swarm(Algorithm::Bso), Start::Swarm(Algorithm::Abc)] {
+        let on = |jobs| train(&samples, &Recipe { jobs, start, ..recipe(6) }, |_| {});
+        assert_eq!(on(1), on(3), "{start:?}");
+    }
+    let tool = sr210d();
+    let cheap = Recipe { generations: 5, iterations: 40, ..recipe(6) };
+    let judged = |jobs| {
+        let contest = contest(Some(&tool), &ALL, &Recipe { jobs, ..cheap.clone() }, 3);
+        let comparison = compare(&samples, &contest, |_, _| {});
+        let learnt: Vec<_> = comparison.judged.iter().map(|judged| learn(&samples, &contest, judged, |_| {})).collect();
+        (comparison, learnt)
+    };
     assert_eq!(judged(1), judged(3));
+}
+
+#[test]
+fn joint_curves_find_waves_that_no_other_rival_can_see() {
+    let tool = sr210d();
+    let (training, unseen) = (waves(300, &tool, 20e-6, 1), waves(300, &tool, 20e-6, 2));
+    let cheap = Recipe { generations: 5, iterations: 60, ..recipe(6) };
+    let contest = contest(Some(&tool), &ALL, &cheap, 4);
+    let comparison = compare(&training, &contest, |_, _| {});
+    let before = mean_error(&unseen, None);
+    let best = &comparison.judged[comparison.chosen];
+    assert_eq!(best.rival, Some(Rival::Curves));
+    assert!(ALL.iter().all(|rival| *rival == Rival::Curves || error(&comparison, *rival) > 1.2 * best.mean()));
+    let (correction, _) = learn(&training, &contest, best, |_| {}).unwrap();
+    let after = mean_error(&unseen, Some(&correction));
+    // Noise alone is 1.596 * 20 um.
+    assert!(after > 30e-6 && after < 45e-6 && after < 0.3 * before, "{before} {after}");
+    // What is stated of it is what is left.
+    let spread = correction.at(&unseen.sources[0]).spread.unwrap();
+    assert!((15e-6..35e-6).contains(&spread), "{spread}");
 }
 
 #[test]
 fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
-    let decays = [0.3, 3.0];
-    let verdict = judge(&arm(150, 1.0, 0.2e-3, 4), &cheap, &decays, 5, |_, _| {});
-    assert!(verdict.helps() && verdict.after < 0.8 * verdict.before, "{verdict:?}");
+    let tool = sr210d();
+    let smooth = compare(&arm(150, 1.0, 0.2e-3, 4), &contest(Some(&tool), &ALL, &cheap, 5), |_, _| {});
+    let best = &smooth.judged[smooth.chosen];
+    assert!(best.helps() && best.mean() < 0.8 * smooth.judged[0].mean(), "{smooth:?}");
     let refused = (0..20).filter(|seed| {
         let recipe = Recipe { seed: *seed, ..cheap.clone() };
-        !judge(&arm(120, 0.0, 0.5e-3, 200 + seed), &recipe, &decays, 5, |_, _| {}).helps()
+        let rivals = [Rival::Ridge, Rival::Process, Rival::Network(Start::Random)];
+        compare(&arm(120, 0.0, 0.5e-3, 200 + seed), &contest(None, &rivals, &recipe, 4), |_, _| {}).chosen == 0
     });
-    assert!(refused.count() >= 19, "useless networks pass");
+    let refused = refused.count();
+    assert!(refused >= 18, "useless corrections pass: {refused} of 20 refused");
 }
 
 #[test]
 fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     let (correction, _) = train(&arm(120, 1.0, 0.1e-3, 5), &recipe(6), |_| {});
     let mut q = vec![0.1; 6];
-    q[1] = correction.valid[1].upper;
+    let range = correction.region.ranges[1];
+    q[1] = range.upper;
     let edge = correction.at(&q);
-    assert_eq!(edge.share, 1.0);
-    let margin = correction.valid[1].margin;
-    assert!((margin - 0.1 * (correction.valid[1].upper - correction.valid[1].lower)).abs() < 1e-15);
+    assert!(edge.share == 1.0 && edge.spread.is_some());
+    let margin = range.margin;
+    assert!((margin - 0.1 * (range.upper - range.lower)).abs() < 1e-15);
     let length = |d: [f64; 3]| d.iter().map(|d| d * d).sum::<f64>().sqrt();
     let mut last = edge;
     for step in 1..=20 {
-        q[1] = correction.valid[1].upper + margin * f64::from(step) / 20.0;
+        q[1] = range.upper + margin * f64::from(step) / 20.0;
         let now = correction.at(&q);
         assert!(now.share < last.share && length(now.delta) <= length(last.delta), "step {step}");
         // No jump: the smoothstep falls by at most 1.5/20 a step.
         assert!(last.share - now.share < 0.08);
         last = now;
     }
-    assert_eq!((last.share, last.delta), (0.0, [0.0; 3]));
+    assert_eq!((last.share, last.delta, last.spread), (0.0, [0.0; 3], None));
+    // Every joint within its range, but all at once at their ends: no such posture was seen.
+    let corner: Vec<f64> = correction.region.ranges.iter().map(|range| range.upper).collect();
+    assert!(correction.region.jointly.is_some() && correction.at(&corner).share < 1.0);
     q[1] = f64::NAN;
     assert_eq!(correction.at(&q).share, 0.0);
     assert_eq!(correction.at(&q[..3]).share, 0.0);
@@ -163,23 +249,21 @@ fn a_correction_comes_back_from_its_table() {
     let shape = Shape { inputs: features.len(), hidden: 4, activation: Activation::Tanh };
     let mut number = |from: f64, to: f64| rng.random_range(from..to);
     let mut scaling = || Scaling { mean: number(-1.0, 1.0), scale: number(0.1, 2.0) };
-    let correction = Correction {
-        shape,
-        inputs: features.iter().map(|_| scaling()).collect(),
-        outputs: [scaling(), scaling(), scaling()],
-        valid: (0..4).map(|_| Valid { lower: number(-2.0, -1.0), upper: number(1.0, 2.0), margin: number(0.1, 0.5) }).collect(),
-        members: (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect(),
-        features,
-    };
-    assert_eq!(correction.features.len(), 6);
+    let dress =
+        Dress { inputs: features.iter().map(|_| scaling()).collect(), outputs: [scaling(), scaling(), scaling()], features };
+    assert_eq!(dress.features.len(), 6);
+    let members = (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect();
+    let sources: Vec<Vec<f64>> = (0..40).map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect()).collect();
+    let region = Region::of(&sources, 3);
+    let correction = Correction { body: Body::Networks(dress, Networks { shape, members }), region, left: 1e-4 };
     let table = Network::of(&correction, &prismatic);
     let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&prismatic).unwrap().unwrap();
-    assert_eq!((&back.features, &back.members, back.shape), (&correction.features, &correction.members, correction.shape));
     for _ in 0..100 {
         let q: Vec<f64> = (0..4).map(|_| number(-2.5, 2.5)).collect();
         let (there, here) = (correction.at(&q), back.at(&q));
         // mm and m differ in the last bit only.
         assert!((0..3).all(|k| (there.delta[k] - here.delta[k]).abs() <= 1e-12), "{there:?} {here:?}");
+        assert!((there.share - here.share).abs() < 1e-12 && there.spread.is_some() == here.spread.is_some());
     }
     let empty = Network::from_frame(&Network(Vec::new()).to_frame().unwrap()).unwrap();
     assert!(empty.correction(&prismatic).unwrap().is_none());
@@ -187,4 +271,26 @@ fn a_correction_comes_back_from_its_table() {
     holed.0.retain(|row| !(row.member == 2 && row.part == "bias" && row.layer == 1 && row.to == 3));
     let message = holed.correction(&prismatic).unwrap_err().to_string();
     assert!(message.contains("bias"), "{message}");
+}
+
+#[test]
+fn every_kind_of_correction_comes_back_from_its_table() {
+    let tool = sr210d();
+    let samples = waves(120, &tool, 50e-6, 7);
+    let cheap = Recipe { generations: 3, iterations: 20, ..recipe(6) };
+    let contest = contest(Some(&tool), &ALL, &cheap, 2);
+    let comparison = compare(&samples, &contest, |_, _| {});
+    for judged in &comparison.judged[1..] {
+        let (correction, _) = learn(&samples, &contest, judged, |_| {}).unwrap();
+        let table = Network::of(&correction, &[false; 6]);
+        let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&[false; 6]).unwrap().unwrap();
+        for q in &samples.sources {
+            let (there, here) = (correction.at(q), back.at(q));
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+            assert!((0..3).all(|k| near(there.delta[k], here.delta[k])) && near(there.spread.unwrap(), here.spread.unwrap()));
+        }
+        let mut twice = table.clone();
+        twice.0.push(table.0[0].clone());
+        assert!(twice.correction(&[false; 6]).unwrap_err().to_string().contains("twice"));
+    }
 }

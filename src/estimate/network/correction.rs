@@ -1,15 +1,12 @@
-//! A trained correction and the range in which it may be applied.
+//! A learned correction and how it applies: the one function by which any kind of it is ever used.
 //!
-//! Inside the range that the training saw, the correction is the mean of its networks. Outside, the inputs are held at the edge and
-//! the correction fades: by the smoothstep `s^2 (3 - 2 s)`, `s = 1 - distance/margin`, per source, multiplied over the sources,
-//! so that it is zero one margin beyond.
+//! Inside the region that the training saw it is what was learnt; outside, sources are held at its edge and it fades to nothing
+//! (see [`Region`]).
 
+use super::linear::Linear;
 use super::perceptron::{OUTPUTS, Shape};
-
-/// The margin as a share of the range that was seen.
-const MARGIN: f64 = 0.1;
-/// The margin where a joint hardly moved, rad or m.
-const LEAST_MARGIN: f64 = 0.01;
+use super::process::Process;
+use super::region::Region;
 
 /// How an input comes from a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +16,7 @@ pub enum Map {
     Cos,
 }
 
-/// One input of the network. Sources are the joints (rad or m, from 0), then the payload (kg).
+/// One input. Sources are the joints (rad or m, from 0), then the payload (kg).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Feature {
     pub source: usize,
@@ -73,47 +70,53 @@ impl Scaling {
     }
 }
 
-/// The range of a source that the training saw, and how far beyond it the correction is gone.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Valid {
-    pub lower: f64,
-    pub upper: f64,
-    pub margin: f64,
-}
-
-impl Valid {
-    /// The range of a joint's positions, rad or m.
-    pub fn joint(values: impl Iterator<Item = f64> + Clone) -> Self {
-        Self::of(values, |_| LEAST_MARGIN)
-    }
-    /// The range of a payload, kg: what a load does is proportional to it, so a tenth of the load is as near as a tenth of the range.
-    pub fn payload(values: impl Iterator<Item = f64> + Clone) -> Self {
-        Self::of(values, |heaviest| MARGIN * heaviest.max(1.0))
-    }
-    fn of(values: impl Iterator<Item = f64> + Clone, least: impl Fn(f64) -> f64) -> Self {
-        let lower = values.clone().fold(f64::INFINITY, f64::min);
-        let upper = values.fold(f64::NEG_INFINITY, f64::max);
-        Self { lower, upper, margin: (MARGIN * (upper - lower)).max(least(upper)) }
-    }
-    /// 1 inside, 0 from one margin outside on.
-    fn share(&self, value: f64) -> f64 {
-        let outside = (self.lower - value).max(value - self.upper).max(0.0);
-        let s = (1.0 - outside / self.margin).max(0.0);
-        s * s * (3.0 - 2.0 * s)
-    }
-}
-
-/// An ensemble of equal networks with everything that is needed to apply it. Positions in m, tracker frame.
+/// Inputs and outputs with their scaling.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Correction {
-    pub shape: Shape,
+pub struct Dress {
     pub features: Vec<Feature>,
     pub inputs: Vec<Scaling>,
+    /// m.
     pub outputs: [Scaling; OUTPUTS],
-    /// By source: the joints, and the payload where it was known in training, be it an input or not.
-    pub valid: Vec<Valid>,
+}
+
+impl Dress {
+    /// Standardised inputs at `sources`.
+    pub fn scaled(&self, sources: &[f64]) -> Vec<f64> {
+        self.features.iter().zip(&self.inputs).map(|(f, scaling)| scaling.scaled(f.of(sources))).collect()
+    }
+    /// Outputs in m.
+    fn worn(&self, y: [f64; OUTPUTS]) -> [f64; 3] {
+        std::array::from_fn(|k| self.outputs[k].mean + self.outputs[k].scale * y[k])
+    }
+    /// Root of the mean squared scale of the outputs, m.
+    fn size(&self) -> f64 {
+        (self.outputs.iter().map(|o| o.scale * o.scale).sum::<f64>() / OUTPUTS as f64).sqrt()
+    }
+}
+
+/// Equal networks whose mean is the correction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Networks {
+    pub shape: Shape,
     /// Parameters of each network.
     pub members: Vec<Vec<f64>>,
+}
+
+/// What was learnt.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Body {
+    Networks(Dress, Networks),
+    Process(Dress, Process),
+    Linear(Linear),
+}
+
+/// A learned correction with everything that is needed to apply it. Positions in m, tracker frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correction {
+    pub body: Body,
+    pub region: Region,
+    /// What is left of held-out rows, per axis, m: root mean square in cross-validation.
+    pub left: f64,
 }
 
 /// A correction as it applies at one pose.
@@ -121,36 +124,51 @@ pub struct Correction {
 pub struct Applied {
     /// What to add to the predicted position, m.
     pub delta: [f64; 3],
-    /// 1 inside the valid range, 0 where nothing is known and `delta` is zero, between on the margin.
+    /// 1 inside the valid region, 0 where nothing is known and `delta` is zero, between on the margin.
     pub share: f64,
+    /// Standard deviation per axis of what is left, m; `None` outside the region, where nothing is known of it.
+    pub spread: Option<f64>,
 }
 
 impl Correction {
     /// The correction at `sources` (joints in rad or m, then payload in kg where it was known in training).
     ///
-    /// A source that is missing or no number counts as outside the range: no correction.
+    /// A source that is missing or no number counts as outside the region: no correction.
     pub fn at(&self, sources: &[f64]) -> Applied {
-        let nothing = Applied { delta: [0.0; 3], share: 0.0 };
-        if sources.len() < self.valid.len() || sources.iter().take(self.valid.len()).any(|v| !v.is_finite()) {
-            return nothing;
+        let share = self.region.share(sources);
+        if share == 0.0 {
+            return Applied { delta: [0.0; 3], share: 0.0, spread: None };
         }
-        let share: f64 = self.valid.iter().zip(sources).map(|(valid, value)| valid.share(*value)).product();
-        if share == 0.0 || self.members.is_empty() {
-            return nothing;
-        }
-        let held: Vec<f64> = self.valid.iter().zip(sources).map(|(v, value)| value.clamp(v.lower, v.upper)).collect();
-        let x: Vec<f64> = self.features.iter().zip(&self.inputs).map(|(f, scaling)| scaling.scaled(f.of(&held))).collect();
-        let mut sum = [0.0; OUTPUTS];
-        for member in &self.members {
-            for (sum, y) in sum.iter_mut().zip(self.shape.at(member, &x)) {
-                *sum += y;
+        let (whole, doubt) = self.inside(&self.region.held(sources));
+        let spread = (share == 1.0).then(|| doubt.hypot(self.left));
+        Applied { delta: whole.map(|value| share * value), share, spread }
+    }
+
+    /// The correction within the region, and how far it is in doubt per axis, m.
+    fn inside(&self, sources: &[f64]) -> ([f64; 3], f64) {
+        match &self.body {
+            Body::Linear(linear) => linear.at(sources),
+            Body::Process(dress, process) => {
+                let (y, doubt) = process.at(&dress.scaled(sources));
+                (dress.worn(y), doubt * dress.size())
+            }
+            Body::Networks(dress, networks) => {
+                let x = dress.scaled(sources);
+                let each: Vec<[f64; OUTPUTS]> = networks.members.iter().map(|member| networks.shape.at(member, &x)).collect();
+                let count = each.len().max(1) as f64;
+                let mean: [f64; OUTPUTS] = std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
+                let squares: f64 = each.iter().flatten().zip(mean.iter().cycle()).map(|(y, mean)| (y - mean).powi(2)).sum();
+                (dress.worn(mean), (squares / (count * OUTPUTS as f64)).sqrt() * dress.size())
             }
         }
-        let count = self.members.len() as f64;
-        let mut delta = [0.0; 3];
-        for ((delta, sum), scaling) in delta.iter_mut().zip(sum).zip(&self.outputs) {
-            *delta = share * (scaling.mean + scaling.scale * sum / count);
+    }
+
+    /// Numbers that were learnt.
+    pub fn numbers(&self) -> usize {
+        match &self.body {
+            Body::Linear(linear) => linear.terms.len(),
+            Body::Process(_, process) => process.lengths.len() + 2 + OUTPUTS * process.rows.len(),
+            Body::Networks(_, networks) => networks.members.iter().map(Vec::len).sum(),
         }
-        Applied { delta, share }
     }
 }

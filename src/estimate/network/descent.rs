@@ -1,6 +1,6 @@
 //! Gradient training: limited-memory BFGS (Liu and Nocedal 1989) with backtracking, stopped early by rows kept back.
 
-use super::perceptron::{Loss, Scratch};
+use super::OUTPUTS;
 use std::collections::VecDeque;
 
 /// Steps remembered; ten is the usual choice and more gains nothing here.
@@ -19,8 +19,8 @@ pub struct Iteration {
     /// Loss on the training rows, decay included.
     pub loss: f64,
     /// Mean squared error per output on the training rows, and on the rows kept back.
-    pub train: [f64; super::OUTPUTS],
-    pub check: Option<[f64; super::OUTPUTS]>,
+    pub train: [f64; OUTPUTS],
+    pub check: Option<[f64; OUTPUTS]>,
     pub evaluations: u64,
 }
 
@@ -42,14 +42,19 @@ pub struct Descent {
     pub stop: Stop,
 }
 
-/// Minimises `train` from `start` in at most `iterations` iterations.
+/// Minimises a loss from `start` in at most `iterations` iterations.
 ///
-/// With `check`, the parameters of the smallest check error are returned, else those of the smallest loss.
-pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: usize) -> Descent {
-    let mut scratch = Scratch::new(train.shape);
+/// `evaluate` writes its gradient and returns its value with the mean squared error of each output; `check` judges rows kept back. With
+/// a check, the parameters of the smallest check error are returned, else those of the smallest loss.
+pub fn descend(
+    mut evaluate: impl FnMut(&[f64], &mut [f64]) -> (f64, [f64; OUTPUTS]),
+    mut check: impl FnMut(&[f64]) -> Option<[f64; OUTPUTS]>,
+    start: Vec<f64>,
+    iterations: usize,
+) -> Descent {
     let mut x = start;
     let mut gradient = vec![0.0; x.len()];
-    let (mut loss, mut squares) = train.gradient(&x, &mut gradient, &mut scratch);
+    let (mut loss, mut squares) = evaluate(&x, &mut gradient);
     let mut evaluations = 1;
     let mut memory: VecDeque<Pair> = VecDeque::new();
     let mut kept = (f64::INFINITY, x.clone());
@@ -59,7 +64,7 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
     let mut next_gradient = gradient.clone();
     let mut index = 0;
     let stop = loop {
-        let checked = check.map(|check| check.mean_squares(&x, &mut scratch));
+        let checked = check(&x);
         history.push(Iteration { index, loss, train: squares, check: checked, evaluations });
         let judged = checked.map_or(loss, |squares| squares.iter().sum());
         if judged < kept.0 {
@@ -89,7 +94,7 @@ pub fn descend(train: Loss, check: Option<Loss>, start: Vec<f64>, iterations: us
             for ((n, x), d) in next.iter_mut().zip(&x).zip(&direction) {
                 *n = x + step * d;
             }
-            let (value, at_next) = train.gradient(&next, &mut next_gradient, &mut scratch);
+            let (value, at_next) = evaluate(&next, &mut next_gradient);
             evaluations += 1;
             if value <= loss + SUFFICIENT * step * slope {
                 break Some((value, at_next));

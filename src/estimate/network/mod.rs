@@ -1,17 +1,23 @@
-//! The learned correction of what physics left over: multilayer perceptrons with one hidden layer, started by a beetle swarm and
-//! trained by gradient (Wang et al. 2020, section 5.3-5.4 and Fig. 3).
+//! The learned correction of what physics left over: rivals compared by cross-validation, the best of which is kept if it helps.
 //!
-//! [`perceptron`] is the network and its gradient, [`descent`] the gradient training, [`training`] the ensemble from samples,
-//! [`cross_validation`] the judge of whether it helps at all, and [`Correction`] the result: the one function by which a network is
-//! ever applied, with the range in which it may be.
+//! [`rivals`] is the judge. The rivals: [`linear`] fits [`basis`] terms (ridge on harmonics; joint curves through the Jacobian of
+//! the [`arm`]), [`process`] is a Gaussian process, [`training`] makes [`perceptron`]s (Wang et al. 2020, sections 5.3-5.4) from
+//! random starts or from a swarm's by [`descent`]. [`Correction`] is the result: the one function by which any of them is ever
+//! applied, with the [`region`] in which it may be.
 
+pub mod arm;
+pub mod basis;
 pub mod correction;
-pub mod cross_validation;
 pub mod descent;
+pub mod linear;
 pub mod perceptron;
+pub mod process;
+pub mod region;
+pub mod rivals;
 pub mod training;
 
-pub use correction::{Applied, Correction, Feature, Map};
-pub use cross_validation::{Verdict, judge};
+pub use arm::Arm;
+pub use correction::{Applied, Body, Correction, Feature, Map};
 pub use perceptron::{Activation, OUTPUTS, Shape};
-pub use training::{Course, Phase, Recipe, Samples, train};
+pub use rivals::{Judged, Rival, compare};
+pub use training::{Course, Phase, Recipe, Samples, Start, train};

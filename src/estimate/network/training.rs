@@ -1,11 +1,12 @@
-//! From samples to a correction: a beetle swarm finds the starts (Fig. 3), gradient descent finishes them, their mean is used.
+//! From samples to networks: a swarm (Fig. 3) or chance finds the starts, gradient descent finishes them, their mean is used.
 //!
-//! Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
+//! All swarms may spend what a beetle swarm of the recipe's size does. Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
 
-use super::correction::{Correction, Feature, Scaling, Valid};
+use super::correction::{Body, Correction, Dress, Feature, Networks, Scaling};
 use super::descent::{Iteration, descend};
 use super::perceptron::{Activation, Batch, Loss, OUTPUTS, Scratch, Shape};
-use crate::estimate::swarm::{BeetleSwarm, Bounds, Budget, Generation, Objective, minimise};
+use super::region::Region;
+use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation, Objective};
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -14,6 +15,23 @@ use rand::{RngExt, SeedableRng};
 pub const SWARM_ROWS: usize = 256;
 /// Beetles search weights in -1..1: with standardised inputs no neuron is saturated there.
 const SWARM_BOUND: f64 = 1.0;
+
+/// Where the gradient training starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// Weights drawn evenly from the box that swarms search.
+    Random,
+    Swarm(Algorithm),
+}
+
+impl Start {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Swarm(algorithm) => algorithm.name(),
+        }
+    }
+}
 
 /// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +60,7 @@ pub struct Recipe {
     pub features: Vec<Feature>,
     pub hidden: usize,
     pub activation: Activation,
+    pub start: Start,
     pub beetles: usize,
     pub generations: usize,
     /// Most iterations of the gradient training.
@@ -80,7 +99,7 @@ pub struct Course {
 pub fn train(samples: &Samples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<Course>) {
     assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
     let prepared = Prepared::new(samples, recipe);
-    let (starts, mut course) = prepared.swarm(observe);
+    let (starts, mut course) = prepared.starts(observe);
     let trained = in_order(recipe.jobs, recipe.members, |m| prepared.member(m, starts[m % starts.len()].clone()));
     let mut members = Vec::with_capacity(recipe.members);
     for (parameters, history) in trained {
@@ -90,72 +109,93 @@ pub fn train(samples: &Samples, recipe: &Recipe, observe: impl FnMut(&Generation
     (prepared.correction(members), course)
 }
 
-/// Starts of `recipe.members` networks and the swarm's course; apart from [`finish`] so that several decays share one swarm.
-pub(super) struct Prepared<'a> {
+/// Rows scaled and ready to be learnt.
+struct Prepared<'a> {
     recipe: &'a Recipe,
     shape: Shape,
     x: Vec<Vec<f64>>,
     y: Vec<[f64; OUTPUTS]>,
-    inputs: Vec<Scaling>,
-    outputs: [Scaling; OUTPUTS],
-    valid: Vec<Valid>,
+    dress: Dress,
+    region: Region,
+}
+
+/// Standardised inputs and outputs with their scaling.
+pub(super) fn dressed(samples: &Samples, features: &[Feature]) -> (Dress, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
+    let inputs = features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
+    let outputs: [Scaling; OUTPUTS] = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
+    let dress = Dress { features: features.to_vec(), inputs, outputs };
+    let x = samples.sources.iter().map(|row| dress.scaled(row)).collect();
+    let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k]))).collect();
+    (dress, x, y)
 }
 
 impl<'a> Prepared<'a> {
-    pub(super) fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
-        let sources = samples.sources.first().map_or(0, Vec::len);
-        let column = |s: usize| samples.sources.iter().map(move |row| row[s]);
-        let valid =
-            (0..sources).map(|s| if s < recipe.joints { Valid::joint(column(s)) } else { Valid::payload(column(s)) }).collect();
-        let inputs: Vec<Scaling> =
-            recipe.features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
-        let outputs = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
-        let scaled = |row: &Vec<f64>| recipe.features.iter().zip(&inputs).map(|(f, s)| s.scaled(f.of(row))).collect();
-        let x = samples.sources.iter().map(scaled).collect();
-        let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs_scaled(&outputs, k, r[k]))).collect();
+    fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
+        let (dress, x, y) = dressed(samples, &recipe.features);
         let shape = Shape { inputs: recipe.features.len(), hidden: recipe.hidden, activation: recipe.activation };
-        Self { recipe, shape, x, y, inputs, outputs, valid }
+        Self { recipe, shape, x, y, dress, region: Region::of(&samples.sources, recipe.joints) }
     }
 
-    /// The beetles' best positions, best first, and the course of the swarm.
-    pub(super) fn swarm(&self, mut observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<Course>) {
+    /// Where members start, best first, and the course of the swarm; chance has none.
+    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<Course>) {
         let mut rng = self.rng(0);
-        let rows =
-            if self.y.len() > SWARM_ROWS { draw(&mut rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
+        let bounds = Bounds::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
+        match self.recipe.start {
+            Start::Random => ((0..self.recipe.members).map(|_| bounds.random(&mut rng)).collect(), Vec::new()),
+            Start::Swarm(algorithm) => self.swarm(algorithm, &bounds, &mut rng, observe),
+        }
+    }
+
+    fn swarm(
+        &self,
+        algorithm: Algorithm,
+        bounds: &Bounds,
+        rng: &mut ChaCha8Rng,
+        mut observe: impl FnMut(&Generation),
+    ) -> (Vec<Vec<f64>>, Vec<Course>) {
+        let rows = if self.y.len() > SWARM_ROWS { draw(rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
         let batch = self.batch(&rows);
         let loss = Loss { shape: self.shape, batch: &batch, decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64 };
         let mut scratch = Scratch::new(self.shape);
         let mut course: Vec<Course> = Vec::new();
-        let bounds = Bounds::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
-        let budget = Budget {
-            generations: self.recipe.generations,
-            evaluations: None,
-            target: None,
-            seed: rng.random(),
-            jobs: self.recipe.jobs,
-        };
-        let method = BeetleSwarm { beetles: self.recipe.beetles, ..BeetleSwarm::default() };
-        let outcome = minimise(&method, &Fitness(loss), &bounds, &budget, |generation, best| {
-            observe(generation);
-            let train_rms = match course.last() {
-                Some(last) if last.best == generation.best => last.train_rms,
-                _ => self.rms(loss.mean_squares(best, &mut scratch)),
+        // A lone beetle knows one place: each member has a search of its own, at a share of the cost.
+        let searches = if algorithm == Algorithm::Bas { self.recipe.members } else { 1 };
+        let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations) / searches as u64;
+        let mut starts = Vec::new();
+        for search in 0..searches {
+            let budget = Budget {
+                generations: algorithm.generations(self.recipe.beetles, spent),
+                evaluations: Some(spent),
+                target: None,
+                seed: rng.random(),
+                jobs: self.recipe.jobs,
             };
-            course.push(Course {
-                phase: Phase::Swarm,
-                member: 0,
-                index: generation.index,
-                best: generation.best,
-                train_rms,
-                check_rms: None,
-                evaluations: generation.evaluations,
+            let outcome = algorithm.minimise(self.recipe.beetles, &Fitness(loss), bounds, &budget, |generation, best| {
+                if search > 0 {
+                    return;
+                }
+                observe(generation);
+                let train_rms = match course.last() {
+                    Some(last) if last.best == generation.best => last.train_rms,
+                    _ => self.rms(loss.mean_squares(best, &mut scratch)),
+                };
+                course.push(Course {
+                    phase: Phase::Swarm,
+                    member: 0,
+                    index: generation.index,
+                    best: generation.best,
+                    train_rms,
+                    check_rms: None,
+                    evaluations: generation.evaluations,
+                });
             });
-        });
-        (outcome.elite.into_iter().map(|(_, position)| position).collect(), course)
+            starts.extend(outcome.elite.into_iter().map(|(_, position)| position));
+        }
+        (starts, course)
     }
 
     /// Trains member `m` (from 0) from `start`.
-    pub(super) fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<Course>) {
+    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<Course>) {
         let mut rng = self.rng(1 + m as u64);
         let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
         let (kept_back, rest) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
@@ -164,7 +204,13 @@ impl<'a> Prepared<'a> {
         let decay = self.recipe.decay;
         let train = Loss { shape: self.shape, batch: &batch, decay };
         let check = (check.rows() > 0).then_some(Loss { shape: self.shape, batch: &check, decay });
-        let descent = descend(train, check, start, self.recipe.iterations);
+        let (mut scratch, mut beside) = (Scratch::new(self.shape), Scratch::new(self.shape));
+        let descent = descend(
+            |x, gradient| train.gradient(x, gradient, &mut scratch),
+            |x| check.map(|check| check.mean_squares(x, &mut beside)),
+            start,
+            self.recipe.iterations,
+        );
         let course = |i: Iteration| Course {
             phase: Phase::Gradient,
             member: m + 1,
@@ -177,15 +223,9 @@ impl<'a> Prepared<'a> {
         (descent.parameters, descent.history.into_iter().map(course).collect())
     }
 
-    pub(super) fn correction(self, members: Vec<Vec<f64>>) -> Correction {
-        Correction {
-            shape: self.shape,
-            features: self.recipe.features.clone(),
-            inputs: self.inputs,
-            outputs: self.outputs,
-            valid: self.valid,
-            members,
-        }
+    fn correction(self, members: Vec<Vec<f64>>) -> Correction {
+        let left = 0.0;
+        Correction { body: Body::Networks(self.dress, Networks { shape: self.shape, members }), region: self.region, left }
     }
 
     /// A stream of its own for each purpose, so that none depends on how much another drew.
@@ -203,12 +243,8 @@ impl<'a> Prepared<'a> {
 
     /// Root of the mean squared length, m, from mean squares of the scaled outputs.
     fn rms(&self, squares: [f64; OUTPUTS]) -> f64 {
-        squares.iter().zip(&self.outputs).map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
+        squares.iter().zip(&self.dress.outputs).map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
     }
-}
-
-fn outputs_scaled(outputs: &[Scaling; OUTPUTS], k: usize, value: f64) -> f64 {
-    outputs[k].scaled(value)
 }
 
 /// The loss as the swarm sees it.

@@ -68,7 +68,8 @@ impl Bounds {
             *value = value.clamp(self.lower[s], self.upper[s]);
         }
     }
-    fn random(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    /// A point anywhere in the box.
+    pub(super) fn random(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
         (0..self.dimensions()).map(|s| self.lower[s] + self.width(s) * rng.random::<f64>()).collect()
     }
 }

@@ -1,0 +1,263 @@
+//! Which correction helps most, if any? Decided by cross-validation within the training rows, before anything else sees the result.
+//!
+//! Rows are judged by corrections that did not see them. Folds are made of runs of neighbouring rows, since a recording's neighbours
+//! are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
+
+use super::arm::Arm;
+use super::basis::{curves, harmonics};
+use super::correction::{Body, Correction};
+use super::linear::Linear;
+use super::process::Process;
+use super::region::Region;
+use super::training::{Course, Recipe, Samples, Start, dressed, train};
+use crate::estimate::swarm::Generation;
+use crate::estimate::threads::in_order;
+use std::sync::Mutex;
+
+/// Runs of neighbouring rows per fold.
+const RUNS: usize = 4;
+/// The mean gain must exceed so many of its standard errors: several rivals are tried, and neighbouring rows are alike.
+const CLEAR: f64 = 3.0;
+
+/// What may be learnt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rival {
+    /// Harmonics of the joints along the axes of the tracker's frame.
+    Ridge,
+    /// A Gaussian process of the networks' inputs.
+    Process,
+    /// Joint curves, small motions of links and wind-up by weight, through the Jacobian.
+    Curves,
+    /// Multilayer perceptrons, by where their training starts.
+    Network(Start),
+}
+
+impl Rival {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ridge => "ridge",
+            Self::Process => "gaussian_process",
+            Self::Curves => "curves",
+            Self::Network(Start::Random) => "mlp_random",
+            Self::Network(Start::Swarm(algorithm)) => match algorithm.name() {
+                "bas" => "mlp_bas",
+                "pso" => "mlp_pso",
+                "ga" => "mlp_ga",
+                "abc" => "mlp_abc",
+                _ => "mlp_bso",
+            },
+        }
+    }
+}
+
+/// What is compared.
+#[derive(Debug, Clone)]
+pub struct Contest<'a> {
+    pub rivals: Vec<Rival>,
+    /// What joint curves go through; without it they are no rival.
+    pub arm: Option<&'a Arm>,
+    pub prismatic: &'a [bool],
+    /// How the kept correction is trained.
+    pub recipe: Recipe,
+    /// How networks are trained in each fold.
+    pub trial: Recipe,
+    /// Decays and sizes of the hidden layer to choose from, with random starts.
+    pub decays: Vec<f64>,
+    pub hidden: Vec<usize>,
+    pub folds: usize,
+}
+
+/// What the cross-validation says of one rival.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// `None`: no correction.
+    pub rival: Option<Rival>,
+    /// Length of what is left of each row, m.
+    pub left: Vec<f64>,
+    /// Mean gain over no correction and its standard error, m.
+    pub gain: f64,
+    pub sigma: f64,
+    /// Numbers of one correction, and evaluations of a loss for it; both of the first fold.
+    pub numbers: usize,
+    pub evaluations: u64,
+    /// Hidden neurons and decay of networks.
+    pub settings: Option<(usize, f64)>,
+}
+
+impl Judged {
+    pub fn mean(&self) -> f64 {
+        mean(&self.left)
+    }
+    pub fn rms(&self) -> f64 {
+        (self.left.iter().map(|e| e * e).sum::<f64>() / self.left.len().max(1) as f64).sqrt()
+    }
+    pub fn max(&self) -> f64 {
+        self.left.iter().copied().fold(0.0, f64::max)
+    }
+    /// Whether the gain is clearly positive.
+    pub fn helps(&self) -> bool {
+        self.rival.is_some() && self.gain > CLEAR * self.sigma
+    }
+}
+
+/// Everything learnt from the samples: the rivals as judged, and the number of the one to keep (0: no correction).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    pub judged: Vec<Judged>,
+    pub chosen: usize,
+}
+
+/// One fit of a rival.
+struct Task {
+    rival: Rival,
+    recipe: Recipe,
+    fold: usize,
+}
+
+/// What a task leaves of the rows of its fold.
+struct Done {
+    left: Vec<(usize, f64)>,
+    numbers: usize,
+    evaluations: u64,
+}
+
+/// How many fits [`compare`] makes.
+pub fn fits(contest: &Contest) -> usize {
+    let networks = contest.rivals.iter().filter(|rival| matches!(rival, Rival::Network(_))).count();
+    let grid = if networks > 0 { contest.decays.len() * contest.hidden.len() } else { 0 };
+    (contest.rivals.len() + grid) * contest.folds
+}
+
+/// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
+///
+/// Panics with fewer than two folds or rows.
+pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
+    assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
+    let done = Mutex::new(0);
+    let run = |tasks: &[Task]| {
+        in_order(contest.recipe.jobs, tasks.len(), |t| {
+            let result = tasks[t].run(samples, contest);
+            let mut done = done.lock().expect("no fit panics");
+            *done += 1;
+            let best = result.as_ref().map_or(f64::NAN, |r| r.left.iter().map(|left| left.1).sum::<f64>() / r.left.len() as f64);
+            let place =
+                format!("{}, part {} of {}: {:.4} mm", tasks[t].rival.name(), tasks[t].fold + 1, contest.folds, best * 1e3);
+            observe(*done, &place);
+            result
+        })
+    };
+    let tasks = |rivals: &[(Rival, Recipe)]| -> Vec<Task> {
+        let each = |(rival, recipe): &(Rival, Recipe)| {
+            (0..contest.folds).map(|fold| Task { rival: *rival, recipe: recipe.clone(), fold }).collect::<Vec<Task>>()
+        };
+        rivals.iter().flat_map(each).collect()
+    };
+    let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
+    let nothing = Judged { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
+    let mut judged = vec![nothing];
+    let chance = Rival::Network(Start::Random);
+    let networks = contest.rivals.iter().any(|rival| matches!(rival, Rival::Network(_)));
+    let mut trial = Recipe { jobs: 1, ..contest.trial.clone() };
+    if networks {
+        let mut grid = Vec::new();
+        for hidden in &contest.hidden {
+            for decay in &contest.decays {
+                grid.push((chance, Recipe { hidden: *hidden, decay: *decay, start: Start::Random, ..trial.clone() }));
+            }
+        }
+        let results = run(&tasks(&grid));
+        let errors: Vec<f64> =
+            results.chunks(contest.folds).map(|folds| together(folds, &before).map_or(f64::NAN, |j| j.mean())).collect();
+        if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
+            trial = grid[best].1.clone();
+        }
+    }
+    let entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
+    let results = run(&tasks(&entered));
+    for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
+        let settings = matches!(rival, Rival::Network(_)).then_some((recipe.hidden, recipe.decay));
+        if let Some(row) = together(folds, &before) {
+            judged.push(Judged { rival: Some(*rival), settings, ..row });
+        }
+    }
+    let helping = (0..judged.len()).filter(|j| judged[*j].helps());
+    let chosen = helping.min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean())).unwrap_or(0);
+    Comparison { judged, chosen }
+}
+
+/// The rival learnt from all samples, with the course of a network's training. `None` where it cannot be fitted.
+pub fn learn(
+    samples: &Samples,
+    contest: &Contest,
+    judged: &Judged,
+    observe: impl FnMut(&Generation),
+) -> Option<(Correction, Vec<Course>)> {
+    let (hidden, decay) = judged.settings.unwrap_or((contest.recipe.hidden, contest.recipe.decay));
+    let (mut correction, course) =
+        fit(judged.rival?, samples, contest, &Recipe { hidden, decay, ..contest.recipe.clone() }, observe)?;
+    correction.left = judged.rms() / 3.0_f64.sqrt();
+    Some((correction, course))
+}
+
+fn fit(
+    rival: Rival,
+    samples: &Samples,
+    contest: &Contest,
+    recipe: &Recipe,
+    observe: impl FnMut(&Generation),
+) -> Option<(Correction, Vec<Course>)> {
+    let region = || Region::of(&samples.sources, recipe.joints);
+    let body = match rival {
+        Rival::Network(start) => return Some(train(samples, &Recipe { start, ..recipe.clone() }, observe)),
+        Rival::Ridge => Body::Linear(Linear::fit(samples, None, &harmonics(contest.prismatic), recipe.seed)?),
+        Rival::Curves => Body::Linear(Linear::fit(samples, contest.arm, &curves(contest.arm?, samples.rows()), recipe.seed)?),
+        Rival::Process => {
+            let (dress, x, y) = dressed(samples, &recipe.features);
+            Body::Process(dress, Process::fit(&x, &y)?)
+        }
+    };
+    Some((Correction { body, region: region(), left: 0.0 }, Vec::new()))
+}
+
+impl Task {
+    fn run(&self, samples: &Samples, contest: &Contest) -> Option<Done> {
+        let rows = samples.rows();
+        let (inside, outside): (Vec<usize>, Vec<usize>) =
+            (0..rows).partition(|row| row * contest.folds * RUNS / rows % contest.folds != self.fold);
+        let recipe = Recipe { seed: self.recipe.seed ^ (self.fold as u64 + 1), ..self.recipe.clone() };
+        let (correction, course) = fit(self.rival, &samples.pick(&inside), contest, &recipe, |_| {})?;
+        let left = outside.iter().map(|row| {
+            let (delta, residual) = (correction.at(&samples.sources[*row]).delta, samples.residual[*row]);
+            (*row, length(std::array::from_fn(|k| residual[k] - delta[k])))
+        });
+        // A course counts up within each member, and the swarm's is member 0.
+        let ends = course.iter().enumerate().filter(|(i, c)| course.get(i + 1).is_none_or(|next| next.member != c.member));
+        let evaluations = ends.map(|(_, end)| end.evaluations).sum();
+        Some(Done { left: left.collect(), numbers: correction.numbers(), evaluations })
+    }
+}
+
+/// All folds of one rival; `None` where one could not be fitted.
+fn together(folds: &[Option<Done>], before: &[f64]) -> Option<Judged> {
+    let mut left = before.to_vec();
+    for fold in folds {
+        for (row, value) in &fold.as_ref()?.left {
+            left[*row] = *value;
+        }
+    }
+    let first = folds.first()?.as_ref()?;
+    let gains: Vec<f64> = before.iter().zip(&left).map(|(before, left)| before - left).collect();
+    let gain = mean(&gains);
+    let rows = gains.len() as f64;
+    let variance = gains.iter().map(|g| (g - gain) * (g - gain)).sum::<f64>() / (rows - 1.0).max(1.0);
+    let (numbers, evaluations) = (first.numbers, first.evaluations);
+    Some(Judged { rival: None, left, gain, sigma: (variance / rows).sqrt(), numbers, evaluations, settings: None })
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}

@@ -1,0 +1,89 @@
+//! What `learn` tells of the rivals and of a network's training.
+
+use crate::estimate::network::rivals::{Comparison, Contest};
+use crate::estimate::network::{Course, Judged, Phase, Rival};
+use crate::table::{Corrections, CorrectionsRow, Training, TrainingRow};
+
+/// What the comparison comes to, for the person who waits.
+pub(super) fn sentence(comparison: &Comparison, learnt: bool) -> String {
+    let tell = |judged: &Judged| {
+        let name = judged.rival.map_or("none", Rival::name);
+        format!("{name} {:.3} mm", judged.mean() * 1e3)
+    };
+    let all: Vec<String> = comparison.judged.iter().map(tell).collect();
+    let kept = comparison.judged[comparison.chosen].rival.filter(|_| learnt);
+    let what = kept.map_or_else(|| "no correction was kept".to_string(), |rival| format!("`{}` was kept", rival.name()));
+    format!("{what}; cross-validated error on its own training rows: {}", all.join(", "))
+}
+
+pub(super) fn table(step: &str, contest: &Contest, comparison: &Comparison, learnt: bool) -> Corrections {
+    let chosen = if learnt { comparison.chosen } else { 0 };
+    let best = &comparison.judged[chosen];
+    let before = comparison.judged[0].mean() * 1e3;
+    let row = |(j, judged): (usize, &Judged)| {
+        let (gain, sigma, behind) = (judged.gain * 1e3, judged.sigma * 1e3, (judged.mean() - best.mean()) * 1e3);
+        let reason = match judged.rival {
+            None if j == chosen => "nothing that was tried helps clearly".to_string(),
+            None => format!("a correction gains {:.3} mm", best.gain * 1e3),
+            Some(_) if j == chosen => format!("smallest error of those that help: gains {gain:.3} +- {sigma:.3} mm"),
+            Some(_) if !judged.helps() => format!("does not help clearly: gains {gain:.3} +- {sigma:.3} mm"),
+            Some(_) => format!("{behind:.3} mm behind {}", best.rival.map_or("none", Rival::name)),
+        };
+        CorrectionsRow {
+            step: step.into(),
+            rival: judged.rival.map_or("none", Rival::name).into(),
+            chosen: j == chosen,
+            reason,
+            before_mm: before,
+            mean_mm: Some(judged.mean() * 1e3),
+            rms_mm: Some(judged.rms() * 1e3),
+            max_mm: Some(judged.max() * 1e3),
+            gain_mm: Some(gain),
+            gain_sigma_mm: Some(sigma),
+            numbers: judged.numbers as i64,
+            evaluations: judged.evaluations as i64,
+            hidden: judged.settings.map(|settings| settings.0 as i64),
+            decay: judged.settings.map(|settings| settings.1),
+        }
+    };
+    let mut rows: Vec<CorrectionsRow> = comparison.judged.iter().enumerate().map(row).collect();
+    let untried = contest.rivals.iter().filter(|rival| comparison.judged.iter().all(|judged| judged.rival != Some(**rival)));
+    rows.extend(untried.map(|rival| CorrectionsRow {
+        step: step.into(),
+        rival: rival.name().into(),
+        chosen: false,
+        reason: match rival {
+            Rival::Curves if contest.arm.is_none() => "the stage has no robot with these joints, or no parameters".into(),
+            _ => "it could not be fitted to these rows".into(),
+        },
+        before_mm: before,
+        mean_mm: None,
+        rms_mm: None,
+        max_mm: None,
+        gain_mm: None,
+        gain_sigma_mm: None,
+        numbers: 0,
+        evaluations: 0,
+        hidden: None,
+        decay: None,
+    }));
+    Corrections(rows)
+}
+
+/// The course of a training as a table.
+pub(super) fn history(step: &str, course: Vec<Course>) -> Training {
+    let rows = course.into_iter().map(|record| TrainingRow {
+        step: step.into(),
+        phase: match record.phase {
+            Phase::Swarm => "swarm".into(),
+            Phase::Gradient => "gradient".into(),
+        },
+        member: record.member as i64,
+        generation: record.index as i64,
+        best: record.best,
+        train_rms_mm: record.train_rms * 1e3,
+        check_rms_mm: record.check_rms.map(|rms| rms * 1e3),
+        evaluations: record.evaluations as i64,
+    });
+    Training(rows.collect())
+}
