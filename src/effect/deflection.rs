@@ -1,6 +1,7 @@
 //! The small motions of one row, and their partial derivatives by the parameters.
 
 use crate::spatial::Twist;
+use nalgebra::Vector3;
 
 /// Where a partial derivative acts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +12,8 @@ pub enum Direction {
     Station(usize, Twist),
     /// On the load of a joint (from 0): Nm per unit of the parameter; it acts through the joint's compliance.
     Torque(usize, f64),
+    /// Of the row's anchor, tracker frame, m per unit.
+    Anchor(Vector3<f64>),
 }
 
 /// Sums of all motions of a row. Twists at a station are added before the exponential, so the order of effects is irrelevant.
@@ -20,6 +23,8 @@ pub struct Deflection {
     pub joint: Vec<f64>,
     /// Twist at each station 0..=n.
     pub station: Vec<Twist>,
+    /// How far the row's anchor is from where it was believed, tracker frame, m.
+    pub anchor: Vector3<f64>,
     /// How far each joint yields to a torque more, rad/Nm.
     pub yielding: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
@@ -39,12 +44,21 @@ struct Kept {
 impl Deflection {
     pub fn new(joints: usize) -> Self {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
-        Self { yielding: joint.clone(), joint, station, partials: Vec::new(), first: 0, kept: Kept::default() }
+        Self {
+            anchor: Vector3::zeros(),
+            yielding: joint.clone(),
+            joint,
+            station,
+            partials: Vec::new(),
+            first: 0,
+            kept: Kept::default(),
+        }
     }
 
     pub(crate) fn clear(&mut self) {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
+        self.anchor = Vector3::zeros();
         self.yielding.fill(0.0);
         self.partials.clear();
     }
@@ -84,6 +98,12 @@ impl Deflection {
     pub fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
         self.station[station] += rate * p[parameter];
         self.partials.push((self.first + parameter, Direction::Station(station, rate)));
+    }
+
+    /// Moves the row's anchor by `p[parameter] * rate` (m per unit); no effect that needs torques does.
+    pub fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
+        self.anchor += rate * p[parameter];
+        self.partials.push((self.first + parameter, Direction::Anchor(rate)));
     }
 
     /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).

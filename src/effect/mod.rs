@@ -3,6 +3,7 @@
 //! An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
 //! and compensation use the same effects through one composition, the [`EffectStack`].
 
+mod anchor;
 mod axis_wobble;
 mod backlash;
 mod base_compliance;
@@ -34,6 +35,7 @@ mod tracker_drift;
 mod unknown;
 mod zero_shift;
 
+pub use anchor::Anchor;
 pub use backlash::{Backlash, Side};
 pub use base_frame::BaseFrame;
 pub use catalogue::{About, CATALOGUE};
@@ -50,6 +52,7 @@ pub use place::Place;
 pub use stack::{EffectStack, Scratch, Sight};
 pub use survey::{Hypothesis, Survey};
 pub use thermal_growth::{ThermalGrowth, Warmth};
+pub use tool_offset::ToolOffset;
 pub use tracker_drift::{Course, TrackerDrift};
 pub use unknown::{Signature, Unknown};
 
@@ -90,6 +93,16 @@ impl<'a> ArmState<'a> {
     /// Load torque about each joint, Nm.
     pub fn torque(&self) -> &'a [f64] {
         &self.posture.torque
+    }
+
+    /// The number of the target that the row measured; none where the robot knows no such target.
+    pub fn target(&self, robot: &RobotModel) -> Option<usize> {
+        robot.gauging().target(self.data.target(self.row))
+    }
+
+    /// The number of the anchor that the row measured its distance from.
+    pub fn anchor(&self, robot: &RobotModel) -> Option<usize> {
+        self.data.distance(self.row).and_then(|distance| robot.gauging().anchor(distance.anchor))
     }
 
     /// Motor currents, A, where recorded.
@@ -178,45 +191,51 @@ pub struct EffectEntry {
 /// Every effect that can be identified, predicted and compensated.
 pub const EFFECTS: &[EffectEntry] = &[
     EffectEntry {
+        name: "anchor",
+        summary: "where the far end of a draw-wire or ballbar is",
+        precedence: 0,
+        make: |_| Box::new(Anchor),
+    },
+    EffectEntry {
         name: "base_frame",
         summary: "where the robot stands in the tracker's frame",
-        precedence: 0,
+        precedence: 1,
         make: |s| Box::new(BaseFrame::new(s.base)),
     },
     EffectEntry {
         name: "tool_offset",
         summary: "where the measured point sits on the tool",
-        precedence: 1,
-        make: |_| Box::new(tool_offset::ToolOffset),
+        precedence: 2,
+        make: |_| Box::new(ToolOffset),
     },
     EffectEntry {
         name: "joint_offset",
         summary: "zero error of a joint",
-        precedence: 2,
+        precedence: 3,
         make: |_| Box::new(joint_offset::JointOffset),
     },
     EffectEntry {
         name: "link_geometry",
         summary: "length and twist errors of a link",
-        precedence: 3,
+        precedence: 4,
         make: |_| Box::new(link_geometry::LinkGeometry),
     },
     EffectEntry {
         name: "reduction_ratio",
         summary: "output angle scaled by k",
-        precedence: 4,
+        precedence: 5,
         make: |_| Box::new(reduction_ratio::ReductionRatio),
     },
     EffectEntry {
         name: "coupling_ratio",
         summary: "a joint moves with another joint",
-        precedence: 5,
+        precedence: 6,
         make: |_| Box::new(coupling_ratio::CouplingRatio),
     },
     EffectEntry {
         name: "joint_compliance",
         summary: "wind-up of a joint proportional to its load",
-        precedence: 6,
+        precedence: 7,
         make: |s| Box::new(joint_compliance::JointCompliance::new(s.load)),
     },
 ];

@@ -5,7 +5,7 @@
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
 use crate::robot::{Burden, Measurements, Posture, RobotModel, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
-use nalgebra::{Matrix3x6, Matrix6, Vector3};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
 
 /// Effects in a fixed order with their parameters numbered through.
@@ -30,6 +30,8 @@ pub struct Scratch {
     by_station: Vec<Matrix3x6<f64>>,
     /// Velocity of the point by the travel of joint k.
     by_joint: Vec<Vector3<f64>>,
+    /// The row's target.
+    target: Option<usize>,
 }
 
 /// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
@@ -85,6 +87,7 @@ impl EffectStack {
             before: vec![Pose::identity(); n + 1],
             by_station: vec![Matrix3x6::zeros(); n + 1],
             by_joint: vec![Vector3::zeros(); n],
+            target: None,
         }
     }
 
@@ -97,6 +100,7 @@ impl EffectStack {
             *travel = Travel::new(*q);
         }
         scratch.deflection.clear();
+        scratch.target = robot.gauging().target(data.target(row));
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
@@ -158,6 +162,60 @@ impl EffectStack {
         tool
     }
 
+    /// The orientation of the row's target (tracker frame), after [`Self::point`].
+    pub(crate) fn orientation(&self, robot: &RobotModel, scratch: &Scratch) -> Matrix3<f64> {
+        scratch.posture.behind[robot.joints()].rotation * robot.seat(scratch.target).rotation
+    }
+
+    /// Derivatives (rad, tracker axes) of [`Self::orientation`], as [`Self::partials`].
+    pub(crate) fn turning(&self, robot: &RobotModel, scratch: &Scratch, mut emit: impl FnMut(usize, Vector3<f64>)) {
+        let Scratch { deflection, posture, stations, before, .. } = scratch;
+        let joint = |joint: usize| {
+            if robot.is_revolute(joint) { posture.behind[joint].rotation * robot.axis(joint) } else { Vector3::zeros() }
+        };
+        for (parameter, direction) in &deflection.partials {
+            let turn = match direction {
+                Direction::Joint(k, rate) => joint(*k) * *rate,
+                Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
+                Direction::Torque(k, rate) => joint(*k) * (deflection.yielding[*k] * *rate),
+                Direction::Anchor(_) => continue,
+            };
+            emit(*parameter, turn);
+        }
+    }
+
+    /// From where a row's anchor is to its `point`, after [`Self::point`]. `None` where the robot knows no such anchor.
+    pub(crate) fn reach(
+        &self,
+        robot: &RobotModel,
+        anchor: &str,
+        point: &Vector3<f64>,
+        scratch: &Scratch,
+    ) -> Option<Vector3<f64>> {
+        let gauging = robot.gauging();
+        let anchor = gauging.anchors.get(gauging.anchor(anchor)?)?;
+        Some(point - anchor.place - scratch.deflection.anchor)
+    }
+
+    /// Derivatives of [`Self::reach`], as [`Self::partials`].
+    pub(crate) fn reaching(
+        &self,
+        robot: &RobotModel,
+        point: &Vector3<f64>,
+        scratch: &mut Scratch,
+        mut emit: impl FnMut(usize, Vector3<f64>),
+    ) {
+        self.velocities(robot, point, scratch);
+        let Scratch { deflection, by_station, by_joint, .. } = scratch;
+        for (parameter, direction) in &deflection.partials {
+            let velocity = match direction {
+                Direction::Anchor(rate) => -rate,
+                other => along(other, by_joint, by_station, &deflection.yielding),
+            };
+            emit(*parameter, velocity);
+        }
+    }
+
     /// How the point moves with every joint and station.
     fn velocities(&self, robot: &RobotModel, point: &Vector3<f64>, scratch: &mut Scratch) {
         let Scratch { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = scratch;
@@ -216,7 +274,7 @@ impl EffectStack {
                 scratch.posture.body[k] = frame;
             }
         }
-        frame.point(&robot.home().translation)
+        frame.point(&robot.seat(scratch.target).translation)
     }
 }
 
@@ -259,6 +317,7 @@ fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
         Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
+        Direction::Anchor(_) => Vector3::zeros(),
     }
 }
 

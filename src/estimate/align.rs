@@ -13,12 +13,14 @@ const TRIPLES: usize = 60;
 /// Points that judge a triple.
 const JUDGES: usize = 500;
 
-/// Returns the pose of the base in the tracker's frame, from `rows` of the recording. Fewer than three points give the identity.
+/// Returns the pose of the base in the tracker's frame, from whole points in `rows`. Fewer than three give the identity.
 pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
+    let rows: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
     if rows.len() < 3 {
         return Pose::identity();
     }
-    let model: Vec<Vector3<f64>> = rows.iter().map(|row| robot.forward(data.q(*row)).translation).collect();
+    let seat = |row: usize| robot.seat(robot.gauging().target(data.target(row)));
+    let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
     let measured: Vec<Vector3<f64>> = rows.iter().map(|row| data.position[*row]).collect();
     let mut used: Vec<usize> = Vec::new();
     let mut pose = best_start(&model, &measured);

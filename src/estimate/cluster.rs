@@ -4,7 +4,9 @@
 
 use super::factor::Tall;
 use super::model::Model;
-use super::problem::{HUBER, Problem, Weight};
+use super::piece::{self, Piece};
+use super::problem::Problem;
+use crate::effect::Scratch;
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -26,32 +28,42 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
         .map_init(
             || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
             |(scratch, jacobian), pose| {
-                let mut errors = DVector::zeros(3 * pose.len());
-                let mut visible = DMatrix::zeros(3 * pose.len(), p);
-                for (i, &row) in pose.iter().enumerate() {
-                    jacobian.fill(Vector3::zeros());
-                    let point =
-                        model.stack.derivatives(&model.robot, problem.data, row, &model.x, scratch, |parameter, derivative| {
+                let (mut errors, mut visible) = (Vec::new(), Vec::new());
+                for &row in pose {
+                    let point = model.stack.point(&model.robot, problem.data, row, &model.x, scratch);
+                    for piece in pieces(problem, model, row, &point, scratch).into_iter().flatten() {
+                        let share = piece.share();
+                        jacobian.fill(Vector3::zeros());
+                        piece.derivatives(model, &point, scratch, |parameter, derivative| {
                             if let Some(sum) = jacobian.get_mut(column[parameter]) {
                                 *sum += derivative;
                             }
                         });
-                    let weight = Weight::of(problem.data, row, problem.unmodelled);
-                    let error = weight.apply(&(problem.data.position[row] - point));
-                    let share = if error.norm() > HUBER { (HUBER / error.norm()).sqrt() } else { 1.0 };
-                    errors.rows_mut(3 * i, 3).copy_from(&(error * share));
-                    for k in 0..p {
-                        let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse[(j, k)]).sum();
-                        visible.view_mut((3 * i, k), (3, 1)).copy_from(&(weight.apply(&seen) * share));
+                        errors.extend((piece.error * share).iter());
+                        visible.extend((0..p).map(|k| {
+                            let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse[(j, k)]).sum();
+                            seen * share
+                        }));
                     }
                 }
-                influence(&visible, &errors, inverse)
+                let visible = DMatrix::from_fn(errors.len(), p, |line, k| visible[line / 3 * p + k][line % 3]);
+                influence(&visible, &DVector::from_vec(errors), inverse)
             },
         )
         .collect();
     let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
     let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse[(j, k)] * weight }));
     triangle(p, lines.into_iter().chain(told))
+}
+
+/// What a row measured, after the stack's `point` of it.
+fn pieces(problem: &Problem, model: &Model, row: usize, point: &Vector3<f64>, scratch: &Scratch) -> [Option<Piece>; 3] {
+    let (data, beyond) = (problem.data, problem.unmodelled);
+    let own = piece::point(data, row, &data.residual(row, point), beyond);
+    let turn = piece::turn(model, data, row, scratch).map(|rest| Piece::of_turn(&rest, beyond));
+    let distance = piece::distance(model, data, row, point, scratch);
+    let distance = distance.map(|(rest, along)| Piece::of_distance(&rest, &along, beyond));
+    [own, turn, distance]
 }
 
 /// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.

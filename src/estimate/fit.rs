@@ -7,10 +7,10 @@ use super::known::Opinion;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
-use super::problem::{Evaluation, HUBER, Problem, Weight};
+use super::piece::{Rest, Unmodelled, Weight, as_of_three, bound};
+use super::problem::{Evaluation, Problem};
 use super::repeats::{Poses, Repeated};
 use crate::robot::Measurements;
-use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
@@ -44,7 +44,11 @@ pub struct Fitted {
     pub stop: Stop,
     /// Standard deviation per axis that the rows show beyond the instrument's, m.
     pub unmodelled: f64,
-    /// Rows with Huber weight below one.
+    /// The same about each axis, rad, where orientations were measured.
+    pub unmodelled_turn: Option<f64>,
+    /// Numbers that were measured in the fitted rows.
+    pub values: usize,
+    /// Measured points, orientations and distances with Huber weight below one.
     pub downweighted: usize,
     /// Parameters with a prior: what it says against what the data say.
     pub opinions: BTreeMap<usize, Opinion>,
@@ -82,13 +86,13 @@ const ROUNDS: usize = 4;
 pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitted {
     let specs = model.stack.specs().to_vec();
     let prior = |set: &[usize]| set.iter().map(|k| specs[*k].prior_sigma).collect::<Vec<_>>();
-    let mut problem = Problem { data, rows: options.rows, unmodelled: 0.0 };
+    let mut problem = Problem { data, rows: options.rows, unmodelled: Unmodelled::default() };
     for k in options.candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
     let sight = problem.evaluate(model, options.candidates);
-    problem.unmodelled = unmodelled(&problem, &sight.residuals, 0);
+    problem.unmodelled = unmodelled(&problem, &sight, 0);
     let mut search =
         Search { fates: vec![Fate::Kept; specs.len()], course: Vec::new(), stop: Stop::NothingFree, free: Vec::new() };
     search.settle(&mut problem, model, options.candidates, sight, true);
@@ -97,7 +101,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         all = problem.observe(model, options.candidates);
     }
     let Search { mut fates, course, stop, free } = search;
-    let errors = problem.errors(&all.residuals);
+    let errors = problem.errors(&all.residuals, &all.rests);
     let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     let (factor, _) = model.with_priors(&free, data);
@@ -136,12 +140,14 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         fates,
         course,
         stop,
-        unmodelled: problem.unmodelled,
+        unmodelled: problem.unmodelled.point,
+        unmodelled_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
+        values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
         opinions,
         repeated: poses.against(problem.data, options.rows, &all.residuals, free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
-        downweighted: errors.iter().filter(|error| **error > HUBER).count(),
+        downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
         indices: indices(&singular, options.rows.len()),
         singular,
         singular_all,
@@ -207,15 +213,17 @@ impl Search {
             for k in candidates.iter().filter(|k| !free.contains(k)) {
                 model.x[*k] = model.rest(*k);
             }
-            let weighted_so = !first || round > 0 || problem.unmodelled == 0.0;
+            let weighted_so = !first || round > 0 || problem.unmodelled == Unmodelled::default();
             let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
             let limit = if first && round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
             let (steps, stop, end) = minimise(problem, model, &free, start, limit);
             self.course.extend(steps);
             self.stop = stop;
-            let next = unmodelled(problem, &end.residuals, free.len());
-            let settled =
-                (next - problem.unmodelled).abs() <= 0.02 * next.max(problem.unmodelled) && free.len() == candidates.len();
+            let next = unmodelled(problem, &end, free.len());
+            let same = |one: f64, other: f64| (one - other).abs() <= 0.02 * one.max(other);
+            let settled = same(next.point, problem.unmodelled.point)
+                && same(next.turn, problem.unmodelled.turn)
+                && free.len() == candidates.len();
             problem.unmodelled = next;
             self.free.clone_from(&free);
             candidates = free;
@@ -229,7 +237,7 @@ impl Search {
 
 /// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.
 fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize>]> {
-    let repeated: usize = poses.repeated().map(Vec::len).sum();
+    let repeated: usize = poses.all().iter().filter(|rows| rows.len() > 1).map(Vec::len).sum();
     (REPEATING * repeated >= rows && rows > 0 && poses.all().len() > parameters).then_some(poses.all())
 }
 
@@ -243,40 +251,65 @@ fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, fate
     }
 }
 
-/// Reduced chi-square with Huber's weights.
-fn reduced(errors: &[f64], parameters: usize) -> f64 {
-    let sum: f64 = errors.iter().map(|e| e.min(HUBER) * e.min(HUBER)).sum();
-    let freedom = (3 * errors.len()).saturating_sub(parameters).max(1);
-    sum / freedom as f64
+/// Reduced chi-square with Huber's weights, of (error, axes).
+fn reduced(errors: &[(f64, usize)], parameters: usize) -> f64 {
+    let sum: f64 = errors.iter().map(|(e, axes)| e.min(bound(*axes)) * e.min(bound(*axes))).sum();
+    let values: usize = errors.iter().map(|(_, axes)| axes).sum();
+    sum / values.saturating_sub(parameters).max(1) as f64
 }
 
-/// The extra standard deviation (m, per axis) that brings the median whitened error to what noise alone would give.
-fn unmodelled(problem: &Problem, residuals: &[Vector3<f64>], parameters: usize) -> f64 {
-    let rows = residuals.len();
-    if rows == 0 {
-        return 0.0;
-    }
-    let freedom = (3 * rows).saturating_sub(parameters).max(1) as f64 / (3 * rows) as f64;
-    let mut errors = vec![0.0; rows];
-    let mut median = |extra: f64| {
-        for (error, (residual, row)) in errors.iter_mut().zip(residuals.iter().zip(problem.rows)) {
-            *error = Weight::of(problem.data, *row, extra).apply(residual).norm_squared();
+/// The extra standard deviations that bring the median whitened error of points and distances, and of orientations, to what noise
+/// alone would give.
+fn unmodelled(problem: &Problem, at: &Evaluation, parameters: usize) -> Unmodelled {
+    let rows = problem.rows;
+    let all: usize = rows.iter().map(|row| problem.data.values(*row)).sum();
+    let freedom = all.saturating_sub(parameters).max(1) as f64 / all.max(1) as f64;
+    let (turns, distances): (Vec<&Rest>, Vec<&Rest>) = at.rests.iter().partition(|rest| rest.turn);
+    let mut errors = vec![0.0; rows.len() + distances.len()];
+    let point = excess(|extra| {
+        let beyond = Unmodelled { point: extra, turn: 0.0 };
+        errors.clear();
+        for (residual, row) in at.residuals.iter().zip(rows) {
+            let error = Weight::of(problem.data, *row, extra).apply(residual).norm_squared();
+            match problem.data.axes(*row) {
+                0 => (),
+                3 => errors.push(error),
+                axes => errors.push(error * as_of_three(axes)),
+            }
         }
-        let middle = rows / 2;
-        *errors.select_nth_unstable_by(middle, f64::total_cmp).1 / freedom
-    };
+        errors.extend(distances.iter().map(|rest| rest.error(beyond).powi(2) * as_of_three(1)));
+        (median(&mut errors) / freedom, errors.len())
+    });
+    let turn = excess(|extra| {
+        let beyond = Unmodelled { point: 0.0, turn: extra };
+        errors.clear();
+        errors.extend(turns.iter().map(|rest| rest.error(beyond).powi(2)));
+        (median(&mut errors) / freedom, errors.len())
+    });
+    Unmodelled { point, turn }
+}
+
+/// The middle of the values, zero of none.
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// The extra standard deviation with which the median squared error (of so many) is that of three unit normals.
+fn excess(mut median: impl FnMut(f64) -> (f64, usize)) -> f64 {
     // One sigma of the median's own scatter is no evidence of anything unmodelled.
-    if median(0.0) <= MEDIAN_CHI2_3 * (1.0 + 1.6 / (rows as f64).sqrt()) {
+    let (own, count) = median(0.0);
+    if own <= MEDIAN_CHI2_3 * (1.0 + 1.6 / (count.max(1) as f64).sqrt()) {
         return 0.0;
     }
     let (mut low, mut high) = (0.0, 1e-6);
-    while median(high) > MEDIAN_CHI2_3 && high < 1e3 {
+    while median(high).0 > MEDIAN_CHI2_3 && high < 1e3 {
         low = high;
         high *= 4.0;
     }
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if median(middle) > MEDIAN_CHI2_3 { low = middle } else { high = middle }
+        if median(middle).0 > MEDIAN_CHI2_3 { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

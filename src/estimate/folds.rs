@@ -3,6 +3,7 @@
 
 use super::fit::{Fate, FitOptions, Fitted, fit};
 use super::model::Model;
+use super::piece::miss;
 use super::repeats::Poses;
 use crate::robot::Measurements;
 use rand::SeedableRng;
@@ -71,9 +72,7 @@ fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usi
     let mut other = model.clone();
     fit(&mut other, data, &FitOptions { rows: &kept, candidates });
     let mut scratch = other.stack.scratch(&other.robot);
-    part.iter()
-        .map(|row| (data.position[*row] - other.stack.point(&other.robot, data, *row, &other.x, &mut scratch)).norm())
-        .collect()
+    part.iter().map(|row| miss(&other, data, *row, &mut scratch).length).collect()
 }
 
 fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {

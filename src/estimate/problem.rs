@@ -1,10 +1,12 @@
-//! The calibration problem: weighted position residuals of some rows under some free parameters.
+//! The calibration problem: weighted residuals of some rows under some free parameters.
 
 use super::factor::{Factor, Tall};
 use super::model::Model;
+use super::piece::{self, Piece, Rest, Unmodelled, Weight, huber};
+use crate::effect::Scratch;
 use crate::robot::Measurements;
 use faer::Mat;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
@@ -12,63 +14,37 @@ const SPAN: usize = 4096;
 /// Rows whose derivatives are held at once: three lines each of some fifty columns stay in the processor's cache.
 const CHUNK: usize = 256;
 
-/// Beyond this whitened error length (three axes, one sigma each: 99.3 % of good rows are below) a row pulls with constant force.
-pub(crate) const HUBER: f64 = 3.5;
-
 /// What is fitted to what: residual rows (measured - predicted) / sigma with Huber's weights.
 pub(crate) struct Problem<'a> {
     pub data: &'a Measurements,
     /// Rows of the recording to fit.
     pub rows: &'a [usize],
-    /// Standard deviation per axis added to the instrument's, m: what the model does not explain.
-    pub unmodelled: f64,
+    /// Standard deviations added to the instrument's: what the model does not explain.
+    pub unmodelled: Unmodelled,
 }
 
 /// The state of a problem at some parameters.
 pub(crate) struct Evaluation {
-    /// Measured - predicted (m), in the order of the problem's rows.
+    /// Measured - predicted points (m), in the order of the problem's rows; zero along axes that were not measured.
     pub residuals: Vec<Vector3<f64>>,
+    /// What is left of orientations and distances, in that order.
+    pub rests: Vec<Rest>,
     /// Sum of Huber's losses and of the priors', dimensionless.
     pub cost: f64,
-    /// Root mean square of the residual length, m.
+    /// Root mean square of the residual length of points, or of distances where no point was measured, m.
     pub rms: f64,
     pub factor: Factor,
 }
 
-/// Turns a row's errors into standard deviations.
-#[derive(Clone, Copy)]
-pub(crate) enum Weight {
-    /// Inverse standard deviation per axis.
-    Axes(Vector3<f64>),
-    /// Inverse of the covariance's Cholesky factor.
-    Full(Matrix3<f64>),
-}
-
-impl Weight {
-    /// Of a row with `unmodelled` (m per axis) beside its own noise.
-    pub fn of(data: &Measurements, row: usize, unmodelled: f64) -> Self {
-        let variance = data.sigma[row].map(|sigma| sigma * sigma + unmodelled * unmodelled);
-        let full = data.spread.as_ref().map(|all| all[row] + Matrix3::from_diagonal(&variance));
-        match full.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse()) {
-            Some(inverse) => Self::Full(inverse),
-            None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
-        }
-    }
-
-    /// m (or m per unit) -> standard deviations.
-    pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
-        match self {
-            Self::Axes(weight) => error.component_mul(weight),
-            Self::Full(inverse) => inverse * error,
-        }
-    }
-}
-
 impl Problem<'_> {
-    /// The whitened error length of every residual.
-    pub fn errors(&self, residuals: &[Vector3<f64>]) -> Vec<f64> {
-        let one = |(residual, row): (&Vector3<f64>, &usize)| Weight::of(self.data, *row, self.unmodelled).apply(residual).norm();
-        residuals.iter().zip(self.rows).map(one).collect()
+    /// Length in standard deviations and number of axes of every piece.
+    pub fn errors(&self, residuals: &[Vector3<f64>], rests: &[Rest]) -> Vec<(f64, usize)> {
+        let point = |(residual, row): (&Vector3<f64>, &usize)| {
+            let length = Weight::of(self.data, *row, self.unmodelled.point).apply(residual).norm();
+            Some((length, self.data.axes(*row))).filter(|(_, axes)| *axes > 0)
+        };
+        let others = rests.iter().map(|rest| (rest.error(self.unmodelled), rest.axes()));
+        residuals.iter().zip(self.rows).filter_map(point).chain(others).collect()
     }
 
     /// The problem at the model's parameters, linearised in the `free` ones, with what is known of them beforehand.
@@ -84,54 +60,85 @@ impl Problem<'_> {
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
         }
-        let spans: Vec<(Vec<Vector3<f64>>, Factor)> =
+        let spans: Vec<Span> =
             self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
+        let mut rests = Vec::new();
         let mut sum: Option<Factor> = None;
-        for (some, factor) in spans {
+        for Span { residuals: some, rests: others, factor } in spans {
             residuals.extend(some);
+            rests.extend(others);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
-        let cost = self.errors(&residuals).into_iter().map(huber).sum();
-        let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
-        let rms = (squares / residuals.len().max(1) as f64).sqrt();
+        let cost = self.errors(&residuals, &rests).into_iter().map(|(error, axes)| huber(error, axes)).sum();
+        let rms = self.rms(&residuals, &rests);
         let factor = sum.unwrap_or_else(|| Factor::of(&Mat::zeros(1, free.len() + 1)));
-        Evaluation { residuals, cost, rms, factor }
+        Evaluation { residuals, rests, cost, rms, factor }
+    }
+
+    fn rms(&self, residuals: &[Vector3<f64>], rests: &[Rest]) -> f64 {
+        let points = self.rows.iter().filter(|row| self.data.axes(**row) > 0).count();
+        let mean = |squares: f64, count: usize| (squares / count.max(1) as f64).sqrt();
+        if points > 0 {
+            return mean(residuals.iter().map(Vector3::norm_squared).sum(), points);
+        }
+        let distances: Vec<f64> = rests.iter().filter(|rest| !rest.turn).map(|rest| rest.residual.norm_squared()).collect();
+        mean(distances.iter().sum(), distances.len())
     }
 
     /// Residuals and factor of some rows, in memory of a chunk.
-    fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> (Vec<Vector3<f64>>, Factor) {
+    fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
         let mut scratch = model.stack.scratch(&model.robot);
-        let mut tall = Tall::new(p + 1, 3 * rows.len().min(CHUNK));
+        let extra = usize::from(self.data.turn.is_some()) + usize::from(self.data.distance.is_some());
+        let mut tall = Tall::new(p + 1, 3 * (1 + extra) * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
+        let mut rests = Vec::new();
         for chunk in rows.chunks(CHUNK) {
-            let mut lines = tall.chunk(3 * chunk.len());
-            for (i, &row) in chunk.iter().enumerate() {
-                let point = model.stack.point(&model.robot, self.data, row, &model.x, &mut scratch);
-                let residual = self.data.position[row] - point;
-                let weight = Weight::of(self.data, row, self.unmodelled);
-                let whitened = weight.apply(&residual);
-                let error = whitened.norm();
-                let share = if error > HUBER { (HUBER / error).sqrt() } else { 1.0 };
-                model.stack.partials(&model.robot, &point, &mut scratch, |parameter, derivative| {
+            let height = 3 * (1 + extra) * chunk.len();
+            let mut lines = tall.chunk(height);
+            let mut write = |first: usize, piece: Piece, point: &Vector3<f64>, scratch: &mut Scratch| {
+                let share = piece.share();
+                piece.derivatives(model, point, scratch, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
-                        let derivative = weight.apply(&derivative) * share;
+                        let derivative = derivative * share;
                         for axis in 0..3 {
-                            lines[(3 * i + axis, j)] += derivative[axis];
+                            lines[(first + axis, j)] += derivative[axis];
                         }
                     }
                 });
                 for axis in 0..3 {
-                    lines[(3 * i + axis, p)] = whitened[axis] * share;
+                    lines[(first + axis, p)] = piece.error[axis] * share;
+                }
+            };
+            for (i, &row) in chunk.iter().enumerate() {
+                let first = 3 * (1 + extra) * i;
+                let point = model.stack.point(&model.robot, self.data, row, &model.x, &mut scratch);
+                let residual = self.data.residual(row, &point);
+                if let Some(piece) = piece::point(self.data, row, &residual, self.unmodelled) {
+                    write(first, piece, &point, &mut scratch);
                 }
                 residuals.push(residual);
+                if extra == 0 {
+                    continue;
+                }
+                if let Some(rest) = piece::turn(model, self.data, row, &scratch) {
+                    write(first + 3, Piece::of_turn(&rest, self.unmodelled), &point, &mut scratch);
+                    rests.push(rest);
+                }
+                if let Some((rest, along)) = piece::distance(model, self.data, row, &point, &scratch) {
+                    write(first + 3 * extra, Piece::of_distance(&rest, &along, self.unmodelled), &point, &mut scratch);
+                    rests.push(rest);
+                }
             }
-            tall.absorb(3 * chunk.len());
+            tall.absorb(height);
         }
-        (residuals, tall.factor())
+        Span { residuals, rests, factor: tall.factor() }
     }
 }
 
-fn huber(error: f64) -> f64 {
-    if error <= HUBER { 0.5 * error * error } else { HUBER * (error - 0.5 * HUBER) }
+/// What a thread makes of its rows.
+struct Span {
+    residuals: Vec<Vector3<f64>>,
+    rests: Vec<Rest>,
+    factor: Factor,
 }

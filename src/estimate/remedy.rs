@@ -7,6 +7,7 @@ use super::factor::Factor;
 use super::fit::{Fate, Fitted};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
+use super::piece::Unmodelled;
 use super::problem::Problem;
 use crate::robot::{Measurements, RobotModel};
 use faer::Mat;
@@ -49,11 +50,12 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
+    let unmodelled = Unmodelled { point: fitted.unmodelled, turn: fitted.unmodelled_turn.unwrap_or_default() };
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        Problem { data, rows: &rows, unmodelled: fitted.unmodelled }.observe(model, &candidates).factor
+        Problem { data, rows: &rows, unmodelled }.observe(model, &candidates).factor
     };
-    let own = Problem { data, rows, unmodelled: fitted.unmodelled }.observe(model, &candidates).factor;
+    let own = Problem { data, rows, unmodelled }.observe(model, &candidates).factor;
     let declared = model.robot.description().payload_mass;
     let usual = data.payload[rows[0]];
     let spread = at(model, &poses(model, data, rows, &[usual]));

@@ -5,13 +5,17 @@
 
 use super::fisher::tail;
 use super::model::Model;
-use super::problem::Weight;
+use super::piece::Weight;
 use crate::effect::{EffectStack, Load, Setting, entry};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
 /// Rows grouped by pose and payload; poses in the order of their first rows, rows in the order of recording.
-pub struct Poses(Vec<Vec<usize>>);
+pub struct Poses {
+    all: Vec<Vec<usize>>,
+    /// Whole points of one target in one pose.
+    points: Vec<Vec<usize>>,
+}
 
 /// What repeats say against a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,16 +42,17 @@ impl Poses {
         });
         let mut poses: Vec<Vec<usize>> = sorted.chunk_by(|a, b| data.same_pose(*a, *b)).map(<[usize]>::to_vec).collect();
         poses.sort_unstable_by_key(|rows| rows[0]);
-        Self(poses)
+        let points = poses.iter().flat_map(|rows| points(data, rows)).collect();
+        Self { all: poses, points }
     }
 
     pub fn all(&self) -> &[Vec<usize>] {
-        &self.0
+        &self.all
     }
 
-    /// Poses with more than one row.
+    /// Points measured more than once: the rows of each target in each pose, where there are several.
     pub fn repeated(&self) -> impl Iterator<Item = &Vec<usize>> {
-        self.0.iter().filter(|rows| rows.len() > 1)
+        self.points.iter().filter(|rows| rows.len() > 1)
     }
 
     /// What the repeats say against `residuals` (m, of `rows`) that a fit of `parameters` left. `None` without repeats.
@@ -67,14 +72,14 @@ impl Poses {
                 whitened += Weight::of(data, *row, 0.0).apply(&off).norm_squared();
             }
             freedom += 3 * (pose.len() - 1);
-            revisited |= visits(pose).count() > 1;
+            revisited |= visits(data, pose).len() > 1;
         }
         if freedom == 0 {
             return None;
         }
-        let total: f64 =
-            rows.iter().zip(residuals).map(|(row, residual)| Weight::of(data, *row, 0.0).apply(residual).norm_squared()).sum();
-        let between = (3 * rows.len()).checked_sub(parameters + freedom).filter(|between| *between > 0);
+        let whole = || rows.iter().zip(residuals).filter(|(row, _)| data.whole(**row));
+        let total: f64 = whole().map(|(row, residual)| Weight::of(data, *row, 0.0).apply(residual).norm_squared()).sum();
+        let between = (3 * whole().count()).checked_sub(parameters + freedom).filter(|between| *between > 0);
         let lack_of_fit = between.filter(|_| whitened > 0.0).map(|between| {
             let ratio = (total - whitened).max(0.0) / between as f64 / (whitened / freedom as f64);
             (ratio, tail(ratio, between as f64, freedom as f64))
@@ -114,9 +119,21 @@ fn mean(data: &Measurements, rows: &[usize]) -> Vector3<f64> {
     rows.iter().map(|row| data.position[*row]).sum::<Vector3<f64>>() / rows.len() as f64
 }
 
-/// Stretches of neighbouring rows.
-fn visits(pose: &[usize]) -> impl Iterator<Item = &[usize]> {
-    pose.chunk_by(|a, b| a + 1 == *b)
+/// The whole points among the rows of a pose, by target.
+fn points(data: &Measurements, pose: &[usize]) -> Vec<Vec<usize>> {
+    let mut by_target: Vec<Vec<usize>> = Vec::new();
+    for row in pose.iter().filter(|row| data.whole(**row)) {
+        match by_target.iter_mut().find(|rows| data.target(rows[0]) == data.target(*row)) {
+            Some(rows) => rows.push(*row),
+            None => by_target.push(vec![*row]),
+        }
+    }
+    by_target
+}
+
+/// Rows of a point between which the arm did not move: nothing but rows of the same pose lies between.
+pub(crate) fn visits<'a>(data: &Measurements, point: &'a [usize]) -> Vec<&'a [usize]> {
+    point.chunk_by(|a, b| (a + 1..*b).all(|between| data.same_pose(*a, between))).collect()
 }
 
 /// A pose that was left and returned to.
@@ -131,7 +148,8 @@ struct Group {
 
 impl Group {
     fn of(model: &Model, data: &Measurements, pose: &[usize]) -> Option<Self> {
-        let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(pose)
+        let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(data, pose)
+            .into_iter()
             .map(|rows| {
                 let variance = rows.iter().map(|row| data.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
                 let count = rows.len() as f64;

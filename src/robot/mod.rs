@@ -1,13 +1,17 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
 pub mod description;
+mod gauging;
 pub mod import;
+mod measured;
 mod model;
 mod observation;
 mod posture;
 mod rows;
 mod travel;
 
+pub use gauging::{Anchor, Gauging, Target};
+pub use measured::{Distance, Distances, Named, Turns};
 pub use model::RobotModel;
 pub use observation::{Instrument, Measurements};
 pub use posture::{Burden, Carried, Posture};

@@ -1,6 +1,7 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
 use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::gauging::Gauging;
 use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};
 use nalgebra::{Matrix3, Vector3};
@@ -16,6 +17,7 @@ pub struct RobotModel {
     turns: Vec<(Matrix3<f64>, Matrix3<f64>)>,
     normals: Vec<[(usize, Vector3<f64>); 2]>,
     home: Pose,
+    gauging: Gauging,
 }
 
 impl RobotModel {
@@ -36,7 +38,21 @@ impl RobotModel {
         let r = &description.tool_rotation;
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let home = Pose::new(rotation, Vector3::from(description.tool));
-        Self { description, screws, axes, points, turns, normals, home }
+        Self { description, screws, axes, points, turns, normals, home, gauging: Gauging::default() }
+    }
+
+    /// The robot with what it is measured by.
+    pub fn measured_by(self, gauging: Gauging) -> Self {
+        Self { gauging, ..self }
+    }
+
+    pub fn gauging(&self) -> &Gauging {
+        &self.gauging
+    }
+
+    /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
+    pub fn seat(&self, target: Option<usize>) -> &Pose {
+        target.and_then(|target| self.gauging.targets.get(target)).map_or(&self.home, |target| &target.seat)
     }
 
     pub fn description(&self) -> &RobotDescription {
@@ -100,11 +116,16 @@ impl RobotModel {
 
     /// Tool frame in the base frame for joint positions `q` (rad or m): exp(x1 q1) ... exp(xn qn) home.
     pub fn forward(&self, q: &[f64]) -> Pose {
+        self.last_body(q) * self.home
+    }
+
+    /// Motion of the last body from the zero pose, base frame, for joint positions `q` (rad or m).
+    pub fn last_body(&self, q: &[f64]) -> Pose {
         let mut pose = Pose::identity();
         for (joint, travel) in q.iter().enumerate().take(self.joints()) {
             pose = pose * self.motion(joint, &Travel::new(*travel));
         }
-        pose * self.home
+        pose
     }
 }
 

@@ -1,5 +1,6 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
+use crate::robot::measured::{Distances, Named, Turns};
 use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
@@ -8,9 +9,9 @@ pub struct Measurements {
     pub joints: usize,
     /// rad or m.
     pub q: Vec<f64>,
-    /// Measured point, tracker frame, m.
+    /// Measured point, tracker frame, m; 0 along an axis that was not measured.
     pub position: Vec<Vector3<f64>>,
-    /// Standard deviation per axis, m.
+    /// Standard deviation per axis, m; infinite along an axis that was not measured.
     pub sigma: Vec<Vector3<f64>>,
     /// kg; 0 where nothing was said.
     pub payload: Vec<f64>,
@@ -24,6 +25,12 @@ pub struct Measurements {
     pub direction: Option<Vec<f64>>,
     /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
     pub spread: Option<Vec<Matrix3<f64>>>,
+    /// The target that each row measured; the tool point where rows name none.
+    pub target: Option<Named>,
+    /// Measured orientations.
+    pub turn: Option<Turns>,
+    /// Measured distances from anchors.
+    pub distance: Option<Distances>,
 }
 
 impl Measurements {
@@ -39,10 +46,20 @@ impl Measurements {
         self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
     }
 
-    /// Length (m) of the one-sigma noise of a row: root of the summed variances.
+    /// Length (m) of the one-sigma noise of a row: root of the summed variances of what it measured of the point, or of the distance
+    /// where it measured that alone.
     pub fn noise(&self, row: usize) -> f64 {
-        let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
-        (self.sigma[row].norm_squared() + beyond).sqrt()
+        if self.whole(row) {
+            let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
+            return (self.sigma[row].norm_squared() + beyond).sqrt();
+        }
+        let measured = (0..3).filter(|axis| self.sigma[row][*axis].is_finite());
+        let beyond = |axis: usize| self.spread.as_ref().map_or(0.0, |all| all[row][(axis, axis)]);
+        let variance: f64 = measured.map(|axis| self.sigma[row][axis].powi(2) + beyond(axis)).sum();
+        match self.distance(row) {
+            Some(distance) if variance == 0.0 => distance.sigma,
+            _ => variance.sqrt(),
+        }
     }
 
     /// s from some start; the number of the row where the recording has no clock or the row no time.

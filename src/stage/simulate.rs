@@ -202,6 +202,7 @@ impl Simulate {
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
             current: Some(shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
             direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+            ..Recording::default()
         }
     }
 }

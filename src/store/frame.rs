@@ -3,7 +3,7 @@
 //! [`FrameBuilder::finish`] is the border: behind it nothing is checked again. Columns come out in the order of the schema and
 //! rows in the order of the key, so that neither the order of pushing nor that of computing shows in the content.
 
-use arrow::array::{ArrayRef, RecordBatch};
+use arrow::array::{Array, ArrayRef, RecordBatch, new_null_array};
 use arrow::datatypes::SchemaRef;
 
 pub use super::cell::Cell;
@@ -31,6 +31,14 @@ impl FrameBuilder {
     pub fn push(&mut self, name: impl Into<String>, column: ArrayRef) {
         self.columns.push((name.into(), column));
     }
+    /// The same, but an optional column without a value is left out: tables that never needed it stay as they are.
+    pub fn push_present(&mut self, name: &str, column: ArrayRef) -> Result<()> {
+        let optional = schema::of(&self.kind)?.fields.iter().any(|field| field.name == name && field.optional);
+        if !optional || column.null_count() < column.len() {
+            self.push(name, column);
+        }
+        Ok(())
+    }
     /// Checks the columns. Values out of range are errors of the data, all else is a bug of the stage.
     pub fn finish(self) -> Result<Frame> {
         let schema = schema::of(&self.kind)?;
@@ -57,8 +65,12 @@ impl Frame {
     pub fn column_names(&self) -> impl Iterator<Item = &str> {
         self.batch.schema_ref().fields().iter().map(|field| field.name().as_str())
     }
-    /// A column as Rust values, or what is missing.
+    /// A column as Rust values, or what is missing. An optional column that is not there is all null.
     pub fn read<C: Cell>(&self, name: &str) -> Result<Vec<C>> {
+        if self.column(name).is_none() && self.schema.fields.iter().any(|field| field.name == name && field.optional) {
+            let nulls = new_null_array(&C::data_type(), self.rows());
+            return C::from_array(&nulls).ok_or_else(|| Error::Bug(format!("table {}: no column {name}", self.kind())));
+        }
         let array = self.column(name).ok_or_else(|| Error::Bug(format!("table {}: no column {name}", self.kind())))?;
         C::from_array(array).ok_or_else(|| Error::Bug(format!("table {}: column {name} has another type or nulls", self.kind())))
     }

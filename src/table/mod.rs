@@ -31,7 +31,7 @@ macro_rules! rows {
             fn to_frame(&self) -> crate::error::Result<crate::store::frame::Frame> {
                 use crate::store::frame::Cell;
                 let mut frame = crate::store::frame::FrameBuilder::new(Self::KIND);
-                $( frame.push(stringify!($field), <$ty as Cell>::to_array(self.0.iter().map(|row| row.$field.clone()).collect())); )+
+                $( frame.push_present(stringify!($field), <$ty as Cell>::to_array(self.0.iter().map(|row| row.$field.clone()).collect()))?; )+
                 frame.finish()
             }
             fn from_frame(frame: &crate::store::frame::Frame) -> crate::error::Result<Self> {

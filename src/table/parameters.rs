@@ -28,10 +28,10 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, entry};
+use crate::effect::{Anchor, BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, ToolOffset, entry};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
-use crate::robot::RobotModel;
+use crate::robot::{self, Gauging, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -47,8 +47,6 @@ impl Parameters {
     /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
     pub fn of(step: &str, model: &Model, fitted: &Fitted, held: &[usize], earlier: Option<&Parameters>) -> Self {
         let specs = model.stack.specs();
-        let base = model.base();
-        let start = model.stack.base();
         let mut rows = Vec::with_capacity(specs.len());
         for (effect, range) in model.stack.effects() {
             let form = effect.form().map(|form| serde_json::to_string(form).expect("numbers and names serialise"));
@@ -60,12 +58,7 @@ impl Parameters {
                     rows.push(ParameterRow { status, ..before.clone() });
                     continue;
                 }
-                let (nominal, value) = if effect.name() == BaseFrame::NAME {
-                    let axis = k - range.start;
-                    (component(start, axis), component(&base, axis))
-                } else {
-                    (0.0, model.x[k])
-                };
+                let (nominal, value) = model.standing(k);
                 let names = |with: &[(usize, f64)]| {
                     let list: Vec<&str> = with.iter().take(4).map(|(j, _)| specs[*j].name.as_str()).collect();
                     if list.is_empty() { "several others".to_string() } else { list.join(", ") }
@@ -155,6 +148,7 @@ impl Parameters {
                 Some(_) => Load::GravityTorque,
                 None => load,
             };
+        let robot = self.gauging(robot);
         let setting = Setting { base, load };
         let names = EFFECTS.iter().map(|entry| entry.name);
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
@@ -162,7 +156,13 @@ impl Parameters {
         let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
-        for row in self.0.iter().filter(|row| row.effect != BaseFrame::NAME) {
+        let targets = !robot.gauging().targets.is_empty();
+        // Where these stand is their start: nothing is left to correct.
+        let stands = |row: &ParameterRow| match row.effect.as_str() {
+            BaseFrame::NAME | Anchor::NAME => true,
+            effect => targets && effect == ToolOffset::NAME,
+        };
+        for row in self.0.iter().filter(|row| !stands(row)) {
             let position = model.stack.specs().iter().position(|spec| spec.name == row.name);
             let (Some(k), Some(unit)) = (position, Unit::parse(&row.unit)) else {
                 return Err(Error::data(
@@ -173,6 +173,42 @@ impl Parameters {
             model.x[k] = unit.to_si(row.value);
         }
         Ok(model)
+    }
+
+    /// The robot with the targets and anchors that the parameters place.
+    fn gauging(&self, robot: RobotModel) -> RobotModel {
+        let home = *robot.home();
+        let anchors = self.placed(Anchor::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
+        let mut gauging = Gauging { targets: Vec::new(), anchors: anchors.collect() };
+        let turned = |name: &str| {
+            let rx = format!("{}rx", ToolOffset::prefix(name));
+            self.0.iter().any(|row| row.name == rx)
+        };
+        let targets = self.placed(ToolOffset::NAME);
+        if targets.keys().any(|name| !name.is_empty()) || turned("") {
+            let target = |(name, stand): (String, Pose)| Target {
+                seat: Pose::new(stand.rotation * home.rotation, stand.translation + home.translation),
+                oriented: turned(&name),
+                name,
+            };
+            gauging.targets = targets.into_iter().map(target).collect();
+        }
+        robot.measured_by(gauging)
+    }
+
+    /// Named things of an effect with their translation and rotation vector.
+    fn placed(&self, effect: &str) -> BTreeMap<String, Pose> {
+        let mut parts: BTreeMap<String, [f64; 6]> = BTreeMap::new();
+        for row in self.0.iter().filter(|row| row.effect == effect) {
+            let own = row.name.strip_prefix(effect).unwrap_or_default();
+            let (name, axis) = own.rsplit_once('.').unwrap_or_default();
+            let axis = ["x", "y", "z", "rx", "ry", "rz"].iter().position(|known| *known == axis);
+            if let (Some(axis), Some(unit)) = (axis, Unit::parse(&row.unit)) {
+                parts.entry(name.trim_start_matches('.').into()).or_default()[axis] = unit.to_si(row.value);
+            }
+        }
+        let pose = |[x, y, z, rx, ry, rz]: [f64; 6]| Pose::from_rotation_vector(Vector3::new(rx, ry, rz), Vector3::new(x, y, z));
+        parts.into_iter().map(|(name, part)| (name, pose(part))).collect()
     }
 
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.
@@ -201,9 +237,4 @@ fn told(opinion: &Opinion, unit: Unit) -> Option<String> {
         Some((_, sigma)) if sigma < SILENT * opinion.prior.sigma => None,
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
-}
-
-/// x, y, z (m) or a component of the rotation vector (rad).
-fn component(pose: &Pose, axis: usize) -> f64 {
-    if axis < 3 { pose.translation[axis] } else { pose.rotation_vector()[axis - 3] }
 }

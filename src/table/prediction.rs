@@ -29,12 +29,18 @@ crate::table::rows! { "prediction",
         fold_error_mm: Option<f64>,
         /// The same with contiguous stretches of the recording as folds.
         block_error_mm: Option<f64>,
+        /// What was measured, where it was not a whole point: its axes, e.g. `z`, `rotation`, `distance`. Residual and error then are
+        /// those of the axes, or else of the distance.
+        measured: Option<String>,
+        /// Angle between the measured and the predicted orientation; null where it was not measured.
+        turn_rad: Option<f64>,
     }
 }
 
 use crate::estimate::{Covariance, Model};
 use crate::robot::Measurements;
 use crate::table::{Recording, Split};
+use nalgebra::Vector3;
 
 impl Prediction {
     /// The residuals of every row under a model; no row is a suspect yet. `held_out[row]` as in the column; `covariance` where the
@@ -50,9 +56,13 @@ impl Prediction {
     ) -> Self {
         let sigma = covariance.map(|covariance| covariance.of_predictions(model, data));
         let predicted = model.predict(data);
+        let mut misses = model.misses(data).into_iter();
         let rows = predicted.iter().enumerate().map(|(row, point)| {
             let point = point * 1e3;
-            let residual = data.position[row] * 1e3 - point;
+            let miss = misses.next();
+            let whole = data.whole(row);
+            let residual =
+                if whole { data.position[row] * 1e3 - point } else { miss.as_ref().map_or_else(Vector3::zeros, |miss| miss.point * 1e3) };
             PredictionRow {
                 sequence: recording.sequence[row],
                 point_id: recording.point_id[row].clone(),
@@ -66,11 +76,16 @@ impl Prediction {
                 dx_mm: residual.x,
                 dy_mm: residual.y,
                 dz_mm: residual.z,
-                error_mm: residual.norm(),
+                error_mm: match &miss {
+                    Some(miss) if !whole => miss.length * 1e3,
+                    _ => residual.norm(),
+                },
                 noise_mm: data.noise(row) * 1e3,
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
                 fold_error_mm: None,
                 block_error_mm: None,
+                measured: (!whole).then(|| measured(data, row)),
+                turn_rad: miss.and_then(|miss| miss.turn),
             }
         });
         Self(rows.collect())
@@ -92,4 +107,13 @@ impl Prediction {
         }
         self
     }
+}
+
+/// What a row measured, in words.
+fn measured(data: &Measurements, row: usize) -> String {
+    let axes = ["x", "y", "z"].into_iter().enumerate().filter(|(axis, _)| data.sigma[row][*axis].is_finite());
+    let mut parts: Vec<&str> = axes.map(|(_, name)| name).collect();
+    parts.extend(data.turn(row).map(|_| "rotation"));
+    parts.extend(data.distance(row).map(|_| "distance"));
+    parts.join(" ")
 }

@@ -1,11 +1,12 @@
-//! The recording: joints as commanded or logged, and where the tracker saw the tool. SI in Rust, mm and rad in the table.
+//! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
 
 use crate::error::Result;
-use crate::robot::{Instrument, Measurements};
+use crate::robot::{Distances, Instrument, Measurements, Named, Turns};
+use crate::spatial::Pose;
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 ///
@@ -22,7 +23,7 @@ pub struct Recording {
     pub usage: Vec<Option<String>>,
     /// Joint positions, rad or m.
     pub q: Vec<f64>,
-    /// Measured point in the tracker's frame, m.
+    /// Measured point in the tracker's frame, m; NaN along an axis that was not measured.
     pub position: Vec<[f64; 3]>,
     /// Its standard deviation per axis, m, where the recording has it.
     pub position_sigma: Option<Vec<[f64; 3]>>,
@@ -36,6 +37,18 @@ pub struct Recording {
     pub current: Option<Vec<f64>>,
     /// Direction of the last move of each joint, +1 / -1 / 0.
     pub direction: Option<Vec<f64>>,
+    /// The target that was measured; the tool point where a row names none.
+    pub target: Option<Vec<Option<String>>>,
+    /// Orientation of the target in the tracker's frame, as a rotation vector, rad; NaN where it was not measured.
+    pub rotation: Option<Vec<[f64; 3]>>,
+    /// Its standard deviation about each axis, rad; there wherever the orientation is.
+    pub rotation_sigma: Option<Vec<f64>>,
+    /// Distance of the target from an anchor, m; NaN where it was not measured.
+    pub distance: Option<Vec<f64>>,
+    /// Its standard deviation, m; there wherever the distance is.
+    pub distance_sigma: Option<Vec<f64>>,
+    /// The anchor, where there are several.
+    pub anchor: Option<Vec<Option<String>>>,
 }
 
 impl Recording {
@@ -51,7 +64,9 @@ impl Recording {
 impl Recording {
     /// What the numerics need, with the instrument's noise; where the recording has standard deviations they are added to it.
     pub fn measurements(&self, instrument: &Instrument) -> Measurements {
-        let position: Vec<Vector3<f64>> = self.position.iter().map(|point| Vector3::from(*point)).collect();
+        let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
+        let position: Vec<Vector3<f64>> =
+            self.position.iter().map(|point| Vector3::from_iterator(point.iter().map(measured))).collect();
         let own = |row: usize, axis: usize| match &self.position_sigma {
             Some(all) if all[row][axis].is_finite() => all[row][axis],
             _ => 0.0,
@@ -59,10 +74,14 @@ impl Recording {
         let sigma = position
             .iter()
             .enumerate()
-            .map(|(row, point)| Vector3::from_fn(|axis, _| instrument.sigma(point).hypot(own(row, axis))))
+            .map(|(row, point)| {
+                let sigma = |axis: usize| instrument.sigma(point).hypot(own(row, axis));
+                let there = |axis: usize| self.position[row][axis].is_finite();
+                Vector3::from_fn(|axis, _| if there(axis) { sigma(axis) } else { f64::INFINITY })
+            })
             .collect();
         let payload = match &self.payload {
-            Some(all) => all.iter().map(|mass| if mass.is_finite() { *mass } else { 0.0 }).collect(),
+            Some(all) => all.iter().map(measured).collect(),
             None => vec![0.0; self.rows()],
         };
         Measurements {
@@ -76,8 +95,32 @@ impl Recording {
             temperature: self.temperature.clone(),
             direction: self.direction.clone(),
             spread: None,
+            target: self.target.as_ref().map(|names| named(names)),
+            turn: self.rotation.as_ref().zip(self.rotation_sigma.as_ref()).map(|(all, sigma)| Turns {
+                rotation: all.iter().map(rotation).collect(),
+                sigma: sigma.clone(),
+            }),
+            distance: self.distance.as_ref().zip(self.distance_sigma.as_ref()).map(|(length, sigma)| Distances {
+                anchor: self.anchor.as_ref().map(|names| named(names)).unwrap_or_default(),
+                length: length.clone(),
+                sigma: sigma.clone(),
+            }),
         }
     }
+
+    /// Whether all three axes of a row's point were measured.
+    pub fn is_whole(&self, row: usize) -> bool {
+        self.position.get(row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()))
+    }
+}
+
+fn named(names: &[Option<String>]) -> Named {
+    Named::of(names.iter().map(|name| name.as_deref().unwrap_or_default()))
+}
+
+fn rotation(vector: &[f64; 3]) -> Option<Matrix3<f64>> {
+    let there = vector.iter().all(|value| value.is_finite());
+    there.then(|| Pose::from_rotation_vector(Vector3::from(*vector), Vector3::zeros()).rotation)
 }
 
 impl Table for Recording {
@@ -97,7 +140,7 @@ impl Table for Recording {
         }
         for (axis, name) in AXES.iter().enumerate() {
             let of = |points: &[[f64; 3]]| points.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect::<Vec<f64>>();
-            frame.push(format!("{name}_mm"), Cell::to_array(of(&self.position)));
+            frame.push(format!("{name}_mm"), Cell::to_array(present(of(&self.position))));
             if let Some(sigma) = &self.position_sigma {
                 frame.push(format!("sigma_{name}_mm"), Cell::to_array(present(of(sigma))));
             }
@@ -105,6 +148,25 @@ impl Table for Recording {
         for (name, values) in [("time_s", &self.time), ("payload_kg", &self.payload), ("temp_c", &self.temperature)] {
             if let Some(values) = values {
                 frame.push(name, Cell::to_array(present(values.clone())));
+            }
+        }
+        for (name, names) in [("target", &self.target), ("anchor", &self.anchor)] {
+            if let Some(names) = names {
+                frame.push(name, Cell::to_array(names.clone()));
+            }
+        }
+        if let Some(all) = &self.rotation {
+            for (axis, name) in AXES.iter().enumerate() {
+                frame.push(format!("r{name}_rad"), Cell::to_array(present(all.iter().map(|vector| vector[axis]).collect())));
+            }
+        }
+        for (name, values, unit) in [
+            ("sigma_r_rad", &self.rotation_sigma, Unit::Radian),
+            ("distance_mm", &self.distance, Unit::Millimetre),
+            ("sigma_distance_mm", &self.distance_sigma, Unit::Millimetre),
+        ] {
+            if let Some(values) = values {
+                frame.push(name, Cell::to_array(present(values.iter().map(|value| unit.from_si(*value)).collect())));
             }
         }
         for joint in 0..self.joints {
@@ -138,6 +200,15 @@ impl Table for Recording {
             let si = |row: usize, axis: usize| Unit::Millimetre.to_si(columns[axis][row]);
             Ok((0..frame.rows()).map(|row| [si(row, 0), si(row, 1), si(row, 2)]).collect())
         };
+        let names = |name: &str| has(name).then(|| frame.read::<Option<String>>(name)).transpose();
+        let lengths = |name: &str| -> Result<Option<Vec<f64>>> {
+            let metres = |column: Vec<f64>| column.into_iter().map(|value| Unit::Millimetre.to_si(value)).collect();
+            Ok(optional(name)?.map(metres))
+        };
+        let rotations = || -> Result<Vec<[f64; 3]>> {
+            let columns = AXES.iter().map(|axis| absent(frame, &format!("r{axis}_rad"))).collect::<Result<Vec<_>>>()?;
+            Ok((0..frame.rows()).map(|row| [columns[0][row], columns[1][row], columns[2][row]]).collect())
+        };
         let q = prismatic.iter().enumerate().map(|(joint, &slides)| {
             let (ending, unit) = joint_unit(slides);
             let column = frame.read::<f64>(&format!("q{}_{ending}", joint + 1))?;
@@ -157,6 +228,12 @@ impl Table for Recording {
             temperature: optional("temp_c")?,
             current: optional_joints("i", "_a")?,
             direction: optional_joints("dir", "")?,
+            target: names("target")?,
+            rotation: has("rx_rad").then(rotations).transpose()?,
+            rotation_sigma: optional("sigma_r_rad")?,
+            distance: lengths("distance_mm")?,
+            distance_sigma: lengths("sigma_distance_mm")?,
+            anchor: names("anchor")?,
         })
     }
 }

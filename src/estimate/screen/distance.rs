@@ -4,7 +4,8 @@
 //! 1 + H (1 - wH)^-1. Rows that were not fitted have w = 0.
 
 use crate::estimate::model::Model;
-use crate::estimate::problem::{HUBER, Problem, Weight};
+use crate::estimate::piece::{HUBER, Weight};
+use crate::estimate::problem::Problem;
 use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -51,8 +52,8 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                         *entry += derivative;
                     }
                 });
-                let residual = data.position[row] - predicted;
-                let scale = Weight::of(data, row, problem.unmodelled);
+                let residual = data.residual(row, &predicted);
+                let scale = Weight::of(data, row, problem.unmodelled.point);
                 let whitened = scale.apply(&residual);
                 let weight = match whitened.norm() {
                     _ if !fitted[row] => 0.0,
@@ -63,7 +64,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                 Standing {
                     predicted,
                     residual,
-                    sigma: data.noise(row).hypot(3f64.sqrt() * problem.unmodelled) / 3f64.sqrt(),
+                    sigma: data.noise(row).hypot(3f64.sqrt() * problem.unmodelled.point) / 3f64.sqrt(),
                     distance: distance(&whitened, leverage, weight),
                 }
             },

@@ -10,6 +10,7 @@ pub use kind::Kind;
 
 use super::fit::{Fate, FitOptions, Fitted, fit};
 use super::model::Model;
+use super::piece::Unmodelled;
 use super::problem::Problem;
 use crate::robot::Measurements;
 use distance::{Standing, leave_one_out};
@@ -73,7 +74,8 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
     let start = model.x.clone();
     // Whole blocks may be in metres or zero: more than a robust loss can bear, and plain to see even from the nominal robot.
     let predicted = model.predict(data);
-    let plain = |row: &usize| kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_none();
+    let plain =
+        |row: &usize| !data.whole(*row) || kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_none();
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
     if 2 * kept.len() < options.rows.len() {
         kept = options.rows.to_vec();
@@ -113,7 +115,8 @@ fn screen(
     held: &BTreeSet<usize>,
 ) -> (Vec<Suspect>, usize) {
     let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
-    let problem = Problem { data, rows: kept, unmodelled: fitted.unmodelled };
+    let unmodelled = Unmodelled { point: fitted.unmodelled, turn: fitted.unmodelled_turn.unwrap_or_default() };
+    let problem = Problem { data, rows: kept, unmodelled };
     let mut standings = leave_one_out(&problem, model, &free);
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);

@@ -1,0 +1,47 @@
+//! `anchor`: the far end of a draw-wire or ballbar is elsewhere; three parameters each, tracker axes. It moves no point.
+
+use super::{ArmState, Deflection, Effect, ParameterSpec};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+use nalgebra::Vector3;
+
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+impl Anchor {
+    pub const NAME: &'static str = "anchor";
+
+    /// What the names of an anchor's parameters begin with, dot included.
+    pub fn prefix(anchor: &str) -> String {
+        if anchor.is_empty() { format!("{}.", Self::NAME) } else { format!("{}.{anchor}.", Self::NAME) }
+    }
+}
+
+impl Effect for Anchor {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let anchors = robot.gauging().anchors.iter();
+        let all = anchors.flat_map(|anchor| {
+            AXES.iter().map(move |axis| ParameterSpec {
+                name: format!("{}{axis}", Self::prefix(&anchor.name)),
+                place: "anchor".into(),
+                unit: Unit::Millimetre,
+                prior_sigma: 1.0,
+            })
+        });
+        all.collect()
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        if let Some(number) = state.anchor(robot) {
+            for axis in 0..3 {
+                out.move_anchor(3 * number + axis, p, Vector3::ith(axis, 1.0));
+            }
+        }
+    }
+}

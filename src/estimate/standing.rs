@@ -1,0 +1,65 @@
+//! Parameters as people know them: where base, targets and anchors stand, and of all others the change from nominal.
+
+use super::model::Model;
+use crate::effect::{Anchor, BaseFrame, ToolOffset};
+use crate::robot::Target;
+use crate::spatial::{Pose, Twist};
+use nalgebra::Vector3;
+
+impl Model {
+    /// Nominal and present value of a parameter of the stack, SI.
+    pub fn standing(&self, parameter: usize) -> (f64, f64) {
+        let change = (0.0, self.x.get(parameter).copied().unwrap_or_default());
+        let found = self.stack.effects().find(|(_, range)| range.contains(&parameter));
+        let Some((effect, range)) = found else { return change };
+        let number = parameter - range.start;
+        match effect.name() {
+            BaseFrame::NAME => (component(self.stack.base(), number), component(&self.base(), number)),
+            Anchor::NAME => match self.robot.gauging().anchors.get(number / 3) {
+                Some(anchor) => (anchor.place[number % 3], anchor.place[number % 3] + change.1),
+                None => change,
+            },
+            ToolOffset::NAME => self.seat(number, &self.x[range]).unwrap_or(change),
+            _ => change,
+        }
+    }
+
+    /// The `number`-th parameter of targets with corrections `x`; none where the tool point is what is measured.
+    fn seat(&self, number: usize, x: &[f64]) -> Option<(f64, f64)> {
+        let mut first = 0;
+        for target in &self.robot.gauging().targets {
+            let width = if target.oriented { 6 } else { 3 };
+            if number < first + width {
+                let corrected = corrected(target, x.get(first..first + width)?);
+                let axis = number - first;
+                return Some((self.from_tool(&target.seat, axis), self.from_tool(&corrected, axis)));
+            }
+            first += width;
+        }
+        None
+    }
+
+    /// x, y, z from the tool point (m), or a component of the rotation vector from the tool frame (rad), base axes at the zero pose.
+    fn from_tool(&self, seat: &Pose, axis: usize) -> f64 {
+        let home = self.robot.home();
+        component(&Pose::new(seat.rotation * home.rotation.transpose(), seat.translation - home.translation), axis)
+    }
+}
+
+/// The seat after corrections as `tool_offset` makes them.
+fn corrected(target: &Target, x: &[f64]) -> Pose {
+    let mut twist = Twist::zeros();
+    for (axis, value) in x.iter().enumerate() {
+        if axis < 3 {
+            twist[axis] += value;
+        } else {
+            twist += crate::spatial::screw(&Vector3::ith(axis - 3, 1.0), &target.seat.translation) * *value;
+        }
+    }
+    Pose::exp(&twist) * target.seat
+}
+
+/// x, y, z (m) or a component of the rotation vector (rad).
+fn component(pose: &Pose, axis: usize) -> f64 {
+    if axis < 3 { pose.translation[axis] } else { pose.rotation_vector()[axis - 3] }
+}
