@@ -31,8 +31,7 @@ pub fn gauge(
         let offset = stated.get(name).copied().unwrap_or_else(Vector3::zeros);
         Target { name: name.clone(), seat: Pose::new(home.rotation, home.point(&offset)), oriented: false }
     };
-    let mut robot =
-        robot.measured_by(Gauging { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
+    let mut robot = robot.measured_by(Gauging { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
     let mut base = align(&robot, data, rows);
     for _ in 0..ROUNDS {

@@ -46,9 +46,7 @@ impl Weight {
         });
         match full.and_then(|covariance| covariance.cholesky()).and_then(|factor| factor.l().try_inverse()) {
             Some(inverse) if data.whole(row) => Self::Full(inverse),
-            Some(inverse) => {
-                Self::Full(Matrix3::from_fn(|i, j| if measured(i) && measured(j) { inverse[(i, j)] } else { 0.0 }))
-            }
+            Some(inverse) => Self::Full(Matrix3::from_fn(|i, j| if measured(i) && measured(j) { inverse[(i, j)] } else { 0.0 })),
             None => Self::Axes(variance.map(|value| 1.0 / value.sqrt())),
         }
     }

@@ -60,8 +60,7 @@ impl Problem<'_> {
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
         }
-        let spans: Vec<Span> =
-            self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
+        let spans: Vec<Span> = self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
         let mut rests = Vec::new();
         let mut sum: Option<Factor> = None;

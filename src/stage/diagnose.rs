@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Question, diagnose};
 use crate::error::{Error, Fault, Result};
-use crate::estimate::Suspect;
+use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
@@ -10,6 +10,7 @@ use crate::table::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Settings of `diagnose`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -73,15 +74,18 @@ impl Stage for Diagnose {
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
-        let robot = RobotModel::new(reads.robot.to_description()?);
         let data = reads.recording.measurements(&self.tracker);
-        let fit = reads.split.rows(&reads.recording, &self.on)?;
+        let asked = reads.split.rows(&reads.recording, &self.on)?;
+        // Causes are told apart by whole points; what else was measured takes no part.
+        let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
         if fit.len() < FEWEST {
             let message =
                 format!("{} rows to fit say nothing beyond the geometry's parameters: at least {FEWEST} are needed", fit.len());
             return Err(Error::data("table recording", message));
         }
-        let validate: Vec<usize> = (0..data.rows()).filter(|row| fit.binary_search(row).is_err()).collect();
+        let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && data.whole(*row)).collect();
+        let (robot, _) = gauge(RobotModel::new(reads.robot.to_description()?), &data, &fit, &BTreeMap::new())
+            .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
         let question = Question { robot: &robot, data: &data, fit: &fit, validate: &validate, set: &set, seed: context.seed };
         let diagnosis = diagnose(&question, |line| context.services.note(line));

@@ -199,7 +199,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         services
             .note(format!("the data see {rank} of the {expected} geometric parameters of this arm: {}", why_not(&model.robot)));
     }
-    if 3 * fitting.rows.len() < 2 * free {
+    if fitted.values < 2 * free {
         services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));
     }
     let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;

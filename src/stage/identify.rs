@@ -2,14 +2,17 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{EFFECTS, Effect, EffectStack, Setting, entry};
-use crate::error::{Fault, Result, nearest};
-use crate::estimate::{Fate, FitOptions, Fitted, Model, align, fit};
-use crate::robot::RobotModel;
+use crate::effect::{Anchor, EFFECTS, Effect, EffectStack, Setting, entry};
+use crate::error::{Error, Fault, Result, nearest};
+use crate::estimate::{Fate, FitOptions, Fitted, Model, fit, gauge};
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Pose;
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 crate::stage::identified::identification! {
     /// Settings of `identify`.
@@ -20,6 +23,10 @@ crate::stage::identified::identification! {
         /// Effects to estimate, by canonical name; those that the recording cannot support are left out with a note.
         #[serde(default = "all_effects")]
         pub effects: Vec<String>,
+        /// Where targets of the recording sit, mm from the robot's tool point in the axes of its tool frame, as far as it is known:
+        /// `{A: [50, 0, 20]}`. A target without an entry is placed by the recording. `tool_offset.A.x` and so on are changes from it.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub targets: BTreeMap<String, [f64; 3]>,
     }
 }
 
@@ -48,6 +55,14 @@ impl Stage for Identify {
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = self.shared_faults("fit");
+        for (name, place) in &self.targets {
+            if !place.iter().all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET) {
+                faults.push(Fault::new(
+                    format!("targets.{name}"),
+                    "expected [x, y, z] in mm from the tool point, e.g. [50, 0, 20]",
+                ));
+            }
+        }
         for (k, name) in self.effects.iter().enumerate() {
             if entry(name).is_none() {
                 let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
@@ -63,13 +78,16 @@ impl Stage for Identify {
     }
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
-        let robot = RobotModel::new(reads.robot.to_description()?);
         let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
-        let setting = Setting { base: align(&robot, &data, &rows), load: self.load.into() };
+        let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
+        let setting = Setting { base, load: self.load.into() };
         let mut effects = Vec::new();
         for entry in EFFECTS.iter().filter(|entry| self.effects.iter().any(|name| name == entry.name)) {
             let effect = (entry.make)(&setting);
+            if effect.name() == Anchor::NAME && robot.gauging().anchors.is_empty() {
+                continue;
+            }
             match effect.missing(&robot, &data) {
                 Some(reason) => context.services.note(format!("{} is left out: {reason}", entry.name)),
                 None => effects.push(effect),
@@ -90,7 +108,7 @@ impl Stage for Identify {
             held: &held,
             earlier: None,
             seen_before: &vec![false; data.rows()],
-            geometry: geometric_rank(&model, &fitted),
+            geometry: geometric_rank(&model, &data, &rows, &fitted),
             repeatability,
             folds: self.folds,
         };
@@ -99,12 +117,37 @@ impl Stage for Identify {
     }
 }
 
-/// Effects that together are the rigid geometry of the arm.
-const GEOMETRY: [&str; 4] = ["base_frame", "tool_offset", "joint_offset", "link_geometry"];
+/// mm; a target farther from the tool point is no target on the tool.
+const FARTHEST_TARGET: f64 = 1e4;
+
+impl Identify {
+    /// The robot with what it is measured by, and where its base stands at the start.
+    fn gauged(&self, robot: RobotModel, data: &Measurements, rows: &[usize], context: &Context) -> Result<(RobotModel, Pose)> {
+        let known = data.target.as_ref().map_or(&[][..], |named| &named.names);
+        if let Some(unknown) = self.targets.keys().find(|name| !known.contains(name)) {
+            let there: Vec<&str> = known.iter().map(|name| if name.is_empty() { "(no name)" } else { name }).collect();
+            let there = if there.is_empty() { "none; map a column to `target` in `ingest`".into() } else { there.join(", ") };
+            return Err(Error::spec(
+                format!("{}.with.targets.{unknown}", context.id),
+                format!("the recording has no such target; it has: {there}"),
+            ));
+        }
+        let stated = self.targets.iter().map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3)).collect();
+        gauge(robot, data, rows, &stated).map_err(|message| Error::data("table recording", message))
+    }
+}
+
+/// Effects that together are the rigid geometry of the arm and of what measures it.
+const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
 
 /// (found, expected) rank of the geometry, when all of it was asked for.
-fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
-    let asked = GEOMETRY.iter().all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
+///
+/// 4R + 2P for the axes, 3 for each target and as many for its orientation, 3 for each anchor; 6 less where distances alone were
+/// measured: nothing says where all of it stands. Theory has no word on rows of one or two axes.
+fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
+    let gauging = model.robot.gauging();
+    let needed = GEOMETRY.iter().filter(|name| **name != Anchor::NAME || !gauging.anchors.is_empty());
+    let asked = needed.clone().all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model
         .stack
         .effects()
@@ -112,11 +155,16 @@ fn geometric_rank(model: &Model, fitted: &Fitted) -> Option<(usize, usize)> {
         .flat_map(|(_, range)| range)
         .filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_)))
         .count();
-    let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>() + 3;
+    let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>()
+        + gauging.targets.iter().map(|target| if target.oriented { 6 } else { 3 }).sum::<usize>().max(3)
+        + 3 * gauging.anchors.len();
+    let framed = rows.iter().any(|row| data.whole(*row));
+    let partial = rows.iter().any(|row| !data.whole(*row) && (data.axes(*row) > 0 || data.turn(*row).is_some()));
+    let expected = if framed { expected } else { expected - 6 };
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    (asked && !held && !told).then_some((found, expected))
+    (asked && !held && !told && (framed || !partial)).then_some((found, expected))
 }
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.

@@ -9,6 +9,7 @@ mod check;
 mod layout;
 mod lines;
 mod number;
+mod orientation;
 mod pair;
 mod parquet;
 mod reading;
@@ -18,8 +19,9 @@ mod verdict;
 mod write;
 
 pub use layout::{
-    ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
+    Axis, ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
 };
+pub use orientation::OrientationColumns;
 
 use crate::error::Result;
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
@@ -43,6 +45,10 @@ pub struct Ingest {
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
     pub limits: Limits,
+    /// Axes of the points that were measured at all, e.g. `[z]` for a dial gauge on a plate; without it all three, unless
+    /// orientations or distances are mapped. Of those listed a cell may be blank where its column is `optional`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<Vec<Axis>>,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "half")]
     pub max_rejected_fraction: f64,

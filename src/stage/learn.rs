@@ -225,7 +225,9 @@ impl Stage for Learn {
             Ok::<Arm, Error>(Arm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
         });
         let arm = arm.transpose()?.filter(|arm| arm.hinges.len() == recording.joints);
-        let rows = split.rows(&recording, &self.on)?;
+        let mut rows = split.rows(&recording, &self.on)?;
+        // What is learnt are displacements of points: rows of fewer axes or of distances have none.
+        rows.retain(|row| recording.is_whole(*row));
         let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
         let samples = Samples {

@@ -5,6 +5,7 @@ use crate::stage::{Context, Labelled, Stage, reads, writes};
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// What is held out follows from the split and the steps.
@@ -75,7 +76,7 @@ impl Stage for Validate {
                 (1.0 + free / (values - free - 1.0).max(1.0)).sqrt()
             });
             for ((name, set, held_out), rows) in groups(step)? {
-                let row = describe(order, name, set, held_out, &rows);
+                let row = describe(order, name, &set, held_out, &rows);
                 let row = StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row };
                 statistics.0.push(cross_validated(row, &rows, inflation));
             }
@@ -109,13 +110,19 @@ impl Stage for Validate {
     }
 }
 
-type Groups<'a> = BTreeMap<(&'a str, &'a str, bool), Vec<&'a PredictionRow>>;
+type Groups<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;
 
 /// Rows by (step, set, held out), in that order; fails where a table tells of several steps.
+///
+/// Rows that did not measure a whole point are a set of their own, e.g. `fit (distance)`: their errors are of another kind.
 fn groups(step: &Labelled<Prediction>) -> Result<Groups<'_>> {
     let mut groups = Groups::new();
     for row in &step.table.0 {
-        groups.entry((&row.step, &row.set, row.held_out)).or_default().push(row);
+        let set = match &row.measured {
+            Some(measured) => Cow::Owned(format!("{} ({measured})", row.set)),
+            None => Cow::Borrowed(row.set.as_str()),
+        };
+        groups.entry((&row.step, set, row.held_out)).or_default().push(row);
     }
     let mut names = groups.keys().map(|key| key.0);
     if let Some(first) = names.next()
@@ -204,6 +211,9 @@ fn expected(held_out: bool, rows: &[&PredictionRow], unmodelled: Option<f64>) ->
     let beyond = 3.0 * unmodelled?.powi(2);
     let mut sum = 0.0;
     for row in rows {
+        if row.measured.is_some() {
+            return None;
+        }
         let noise = row.noise_mm.powi(2);
         let leverage = row.sigma_mm?.powi(2) / (noise + beyond);
         sum += noise * if held_out { 1.0 + leverage } else { (1.0 - leverage).max(0.0) };

@@ -60,6 +60,14 @@ impl Observability {
             fitted.unmodelled * 1e3,
             "standard deviation per axis of the fitted rows beyond the instrument's noise",
         );
+        if let Some(sigma) = fitted.unmodelled_turn {
+            push(
+                "unmodelled_turn_rad",
+                0,
+                sigma,
+                "standard deviation about each axis of the fitted orientations beyond their stated noise",
+            );
+        }
         if let Some(sigma) = repeatability {
             push("joint_repeatability_rad", 0, sigma, "standard deviation of every revolute joint that rows are weighted by");
         }

@@ -61,8 +61,11 @@ impl Prediction {
             let point = point * 1e3;
             let miss = misses.next();
             let whole = data.whole(row);
-            let residual =
-                if whole { data.position[row] * 1e3 - point } else { miss.as_ref().map_or_else(Vector3::zeros, |miss| miss.point * 1e3) };
+            let residual = if whole {
+                data.position[row] * 1e3 - point
+            } else {
+                miss.as_ref().map_or_else(Vector3::zeros, |miss| miss.point * 1e3)
+            };
             PredictionRow {
                 sequence: recording.sequence[row],
                 point_id: recording.point_id[row].clone(),

@@ -96,10 +96,11 @@ impl Recording {
             direction: self.direction.clone(),
             spread: None,
             target: self.target.as_ref().map(|names| named(names)),
-            turn: self.rotation.as_ref().zip(self.rotation_sigma.as_ref()).map(|(all, sigma)| Turns {
-                rotation: all.iter().map(rotation).collect(),
-                sigma: sigma.clone(),
-            }),
+            turn: self
+                .rotation
+                .as_ref()
+                .zip(self.rotation_sigma.as_ref())
+                .map(|(all, sigma)| Turns { rotation: all.iter().map(rotation).collect(), sigma: sigma.clone() }),
             distance: self.distance.as_ref().zip(self.distance_sigma.as_ref()).map(|(length, sigma)| Distances {
                 anchor: self.anchor.as_ref().map(|names| named(names)).unwrap_or_default(),
                 length: length.clone(),

@@ -13,6 +13,7 @@ mod export;
 mod fixture;
 mod fleet;
 mod folds;
+mod gauges;
 mod identify;
 mod ingest;
 mod init;

@@ -138,6 +138,7 @@ fn a_recording_keeps_its_quantities_its_gaps_and_its_prismatic_joint() {
         temperature: None,
         current: Some(vec![1.0, nan, -2.0, 0.0]),
         direction: Some(vec![1.0, -1.0, 0.0, nan]),
+        ..table::Recording::default()
     };
     let frame = recording.to_frame().unwrap();
     let names: Vec<&str> = frame.column_names().collect();

@@ -2,6 +2,7 @@
 
 use super::arm::Arm;
 use super::layout::{ColumnRef, FileLayout, PerJoint, Slot};
+use super::orientation::Convention;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::units::{Quantity, Unit};
 
@@ -14,6 +15,9 @@ pub(super) struct Binding {
     pub width: usize,
     pub id: Option<Text>,
     pub usage: Option<Text>,
+    pub target: Option<Text>,
+    pub anchor: Option<Text>,
+    pub turn: Option<Convention>,
     pub sequence: Option<usize>,
     pub cells: Vec<Cell>,
     /// Numbers that are the same in every row, SI.
@@ -68,6 +72,9 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
         width: head.width,
         id: None,
         usage: None,
+        target: None,
+        anchor: None,
+        turn: None,
         sequence: None,
         cells: Vec::new(),
         constants: Vec::new(),
@@ -75,14 +82,18 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
     };
     let mut binder = Binder { head, binding, faults: Vec::new() };
     let columns = &layout.columns;
-    for (name, text) in [("point_id", &columns.point_id), ("usage", &columns.usage)] {
-        let Some(text) = text else { continue };
+    for (name, text) in columns.texts() {
         let value = text.value.clone().map(Text::Value);
         let bound = value.or_else(|| {
             let column = binder.column(text.column.as_ref()?, name, text.optional)?;
             Some(Text::Column { column, optional: text.optional })
         });
-        if name == "usage" { binder.binding.usage = bound } else { binder.binding.id = bound }
+        match name {
+            "usage" => binder.binding.usage = bound,
+            "target" => binder.binding.target = bound,
+            "anchor" => binder.binding.anchor = bound,
+            _ => binder.binding.id = bound,
+        }
     }
     if let Some(sequence) = &columns.sequence {
         binder.binding.sequence = binder.column(&sequence.column, "sequence", false);
@@ -97,6 +108,19 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
         {
             let name = binder.name(column);
             binder.binding.cells.push(Cell { slot, index, column, unit, optional: scalar.optional, name });
+        }
+    }
+    if let Some(orientation) = &columns.orientation
+        && let Some((convention, references)) = orientation.columns()
+    {
+        binder.binding.turn = Some(convention);
+        let unit = unit(orientation.unit.as_deref())?;
+        for (number, reference) in references.iter().enumerate() {
+            if let Some(column) = binder.column(reference, "orientation", false) {
+                let (slot, name) = (Slot::Turn(number), binder.name(column));
+                let index = slot.index(arm.joints());
+                binder.binding.cells.push(Cell { slot, index, column, unit, optional: orientation.optional, name });
+            }
         }
     }
     for mapped in columns.per_joint() {

@@ -1,11 +1,21 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
 use super::Ingest;
-use super::layout::{ColumnRef, Duplicates, FileLayout, Join, JointColumns, ScalarColumn};
+use super::layout::{ColumnRef, Columns, Duplicates, FileLayout, Join, JointColumns, ScalarColumn};
+use super::orientation::{Convention, OrientationColumns};
 use crate::error::{Fault, nearest};
 use crate::units::{Quantity, Unit};
 
-const NEEDED: [&str; 4] = ["q", "x", "y", "z"];
+/// What a recording cannot be without.
+fn needed(settings: &Ingest) -> Vec<&'static str> {
+    let other = |columns: &Columns| columns.distance.is_some() || columns.orientation.is_some();
+    let axes = match &settings.axes {
+        Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
+        None if settings.files.iter().any(|file| other(&file.columns)) => Vec::new(),
+        None => vec!["x", "y", "z"],
+    };
+    std::iter::once("q").chain(axes).collect()
+}
 
 /// All faults at once.
 pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
@@ -39,8 +49,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     if columns.names().is_empty() {
         faults.push(Fault::new(format!("{place}.columns"), "no quantity is mapped"));
     }
-    for (name, text) in [("point_id", &columns.point_id), ("usage", &columns.usage)] {
-        let Some(text) = text else { continue };
+    for (name, text) in columns.texts() {
         let place = format!("{place}.columns.{name}");
         one_of(text.column.is_some(), text.value.is_some(), "`column` or `value`", &place, faults);
         if name == "point_id" && text.value.is_some() {
@@ -53,16 +62,48 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     }
     for (name, scalar, quantity, _) in columns.scalars() {
         scalar_faults(scalar, quantity, file, &format!("{place}.columns.{name}"), faults);
-        if NEEDED.contains(&name) && scalar.optional {
-            faults.push(Fault::new(format!("{place}.columns.{name}.optional"), "no recording without a position"));
-        }
     }
     for mapped in columns.per_joint() {
         joint_faults(mapped.columns, mapped.quantity, file, &format!("{place}.columns.{}", mapped.name), faults);
     }
+    if let Some(orientation) = &columns.orientation {
+        orientation_faults(orientation, file, &format!("{place}.columns.orientation"), faults);
+    }
+    for (name, mapped, sigma, noise) in [
+        ("orientation", columns.orientation.is_some(), "sigma_orientation", columns.sigma_orientation.is_some()),
+        ("distance", columns.distance.is_some(), "sigma_distance", columns.sigma_distance.is_some()),
+    ] {
+        if mapped != noise {
+            let message =
+                format!("`{name}` and `{sigma}` go together: its noise weights it, e.g. {sigma}: {{value: 0.02, unit: ...}}");
+            faults.push(Fault::new(format!("{place}.columns"), message));
+        }
+    }
+    if columns.anchor.is_some() && columns.distance.is_none() {
+        faults.push(Fault::new(format!("{place}.columns.anchor"), "an anchor is the end of a `distance`; map that too"));
+    }
     let sigmas = [&columns.sigma_x, &columns.sigma_y, &columns.sigma_z].iter().filter(|sigma| sigma.is_some()).count();
     if sigmas == 1 || sigmas == 2 {
         faults.push(Fault::new(format!("{place}.columns"), "map all of sigma_x, sigma_y, sigma_z, or none"));
+    }
+}
+
+fn orientation_faults(orientation: &OrientationColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    let Some((convention, references)) = orientation.columns() else {
+        let message = "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]` or `rotation_vector: [x, y, z]`, one of them";
+        faults.push(Fault::new(place, message));
+        return;
+    };
+    if references.len() != convention.numbers() {
+        faults.push(Fault::new(place, format!("{} columns; allowed: {}", references.len(), convention.numbers())));
+    }
+    for reference in references {
+        column(Some(reference), file, place, faults);
+    }
+    if convention != Convention::Quaternion {
+        unit(orientation.unit.as_deref(), Quantity::Angle, &format!("{place}.unit"), faults);
+    } else if orientation.unit.is_some() {
+        faults.push(Fault::new(format!("{place}.unit"), "a quaternion has no unit"));
     }
 }
 
@@ -156,18 +197,19 @@ fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<
 /// Faults of the files taken together.
 fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
     let files = &settings.files;
+    let needed = needed(settings);
     let Some(join) = &settings.join else {
         if files.len() > 1 {
             let message = "several files; say how they belong together: {by: id}, {by: time, tolerance_s: 0.5}, {by: order} or {by: append}";
             faults.push(Fault::new("join", message));
         } else {
-            complete(files, "files[0].columns", faults);
+            complete(files, &needed, "files[0].columns", faults);
         }
         return;
     };
     if let Join::Append {} = join {
         for (index, file) in files.iter().enumerate() {
-            complete(std::slice::from_ref(file), &format!("files[{index}].columns"), faults);
+            complete(std::slice::from_ref(file), &needed, &format!("files[{index}].columns"), faults);
         }
         return;
     }
@@ -175,7 +217,7 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
         faults.push(Fault::new("join", format!("joins two files, not {}", files.len())));
         return;
     };
-    complete(files, "files", faults);
+    complete(files, &needed, "files", faults);
     let key = match join {
         Join::Id {} => Some("point_id"),
         Join::Time { .. } => Some("time"),
@@ -220,9 +262,9 @@ fn optional_key(file: &FileLayout, key: &str) -> bool {
     if key == "time" { time } else { id }
 }
 
-fn complete(files: &[FileLayout], place: &str, faults: &mut Vec<Fault>) {
+fn complete(files: &[FileLayout], needed: &[&str], place: &str, faults: &mut Vec<Fault>) {
     let mapped: Vec<&str> = files.iter().flat_map(|file| file.columns.names()).collect();
-    let missing: Vec<&str> = NEEDED.into_iter().filter(|name| !mapped.contains(name)).collect();
+    let missing: Vec<&str> = needed.iter().copied().filter(|name| !mapped.contains(name)).collect();
     if !missing.is_empty() {
         faults.push(Fault::new(place, format!("not mapped: {}", missing.join(", "))));
     }

@@ -2,6 +2,7 @@
 //!
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
+use super::orientation::OrientationColumns;
 use crate::stage::RawFile;
 use crate::units::Quantity;
 use schemars::JsonSchema;
@@ -191,12 +192,43 @@ pub struct Columns {
     pub sigma_y: Option<ScalarColumn>,
     /// Standard deviation of z.
     pub sigma_z: Option<ScalarColumn>,
+    /// Which of several targets on the tool was measured; blank for the robot's tool point.
+    pub target: Option<TextColumn>,
+    /// Orientation of the target in the tracker's frame.
+    pub orientation: Option<OrientationColumns>,
+    /// Standard deviation of the orientation about each axis.
+    pub sigma_orientation: Option<ScalarColumn>,
+    /// Distance of the target from an anchor: a draw-wire or ballbar.
+    pub distance: Option<ScalarColumn>,
+    /// Standard deviation of the distance.
+    pub sigma_distance: Option<ScalarColumn>,
+    /// Which of several anchors the distance goes to; their places are estimated.
+    pub anchor: Option<TextColumn>,
     /// Joint positions.
     pub q: Option<JointColumns>,
     /// Motor currents.
     pub current: Option<JointColumns>,
     /// Direction of the last move of each joint: 1, -1 or 0; no unit.
     pub direction: Option<JointColumns>,
+}
+
+/// An axis of the tracker's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
 }
 
 /// How two files become one recording. Rows keep the order of the first file.
@@ -258,12 +290,17 @@ pub(super) enum Slot {
     Q(usize),
     Current(usize),
     Direction(usize),
+    /// Numbers of the orientation in the file's convention.
+    Turn(usize),
+    SigmaTurn,
+    Distance,
+    SigmaDistance,
 }
 
 impl Slot {
     /// Numbers in a row of a robot with so many joints.
     pub(super) fn count(joints: usize) -> usize {
-        9 + 3 * joints
+        16 + 3 * joints
     }
     pub(super) fn index(self, joints: usize) -> usize {
         match self {
@@ -275,6 +312,10 @@ impl Slot {
             Self::Q(joint) => 9 + joint,
             Self::Current(joint) => 9 + joints + joint,
             Self::Direction(joint) => 9 + 2 * joints + joint,
+            Self::Turn(number) => 9 + 3 * joints + number,
+            Self::SigmaTurn => 13 + 3 * joints,
+            Self::Distance => 14 + 3 * joints,
+            Self::SigmaDistance => 15 + 3 * joints,
         }
     }
 }
@@ -290,6 +331,11 @@ pub(super) struct PerJoint<'a> {
 }
 
 impl Columns {
+    /// The mapped texts.
+    pub(super) fn texts(&self) -> Vec<(&'static str, &TextColumn)> {
+        let all = [("point_id", &self.point_id), ("usage", &self.usage), ("target", &self.target), ("anchor", &self.anchor)];
+        all.into_iter().filter_map(|(name, column)| Some((name, column.as_ref()?))).collect()
+    }
     /// The mapped single numbers: setting, column, quantity, slot.
     pub(super) fn scalars(&self) -> Vec<(&'static str, &ScalarColumn, Quantity, Slot)> {
         [
@@ -302,6 +348,9 @@ impl Columns {
             ("sigma_x", &self.sigma_x, Quantity::Length, Slot::Sigma(0)),
             ("sigma_y", &self.sigma_y, Quantity::Length, Slot::Sigma(1)),
             ("sigma_z", &self.sigma_z, Quantity::Length, Slot::Sigma(2)),
+            ("sigma_orientation", &self.sigma_orientation, Quantity::Angle, Slot::SigmaTurn),
+            ("distance", &self.distance, Quantity::Length, Slot::Distance),
+            ("sigma_distance", &self.sigma_distance, Quantity::Length, Slot::SigmaDistance),
         ]
         .into_iter()
         .filter_map(|(name, column, quantity, slot)| column.as_ref().map(|column| (name, column, quantity, slot)))
@@ -322,9 +371,9 @@ impl Columns {
     /// Names of all mapped quantities.
     pub(super) fn names(&self) -> Vec<&'static str> {
         let mut names: Vec<&'static str> = Vec::new();
-        names.extend(self.point_id.as_ref().map(|_| "point_id"));
+        names.extend(self.texts().into_iter().map(|(name, _)| name));
         names.extend(self.sequence.as_ref().map(|_| "sequence"));
-        names.extend(self.usage.as_ref().map(|_| "usage"));
+        names.extend(self.orientation.as_ref().map(|_| "orientation"));
         names.extend(self.scalars().iter().map(|mapped| mapped.0));
         names.extend(self.per_joint().iter().map(|mapped| mapped.name));
         names

@@ -64,6 +64,8 @@ pub(super) struct Row {
     /// Empty where there is none.
     pub id: String,
     pub usage: String,
+    pub target: String,
+    pub anchor: String,
     pub sequence: Option<i64>,
     /// SI, by [`Slot::index`]; NaN where missing.
     pub values: Vec<f64>,
@@ -88,6 +90,8 @@ impl RowReader<'_> {
     pub(super) fn read(&mut self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
         row.id.clear();
         row.usage.clear();
+        row.target.clear();
+        row.anchor.clear();
         row.sequence = None;
         row.beyond = None;
         row.turned = None;
@@ -107,12 +111,16 @@ impl RowReader<'_> {
             return refuse(Reason::LongRow, format!("{} fields; allowed: {width}", record.len()));
         }
         text(&self.binding.usage, record, "usage", true, &mut row.usage)?;
+        text(&self.binding.target, record, "target", true, &mut row.target)?;
+        text(&self.binding.anchor, record, "anchor", true, &mut row.anchor)?;
         for (index, value) in &self.binding.constants {
             if let Some(slot) = row.values.get_mut(*index) {
                 *slot = *value;
             }
         }
         self.numbers(record, row)?;
+        self.turn(row)?;
+        self.measured(row)?;
         self.plausible(row)?;
         if let Some(column) = self.binding.sequence {
             row.sequence = Some(self.sequence(record.field(column).unwrap_or_default())?);
@@ -164,6 +172,39 @@ impl RowReader<'_> {
             }
             if let Some(slot) = row.values.get_mut(cell.index) {
                 *slot = value;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes the rotation vector of the file's convention.
+    fn turn(&self, row: &mut Row) -> Result<(), Refusal> {
+        let Some(convention) = self.binding.turn else { return Ok(()) };
+        let first = Slot::Turn(0).index(self.arm.joints());
+        let Some(slots) = row.values.get_mut(first..first + 4) else { return Ok(()) };
+        let mut numbers = [f64::NAN; 4];
+        numbers.copy_from_slice(slots);
+        match convention.rotation_vector(numbers) {
+            Ok([x, y, z]) => slots.copy_from_slice(&[x, y, z, f64::NAN]),
+            Err(detail) => return refuse(Reason::OutOfRange, detail),
+        }
+        Ok(())
+    }
+
+    /// A row measured something, and what needs a standard deviation has one; of what this file holds.
+    fn measured(&self, row: &Row) -> Result<(), Refusal> {
+        let joints = self.arm.joints();
+        let there = |slot: Slot| row.values.get(slot.index(joints)).is_some_and(|value| !value.is_nan());
+        let gauges = [Slot::Position(0), Slot::Position(1), Slot::Position(2), Slot::Turn(0), Slot::Distance];
+        let mapped = |slot: &Slot| self.binding.cells.iter().any(|cell| cell.slot == *slot);
+        if gauges.iter().any(mapped) && !gauges.into_iter().any(there) {
+            return refuse(Reason::Blank, "nothing was measured in this row".into());
+        }
+        for (gauge, sigma, what) in
+            [(Slot::Turn(0), Slot::SigmaTurn, "orientation"), (Slot::Distance, Slot::SigmaDistance, "distance")]
+        {
+            if there(gauge) && !there(sigma) {
+                return refuse(Reason::Blank, format!("a measured {what} without its standard deviation"));
             }
         }
         Ok(())
@@ -227,6 +268,9 @@ fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
         Slot::Q(_) => [-20.0, 20.0],
         Slot::Current(_) => [-1e4, 1e4],
         Slot::Direction(_) => [-1.0, 1.0],
+        Slot::Turn(_) => [-TURNS, TURNS],
+        Slot::SigmaTurn | Slot::SigmaDistance => [0.0, 1.0],
+        Slot::Distance => [0.0, 200.0],
     }
 }
 

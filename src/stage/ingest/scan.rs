@@ -61,6 +61,8 @@ pub(super) struct Packed {
     pub values: Vec<f64>,
     pub ids: Vec<String>,
     pub usage: Vec<String>,
+    pub target: Vec<String>,
+    pub anchor: Vec<String>,
 }
 
 impl Packed {
@@ -158,6 +160,12 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
             }
             if layout.columns.usage.is_some() {
                 packed.usage.push(row.usage.clone());
+            }
+            if layout.columns.target.is_some() {
+                packed.target.push(row.target.clone());
+            }
+            if layout.columns.anchor.is_some() {
+                packed.anchor.push(row.anchor.clone());
             }
         }
         pace.row(reading.bytes());

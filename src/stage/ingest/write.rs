@@ -1,7 +1,7 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
 use super::arm::Arm;
-use super::layout::{FileLayout, Join, Slot};
+use super::layout::{Columns, FileLayout, Join, Slot};
 use super::pair::{Fate, NONE};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
@@ -115,6 +115,14 @@ impl Decided<'_> {
     }
 }
 
+/// The texts of a row.
+struct Texts<'a> {
+    id: &'a str,
+    usage: &'a str,
+    target: &'a str,
+    anchor: &'a str,
+}
+
 /// The recording, chunk by chunk.
 struct Chunks<'a> {
     sink: Box<dyn Sink + 'a>,
@@ -122,6 +130,8 @@ struct Chunks<'a> {
     prismatic: Vec<bool>,
     /// Slots that some file fills: only those become columns.
     has: Vec<bool>,
+    /// Whether some file names targets, anchors.
+    named: [bool; 2],
     chunk: Recording,
     merged: Vec<f64>,
     last_sequence: Option<i64>,
@@ -140,12 +150,14 @@ impl<'a> Chunks<'a> {
             }
         }
         let sink = context.services.sink(Recording::KIND)?;
+        let names = |mapped: fn(&Columns) -> bool| decided.settings.files.iter().any(|file| mapped(&file.columns));
         let prismatic = decided.arm.prismatic.clone();
         let mut chunks = Self {
             sink,
             joints,
             prismatic,
             has,
+            named: [names(|columns| columns.target.is_some()), names(|columns| columns.anchor.is_some())],
             chunk: Recording::default(),
             merged: Vec::new(),
             last_sequence: None,
@@ -168,6 +180,12 @@ impl<'a> Chunks<'a> {
             temperature: self.has(Slot::Temperature).then(Vec::new),
             current: self.has(Slot::Current(0)).then(Vec::new),
             direction: self.has(Slot::Direction(0)).then(Vec::new),
+            target: self.named[0].then(Vec::new),
+            rotation: self.has(Slot::Turn(0)).then(Vec::new),
+            rotation_sigma: self.has(Slot::SigmaTurn).then(Vec::new),
+            distance: self.has(Slot::Distance).then(Vec::new),
+            distance_sigma: self.has(Slot::SigmaDistance).then(Vec::new),
+            anchor: self.named[1].then(Vec::new),
             ..Recording::default()
         }
     }
@@ -175,7 +193,7 @@ impl<'a> Chunks<'a> {
         self.merged.clone_from(&row.values);
         let packed = decided.scans.get(1).and_then(|scan| scan.packed.as_ref());
         let other = partner.and_then(|number| number.checked_sub(1)).zip(packed);
-        let mut texts = (row.id.as_str(), row.usage.as_str());
+        let mut texts = Texts { id: &row.id, usage: &row.usage, target: &row.target, anchor: &row.anchor };
         if let Some((index, packed)) = other {
             let width = packed.slots.len();
             let values = packed.values.get(index * width..(index + 1) * width).unwrap_or_default();
@@ -186,10 +204,14 @@ impl<'a> Chunks<'a> {
                 }
             }
             if let Some(id) = packed.ids.get(index) {
-                texts.0 = id;
+                texts.id = id;
             }
-            if let Some(usage) = packed.usage.get(index) {
-                texts.1 = usage;
+            for (own, other) in
+                [(&mut texts.usage, &packed.usage), (&mut texts.target, &packed.target), (&mut texts.anchor, &packed.anchor)]
+            {
+                if let Some(text) = other.get(index) {
+                    *own = text;
+                }
             }
         }
         let number = self.before + row.number;
@@ -201,15 +223,15 @@ impl<'a> Chunks<'a> {
             let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
             return Err(Error::data(format!("{label}:{}", row.line), message));
         }
-        let id = if texts.0.is_empty() { format!("row {number}") } else { texts.0.to_string() };
-        let usage = (!texts.1.is_empty()).then(|| texts.1.to_string());
-        self.store(sequence, id, usage);
+        let id = if texts.id.is_empty() { format!("row {number}") } else { texts.id.to_string() };
+        self.store(sequence, id, &texts);
         if self.chunk.rows() >= CHUNK {
             self.flush()?;
         }
         Ok(())
     }
-    fn store(&mut self, sequence: i64, id: String, usage: Option<String>) {
+    fn store(&mut self, sequence: i64, id: String, texts: &Texts) {
+        let named = |text: &str| (!text.is_empty()).then(|| text.to_string());
         let joints = self.joints;
         let (values, chunk) = (&self.merged, &mut self.chunk);
         let one = |slot: Slot| values[slot.index(joints)];
@@ -217,7 +239,7 @@ impl<'a> Chunks<'a> {
         let all = |slot: fn(usize) -> Slot| (0..joints).map(move |joint| values[slot(joint).index(joints)]);
         chunk.sequence.push(sequence);
         chunk.point_id.push(id);
-        chunk.usage.push(usage);
+        chunk.usage.push(named(texts.usage));
         chunk.q.extend(all(Slot::Q));
         chunk.position.push(axes(Slot::Position));
         chunk.position_sigma.iter_mut().for_each(|column| column.push(axes(Slot::Sigma)));
@@ -226,6 +248,12 @@ impl<'a> Chunks<'a> {
         chunk.temperature.iter_mut().for_each(|column| column.push(one(Slot::Temperature)));
         chunk.current.iter_mut().for_each(|column| column.extend(all(Slot::Current)));
         chunk.direction.iter_mut().for_each(|column| column.extend(all(Slot::Direction)));
+        chunk.target.iter_mut().for_each(|column| column.push(named(texts.target)));
+        chunk.anchor.iter_mut().for_each(|column| column.push(named(texts.anchor)));
+        chunk.rotation.iter_mut().for_each(|column| column.push(axes(Slot::Turn)));
+        chunk.rotation_sigma.iter_mut().for_each(|column| column.push(one(Slot::SigmaTurn)));
+        chunk.distance.iter_mut().for_each(|column| column.push(one(Slot::Distance)));
+        chunk.distance_sigma.iter_mut().for_each(|column| column.push(one(Slot::SigmaDistance)));
         self.written += 1;
     }
     fn flush(&mut self) -> Result<()> {

@@ -1,0 +1,307 @@
+//! What may be measured beside a single point: several targets, poses, some axes, distances. Rank, truth and uncertainty of each.
+
+use crate::fixture;
+use crate::identify::{GEOMETRY, model, normal};
+use calib::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, fit, gauge};
+use calib::robot::description::RobotDescription;
+use calib::robot::{Distances, Gauging, Measurements, Named, RobotModel, Target, Turns};
+use calib::spatial::{Pose, Twist};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+const SIGMA: f64 = 1e-5;
+const SIGMA_TURN: f64 = 5e-5;
+
+/// A robot that is off nominal, its targets and its anchors.
+struct Cell {
+    description: RobotDescription,
+    truth: Model,
+    seed: usize,
+}
+
+impl Cell {
+    /// Targets by name, mm from the tool point.
+    fn new(description: RobotDescription, targets: &[(&str, [f64; 3])], seed: usize) -> Self {
+        let robot = RobotModel::new(description.clone());
+        let home = *robot.home();
+        let target = |(name, offset): &(&str, [f64; 3])| Target {
+            name: (*name).into(),
+            seat: Pose::new(home.rotation, home.point(&(Vector3::from(*offset) * 1e-3))),
+            oriented: false,
+        };
+        let gauging = Gauging { targets: targets.iter().map(target).collect(), anchors: Vec::new() };
+        let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2));
+        let mut truth = model(&robot.measured_by(gauging), base, &GEOMETRY);
+        for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
+            if !spec.name.starts_with("base_frame") && !spec.name.starts_with("tool_offset") {
+                truth.x[k] = 5e-4 * normal(1000 * seed + k);
+            }
+        }
+        Self { description, truth, seed }
+    }
+
+    fn noise(&self, index: usize) -> f64 {
+        normal(99_991 * (self.seed + 1) + index)
+    }
+
+    /// Rows that measure every target in every pose, without noise; other poses for another `part`.
+    fn rows(&self, poses: usize, part: usize) -> Measurements {
+        let all = fixture::poses(&self.description, poses * (part + 1));
+        let joints = self.description.joints.len();
+        let q = &all[poses * part * joints..];
+        let names: Vec<&str> = self.truth.robot.gauging().targets.iter().map(|target| target.name.as_str()).collect();
+        let count = names.len().max(1);
+        let rows = poses * count;
+        let mut data = Measurements {
+            joints,
+            q: (0..rows).flat_map(|row| q[row / count * joints..(row / count + 1) * joints].to_vec()).collect(),
+            position: vec![Vector3::zeros(); rows],
+            sigma: vec![Vector3::repeat(SIGMA); rows],
+            payload: vec![0.0; rows],
+            target: (!names.is_empty()).then(|| Named::of((0..rows).map(|row| names[row % count]))),
+            ..Measurements::default()
+        };
+        data.position = self.truth.predict(&data);
+        data
+    }
+
+    fn disturb(&self, data: &mut Measurements) {
+        for (row, point) in data.position.iter_mut().enumerate() {
+            *point += Vector3::from_fn(|axis, _| SIGMA * self.noise(3 * row + axis));
+        }
+    }
+
+    /// Orientation of the last body in every row, from points: where it puts a point and its neighbours.
+    fn turns(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
+        let moved = |axis: usize| {
+            let mut gauging = self.truth.robot.gauging().clone();
+            gauging.targets.iter_mut().for_each(|target| target.seat.translation[axis] += 0.5);
+            Model { robot: self.truth.robot.clone().measured_by(gauging), ..self.truth.clone() }.predict(data)
+        };
+        let (own, beside) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);
+        (0..data.rows())
+            .map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - own[row]) / 0.5)))
+            .collect()
+    }
+
+    /// Adds measured orientations of frames that sit askew on the tool.
+    fn turn(&self, data: &mut Measurements) {
+        let askew = Pose::from_rotation_vector(Vector3::new(0.9, -1.2, 0.4), Vector3::zeros()).rotation;
+        let noise = |row: usize| Vector3::from_fn(|axis, _| SIGMA_TURN * self.noise(500_000 + 3 * row + axis));
+        let turns = self.turns(data).into_iter().enumerate();
+        let measured =
+            turns.map(|(row, turn)| Some(Pose::from_rotation_vector(noise(row), Vector3::zeros()).rotation * turn * askew));
+        data.turn = Some(Turns { rotation: measured.collect(), sigma: vec![SIGMA_TURN; data.rows()] });
+    }
+
+    /// Adds measured distances from anchors in turn (m, tracker frame), with a sigma.
+    fn reach(&self, data: &mut Measurements, anchors: &[(&str, Vector3<f64>)], sigma: f64) {
+        let own = self.truth.predict(data);
+        let rows = 0..data.rows();
+        let length = |row: usize| (own[row] - anchors[row % anchors.len()].1).norm() + sigma * self.noise(900_000 + row);
+        data.distance = Some(Distances {
+            anchor: Named::of(rows.clone().map(|row| anchors[row % anchors.len()].0)),
+            length: rows.map(length).collect(),
+            sigma: vec![sigma; data.rows()],
+        });
+    }
+
+    /// A fit that starts at the nominal robot and knows the targets by name alone.
+    fn fit(&self, data: &Measurements, known: impl Fn(&Model) -> BTreeMap<usize, Known>) -> (Model, Fitted) {
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        let stated = BTreeMap::new();
+        let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &stated).unwrap();
+        let effects = [&["anchor"][..], &GEOMETRY].concat();
+        let mut model = model(&robot, base, &effects);
+        model.known = known(&model);
+        let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
+        let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
+        (model, fitted)
+    }
+}
+
+fn nothing(_: &Model) -> BTreeMap<usize, Known> {
+    BTreeMap::new()
+}
+
+fn free(fitted: &Fitted) -> usize {
+    fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count()
+}
+
+/// Mean square of what predictions miss the truth by over what their sigma says.
+fn honesty(model: &Model, fitted: &Fitted, at: &Measurements) -> f64 {
+    let off: f64 = model.predict(at).iter().zip(&at.position).map(|(a, b)| (a - b).norm_squared()).sum();
+    let sigma = fitted.covariance.as_ref().expect("not singular").of_predictions(model, at);
+    off / sigma.iter().map(|sigma| sigma * sigma).sum::<f64>()
+}
+
+const THREE: [(&str, [f64; 3]); 3] = [("A", [120.0, 0.0, 30.0]), ("B", [-60.0, 90.0, 30.0]), ("C", [-50.0, -80.0, -40.0])];
+
+#[test]
+fn every_target_adds_three_to_the_rank_and_their_places_come_out() {
+    for (description, axes) in fixture::all().into_iter().zip([24, 24, 28, 26]) {
+        let cell = Cell::new(description, &THREE, 3);
+        let mut data = cell.rows(60, 0);
+        cell.disturb(&mut data);
+        let (model, fitted) = cell.fit(&data, nothing);
+        let name = &cell.description.name;
+        assert_eq!(free(&fitted), axes + 9, "{name}");
+        assert!(fitted.clusters == 60, "{name}: rows of a pose stay together, {} clusters", fitted.clusters);
+        let fresh = cell.rows(60, 1);
+        let off = model.predict(&fresh).iter().zip(&fresh.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(off < 5.0 * SIGMA, "{name}: new poses are off by {off:e} m");
+    }
+}
+
+#[test]
+fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
+    let cell = Cell::new(fixture::offset_wrist(), &THREE, 4);
+    let mut data = cell.rows(60, 0);
+    cell.disturb(&mut data);
+    let stated: BTreeMap<String, Vector3<f64>> =
+        THREE.iter().map(|(name, offset)| ((*name).to_string(), Vector3::from(*offset) * 1e-3)).collect();
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let (robot, base) = gauge(RobotModel::new(cell.description.clone()), &data, &rows, &stated).unwrap();
+    let mut model = model(&robot, base, &GEOMETRY);
+    let specs = model.stack.specs().to_vec();
+    for (k, _) in specs.iter().enumerate().filter(|(_, spec)| spec.name.starts_with("tool_offset")) {
+        model.known.insert(k, Known { prior: Some(Prior { mean: 0.0, sigma: 1e-5 }), bounds: None });
+    }
+    let candidates: Vec<usize> = (0..specs.len()).collect();
+    let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+    let zero = specs.iter().position(|spec| spec.name == "joint_offset.j6").expect("a parameter");
+    let Fate::Free(sigma) = fitted.fates[zero] else { panic!("{:?}", fitted.fates[zero]) };
+    assert!(sigma < 1e-4, "{sigma:e} rad");
+    // What a turn of the last joint cannot be told from without the targets' places stays where it is.
+    let (_, blind) = cell.fit(&data, nothing);
+    let offset = |fitted: &Fitted, k: usize| matches!(fitted.fates[k], Fate::Free(_));
+    assert!(offset(&fitted, zero) && free(&fitted) > free(&blind));
+}
+
+#[test]
+fn poses_add_the_orientation_of_the_tool_to_the_rank() {
+    for (description, axes) in fixture::all().into_iter().zip([24, 24, 28, 26]) {
+        let cell = Cell::new(description, &[("", [0.0; 3])], 5);
+        let mut data = cell.rows(80, 0);
+        data.target = None;
+        cell.disturb(&mut data);
+        cell.turn(&mut data);
+        let (model, fitted) = cell.fit(&data, nothing);
+        let name = &cell.description.name;
+        assert_eq!(free(&fitted), axes + 6, "{name}");
+        assert_eq!(fitted.unmodelled, 0.0, "{name}");
+        assert_eq!(fitted.unmodelled_turn, Some(0.0), "{name}");
+        let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.turn).collect();
+        let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
+        assert!((0.8..1.05).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
+    }
+}
+
+#[test]
+fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
+    let cell = Cell::new(fixture::offset_wrist(), &[], 6);
+    let mut data = cell.rows(200, 0);
+    cell.reach(&mut data, &[("", cell.truth.base().point(&Vector3::new(-0.9, 1.6, -0.5)))], 2e-5);
+    data.position.fill(Vector3::zeros());
+    data.sigma.fill(Vector3::repeat(f64::INFINITY));
+    let (model, fitted) = cell.fit(&data, nothing);
+    assert_eq!(free(&fitted), 27 + 3 - 6);
+    let off: Vec<f64> = model.misses(&data).iter().map(|miss| miss.length).collect();
+    let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
+    let expected = 2e-5 * (1.0f64 - 24.0 / 200.0).sqrt();
+    assert!((0.85..1.15).contains(&(rms / expected)), "{rms:e} m are left, {expected:e} expected");
+}
+
+#[test]
+fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
+    let cell = Cell::new(fixture::spherical(), &[], 7);
+    let mut data = cell.rows(80, 0);
+    cell.disturb(&mut data);
+    let anchors = [("north", Vector3::new(4.0, 1.0, 0.3)), ("south", Vector3::new(1.0, -3.0, 0.2))];
+    cell.reach(&mut data, &anchors, 3e-5);
+    let (model, fitted) = cell.fit(&data, nothing);
+    assert_eq!(free(&fitted), 27 + 6);
+    for (k, spec) in model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("anchor.")) {
+        let (name, axis) = (spec.name.split('.').nth(1).unwrap_or_default(), spec.name.chars().last().unwrap_or_default());
+        let axis = ['x', 'y', 'z'].iter().position(|known| *known == axis).expect("an axis");
+        let truth = anchors.iter().find(|(known, _)| *known == name).expect("an anchor").1[axis];
+        let Fate::Free(sigma) = fitted.fates[k] else { panic!("{}: {:?}", spec.name, fitted.fates[k]) };
+        let pull = (model.standing(k).1 - truth) / sigma;
+        assert!(pull.abs() < 3.5, "{}: {pull:.1} sigma off", spec.name);
+    }
+}
+
+#[test]
+fn rows_of_one_axis_count_for_that_axis_alone() {
+    let cell = Cell::new(fixture::offset_wrist(), &[], 8);
+    let mut data = cell.rows(120, 0);
+    cell.disturb(&mut data);
+    let (_, whole) = cell.fit(&data, nothing);
+    let spoilt = |row: usize| row >= 60;
+    for row in (0..120).filter(|row| spoilt(*row)) {
+        // What was not measured must not matter.
+        data.position[row].x = 0.0;
+        data.position[row].y = 0.0;
+        data.sigma[row].x = f64::INFINITY;
+        data.sigma[row].y = f64::INFINITY;
+    }
+    let (model, fitted) = cell.fit(&data, nothing);
+    assert_eq!(free(&fitted), 27);
+    assert_eq!(fitted.values, 3 * 60 + 60);
+    let only: Vec<usize> = (0..60).collect();
+    let half = Measurements {
+        q: data.q[..60 * 6].to_vec(),
+        position: only.iter().map(|row| data.position[*row]).collect(),
+        sigma: vec![Vector3::repeat(SIGMA); 60],
+        payload: vec![0.0; 60],
+        joints: 6,
+        ..Measurements::default()
+    };
+    let (_, few) = cell.fit(&half, nothing);
+    let fresh = cell.rows(60, 2);
+    let sigma = |fitted: &Fitted| {
+        let all = fitted.covariance.as_ref().expect("not singular").of_predictions(&model, &fresh);
+        all.iter().map(|sigma| sigma * sigma).sum::<f64>()
+    };
+    assert!(sigma(&whole) < sigma(&fitted) && sigma(&fitted) < 0.9 * sigma(&few), "more axes tell more");
+    let off = model.predict(&fresh).iter().zip(&fresh.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(off < 4.0 * SIGMA, "new poses are off by {off:e} m");
+}
+
+#[test]
+fn what_is_said_of_predictions_is_what_they_are_off_by_whatever_was_measured() {
+    type Kind = (&'static str, fn(&Cell) -> Measurements);
+    let kinds: [Kind; 4] = [
+        ("targets", |cell| cell.rows(40, 0)),
+        ("poses", |cell| {
+            let mut data = cell.rows(30, 0);
+            cell.turn(&mut data);
+            data
+        }),
+        ("heights", |cell| {
+            let mut data = cell.rows(60, 0);
+            for row in (0..data.rows()).filter(|row| row % 3 != 0) {
+                data.sigma[row].x = f64::INFINITY;
+                data.sigma[row].y = f64::INFINITY;
+            }
+            data
+        }),
+        ("distances", |cell| {
+            let mut data = cell.rows(50, 0);
+            cell.reach(&mut data, &[("", Vector3::new(3.5, 1.0, 0.2))], 2e-5);
+            data
+        }),
+    ];
+    for (kind, make) in kinds {
+        let seeds = 24;
+        let mean = (0..seeds).map(|seed| {
+            let cell = Cell::new(fixture::offset_wrist(), &THREE[..2], 20 + seed);
+            let mut data = make(&cell);
+            cell.disturb(&mut data);
+            let (model, fitted) = cell.fit(&data, nothing);
+            honesty(&model, &fitted, &cell.rows(40, 3))
+        });
+        let mean = mean.sum::<f64>() / seeds as f64;
+        assert!((0.75..1.3).contains(&mean), "{kind}: squared errors are {mean:.2} of what sigma says");
+    }
+}
