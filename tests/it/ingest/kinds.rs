@@ -1,0 +1,80 @@
+//! Targets, orientations, some axes and distances arrive as the file has them; what is missing beside them is said.
+
+use super::{refusal, robot, settings, take};
+use crate::desk::Desk;
+use calib::stage::Stage;
+use nalgebra::{Rotation3, Vector3};
+
+const COLUMNS: &str = r#"
+files:
+  - file: a.csv
+    columns:
+      q: {column: "q{j}", unit: deg}
+"#;
+
+fn with(lines: &str) -> String {
+    format!("{COLUMNS}{lines}")
+}
+
+const POINT: &str =
+    "      x: {column: x, unit: mm, optional: true}\n      y: {column: y, unit: mm, optional: true}\n      z: {column: z, unit: mm, optional: true}\n";
+
+#[test]
+fn targets_and_gaps_arrive_by_row() {
+    let yaml = with(&format!("      target: {{column: smr, optional: true}}\n{POINT}"));
+    let desk = Desk::default().with("a.csv", "q1,q2,smr,x,y,z\n1,2,A,10,20,30\n1,2,B,,,35\n1,2,,1,2,3\n5,6,A,,,\n");
+    let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.target, Some(vec![Some("A".into()), Some("B".into()), None]));
+    assert_eq!(taken.recording.position[1][2], 0.035);
+    assert!(taken.recording.position[1][0].is_nan() && !taken.recording.is_whole(1) && taken.recording.is_whole(2));
+    assert_eq!(taken.rejected.0[0].detail, "nothing was measured in this row");
+}
+
+#[test]
+fn three_conventions_of_orientation_are_one_rotation() {
+    let lines = "      sigma_orientation: {value: 20, unit: arcsec}\n";
+    let by = |orientation: &str, cells: &str| {
+        let yaml = with(&format!("      orientation: {orientation}\n{lines}"));
+        let desk = Desk::default().with("a.csv", format!("q1,q2,a,b,c,d\n1,2,{cells}\n"));
+        let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
+        assert!((taken.recording.rotation_sigma.unwrap()[0] - 20.0 / 206_264.806).abs() < 1e-12);
+        Vector3::from(taken.recording.rotation.unwrap()[0])
+    };
+    let rpy = by("{rpy: [a, b, c], unit: deg}", "30,-20,100,");
+    let own = Rotation3::new(rpy) * Vector3::new(1.0, 0.0, 0.0);
+    // Rz(100) Ry(-20) Rx(30) takes x to cos(20) (cos 100, sin 100) and up by sin 20.
+    let expected = Vector3::new(-0.163_175_911, 0.925_416_578, 0.342_020_143);
+    assert!((own - expected).norm() < 1e-8, "{own}");
+    assert!((by("{rotation_vector: [a, b, c], unit: rad}", &format!("{},{},{},", rpy.x, rpy.y, rpy.z)) - rpy).norm() < 1e-12);
+    let turned = nalgebra::UnitQuaternion::from_scaled_axis(rpy);
+    let cells = format!("{},{},{},{}", turned.w, turned.i, turned.j, turned.k);
+    assert!((by("{quaternion: [a, b, c, d]}", &cells) - rpy).norm() < 1e-9);
+}
+
+#[test]
+fn distances_need_no_point_and_half_an_orientation_is_refused() {
+    let distance = "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";
+    let desk = Desk::default().with("a.csv", "q1,q2,l,box\n1,2,1500,N\n3,4,1400.5,S\n");
+    let taken = take(&desk, &with(distance), robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.distance, Some(vec![1.5, 1.4005]));
+    assert_eq!(taken.recording.anchor, Some(vec![Some("N".into()), Some("S".into())]));
+    assert!(taken.recording.position.iter().flatten().all(|axis| axis.is_nan()));
+    let turn = "      orientation: {quaternion: [a, b, c, d], optional: true}\n      sigma_orientation: {value: 1, unit: mrad}\n";
+    let desk = Desk::default().with("a.csv", "q1,q2,a,b,c,d\n1,2,1,0,0,\n3,4,1,0,0,0.2\n");
+    let message = refusal(&desk, &with(turn), robot("rr", 1.0));
+    assert!(message.contains("the orientation is incomplete"), "{message}");
+}
+
+#[test]
+fn what_belongs_together_is_asked_for_together() {
+    let faults = |lines: &str| settings(&with(lines)).check().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    let alone = faults("      distance: {column: l, unit: mm}\n");
+    assert!(alone.contains("`distance` and `sigma_distance` go together"), "{alone}");
+    let two = faults("      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n");
+    assert!(two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]` or `rotation_vector"), "{two}");
+    let height = faults("      z: {column: z, unit: mm}\n");
+    assert!(height.contains("not mapped: x, y"), "{height}");
+    assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
+    let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
+    assert!(anchor.contains("an anchor is the end of a `distance`"), "{anchor}");
+}
