@@ -32,7 +32,7 @@ impl Model {
             if number < first + width {
                 let corrected = corrected(target, x.get(first..first + width)?);
                 let axis = number - first;
-                return Some((self.from_tool(&target.seat, axis), self.from_tool(&corrected, axis)));
+                return Some((self.beside_tool(&target.seat, axis), self.beside_tool(&corrected, axis)));
             }
             first += width;
         }
@@ -40,7 +40,7 @@ impl Model {
     }
 
     /// x, y, z from the tool point (m), or a component of the rotation vector from the tool frame (rad), base axes at the zero pose.
-    fn from_tool(&self, seat: &Pose, axis: usize) -> f64 {
+    fn beside_tool(&self, seat: &Pose, axis: usize) -> f64 {
         let home = self.robot.home();
         component(&Pose::new(seat.rotation * home.rotation.transpose(), seat.translation - home.translation), axis)
     }

@@ -199,7 +199,7 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         assert!(fitted.unmodelled_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN), "{name}: {:?} rad", fitted.unmodelled_turn);
         let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.turn).collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
-        assert!((0.8..1.05).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
+        assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
     }
 }
 
@@ -319,7 +319,8 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     let reads = tables(&cell, &data);
     let (description, recording) = (cell.description.clone(), reads.recording.clone());
     let desk = Desk::default();
-    let stage: Identify = serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false})).expect("settings");
+    let stage: Identify =
+        serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false})).expect("settings");
     let tables = desk.run(&stage, reads).expect("identify runs");
     let parameters = table::<Parameters>(&tables).remove(0);
     let placed = |name: &str| parameters.0.iter().find(|row| row.name == name).map_or(f64::NAN, |row| row.value);

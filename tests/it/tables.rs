@@ -68,7 +68,10 @@ fn frame(kind: &str, rows: &[Extreme]) -> Frame {
                 ColumnType::Utf8 => Arc::new(cells.iter().map(|cell| cell.2.clone()).collect::<StringArray>()),
                 ColumnType::Boolean => Arc::new(cells.iter().map(|cell| cell.3).collect::<BooleanArray>()),
             };
-            builder.push(field.column(joint), array);
+            // Lists of rows leave an optional column out that has no value.
+            if !field.optional || kind == "recording" || array.null_count() < array.len() {
+                builder.push(field.column(joint), array);
+            }
         }
     }
     builder.finish().unwrap()

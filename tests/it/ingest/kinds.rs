@@ -16,8 +16,7 @@ fn with(lines: &str) -> String {
     format!("{COLUMNS}{lines}")
 }
 
-const POINT: &str =
-    "      x: {column: x, unit: mm, optional: true}\n      y: {column: y, unit: mm, optional: true}\n      z: {column: z, unit: mm, optional: true}\n";
+const POINT: &str = "      x: {column: x, unit: mm, optional: true}\n      y: {column: y, unit: mm, optional: true}\n      z: {column: z, unit: mm, optional: true}\n";
 
 #[test]
 fn targets_and_gaps_arrive_by_row() {
@@ -53,7 +52,8 @@ fn three_conventions_of_orientation_are_one_rotation() {
 
 #[test]
 fn distances_need_no_point_and_half_an_orientation_is_refused() {
-    let distance = "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";
+    let distance =
+        "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,l,box\n1,2,1500,N\n3,4,1400.5,S\n");
     let taken = take(&desk, &with(distance), robot("rr", 1.0)).unwrap();
     assert_eq!(taken.recording.distance, Some(vec![1.5, 1.4005]));
@@ -70,7 +70,9 @@ fn what_belongs_together_is_asked_for_together() {
     let faults = |lines: &str| settings(&with(lines)).check().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
     let alone = faults("      distance: {column: l, unit: mm}\n");
     assert!(alone.contains("`distance` and `sigma_distance` go together"), "{alone}");
-    let two = faults("      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n");
+    let two = faults(
+        "      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n",
+    );
     assert!(two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]` or `rotation_vector"), "{two}");
     let height = faults("      z: {column: z, unit: mm}\n");
     assert!(height.contains("not mapped: x, y"), "{height}");
