@@ -68,6 +68,13 @@ pub struct Fitted {
 
 /// Median of the squared length of three unit normals.
 const MEDIAN_CHI2_3: f64 = 2.366;
+impl Fitted {
+    /// What the rows show beyond their own noise.
+    pub(crate) fn beyond(&self) -> Unmodelled {
+        Unmodelled { point: self.unmodelled, turn: self.unmodelled_turn.unwrap_or_default() }
+    }
+}
+
 /// Limit of accepted steps; calibration problems need four to ten.
 const ITERATIONS: usize = 60;
 /// Steps of the first round, which only finds out how large the residual is and what it lets one see.

@@ -7,7 +7,6 @@ use super::factor::Factor;
 use super::fit::{Fate, Fitted};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
-use super::piece::Unmodelled;
 use super::problem::Problem;
 use crate::robot::{Measurements, RobotModel};
 use faer::Mat;
@@ -50,7 +49,7 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
-    let unmodelled = Unmodelled { point: fitted.unmodelled, turn: fitted.unmodelled_turn.unwrap_or_default() };
+    let unmodelled = fitted.beyond();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
         Problem { data, rows: &rows, unmodelled }.observe(model, &candidates).factor

@@ -10,7 +10,6 @@ pub use kind::Kind;
 
 use super::fit::{Fate, FitOptions, Fitted, fit};
 use super::model::Model;
-use super::piece::Unmodelled;
 use super::problem::Problem;
 use crate::robot::Measurements;
 use distance::{Standing, leave_one_out};
@@ -115,8 +114,7 @@ fn screen(
     held: &BTreeSet<usize>,
 ) -> (Vec<Suspect>, usize) {
     let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
-    let unmodelled = Unmodelled { point: fitted.unmodelled, turn: fitted.unmodelled_turn.unwrap_or_default() };
-    let problem = Problem { data, rows: kept, unmodelled };
+    let problem = Problem { data, rows: kept, unmodelled: fitted.beyond() };
     let mut standings = leave_one_out(&problem, model, &free);
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);
