@@ -95,6 +95,7 @@ impl Cell {
             temperature: None,
             current: None,
             direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+            ..Recording::default()
         };
         let set = |k: usize| if k % 4 == 3 { "validate" } else { "fit" };
         let row = |k: usize| SplitRow { sequence: k as i64, point_id: format!("p{k}"), set: set(k).into() };
