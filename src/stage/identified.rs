@@ -211,6 +211,12 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             noise_axis * 1e3
         ));
     }
+    if let Some(turn) = fitted.unmodelled_turn.filter(|turn| *turn > ASKEW) {
+        services.warn(format!(
+            "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
+            turn.to_degrees()
+        ));
+    }
     for (k, opinion) in &fitted.opinions {
         let spec = &model.stack.specs()[*k];
         if let (Some((alone, sigma)), true) = (opinion.without, opinion.conflict > CONFLICT) {
@@ -238,6 +244,9 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         services.note(format!("{} rows stand far off and count less", fitted.downweighted));
     }
 }
+
+/// No arm is that far off in orientation (rad); angles read in another convention are.
+const ASKEW: f64 = 0.02;
 
 /// A measured point closer to the last axis than this (m) says next to nothing about that axis.
 const NEAR_AXIS: f64 = 5e-3;

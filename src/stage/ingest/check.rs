@@ -90,7 +90,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
 
 fn orientation_faults(orientation: &OrientationColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     let Some((convention, references)) = orientation.columns() else {
-        let message = "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]` or `rotation_vector: [x, y, z]`, one of them";
+        let message = "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz: [Rx, Ry, Rz]` or `rotation_vector: [x, y, z]`, one of them";
         faults.push(Fault::new(place, message));
         return;
     };

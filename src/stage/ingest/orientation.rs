@@ -6,7 +6,7 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Columns of the target's orientation in the tracker's frame, in one of three conventions.
+/// Columns of the target's orientation in the tracker's frame, in one of four conventions.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OrientationColumns {
@@ -14,6 +14,8 @@ pub struct OrientationColumns {
     pub quaternion: Option<Vec<ColumnRef>>,
     /// Columns of roll (about x), pitch (y), yaw (z) about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll).
     pub rpy: Option<Vec<ColumnRef>>,
+    /// Columns of angles about x, then the turned y, then the turned z (R = Rx Ry Rz), as many trackers write Rx, Ry, Rz.
+    pub euler_xyz: Option<Vec<ColumnRef>>,
     /// Columns of x, y, z of the rotation vector: the axis times the angle.
     pub rotation_vector: Option<Vec<ColumnRef>>,
     /// Unit of the angles, e.g. `deg`.
@@ -27,6 +29,7 @@ pub struct OrientationColumns {
 pub(super) enum Convention {
     Quaternion,
     Rpy,
+    EulerXyz,
     RotationVector,
 }
 
@@ -39,6 +42,7 @@ impl OrientationColumns {
         let given = [
             (Convention::Quaternion, &self.quaternion),
             (Convention::Rpy, &self.rpy),
+            (Convention::EulerXyz, &self.euler_xyz),
             (Convention::RotationVector, &self.rotation_vector),
         ];
         let mut given = given.into_iter().filter_map(|(convention, columns)| Some((convention, columns.as_deref()?)));
@@ -71,6 +75,10 @@ impl Convention {
                 UnitQuaternion::from_quaternion(quaternion)
             }
             Self::Rpy => UnitQuaternion::from_euler_angles(a, b, c),
+            Self::EulerXyz => {
+                let about = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
+                about(Vector3::x(), a) * about(Vector3::y(), b) * about(Vector3::z(), c)
+            }
             Self::RotationVector => UnitQuaternion::from_scaled_axis(Vector3::new(a, b, c)),
         };
         let rotation = Rotation3::from(rotation).into_inner();

@@ -30,7 +30,7 @@ fn targets_and_gaps_arrive_by_row() {
 }
 
 #[test]
-fn three_conventions_of_orientation_are_one_rotation() {
+fn all_conventions_of_orientation_are_one_rotation() {
     let lines = "      sigma_orientation: {value: 20, unit: arcsec}\n";
     let by = |orientation: &str, cells: &str| {
         let yaml = with(&format!("      orientation: {orientation}\n{lines}"));
@@ -45,6 +45,10 @@ fn three_conventions_of_orientation_are_one_rotation() {
     let expected = Vector3::new(-0.163_175_911, 0.925_416_578, 0.342_020_143);
     assert!((own - expected).norm() < 1e-8, "{own}");
     assert!((by("{rotation_vector: [a, b, c], unit: rad}", &format!("{},{},{},", rpy.x, rpy.y, rpy.z)) - rpy).norm() < 1e-12);
+    // The same angles about moving axes in the other order are fixed ones in this: Rx(30) Ry(-20) Rz(100) takes z to
+    // (sin -20, -sin 30 cos 20, cos 30 cos 20).
+    let moving = Rotation3::new(by("{euler_xyz: [a, b, c], unit: deg}", "30,-20,100,")) * Vector3::z();
+    assert!((moving - Vector3::new(-0.342_020_143, -0.469_846_310, 0.813_797_681)).norm() < 1e-8, "{moving}");
     let turned = nalgebra::UnitQuaternion::from_scaled_axis(rpy);
     let cells = format!("{},{},{},{}", turned.w, turned.i, turned.j, turned.k);
     assert!((by("{quaternion: [a, b, c, d]}", &cells) - rpy).norm() < 1e-9);
@@ -73,7 +77,7 @@ fn what_belongs_together_is_asked_for_together() {
     let two = faults(
         "      orientation: {rpy: [a, b, c], quaternion: [d, e, f, g], unit: deg}\n      sigma_orientation: {value: 1, unit: deg}\n",
     );
-    assert!(two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]` or `rotation_vector"), "{two}");
+    assert!(two.contains("say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz"), "{two}");
     let height = faults("      z: {column: z, unit: mm}\n");
     assert!(height.contains("not mapped: x, y"), "{height}");
     assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
