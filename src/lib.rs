@@ -24,6 +24,7 @@
 //! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
+//! | [`audit`] | runs told, explained, compared, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
@@ -74,6 +75,7 @@ pub mod stage;
 
 pub mod pipeline;
 
+pub mod audit;
 pub mod fleet;
 
 pub mod progress;

@@ -1,8 +1,12 @@
 //! `calib diff`: two tables or two runs compared; exit code 0 same, 1 different beyond tolerance, 2 could not compare.
 
-use super::{complain, emit, emit_json};
+use super::surroundings::default_store;
+use super::{complain, emit, emit_json, run_diff};
+use crate::audit::{Place, compare_runs};
 use crate::diff::{self, Detail, Options, TableDiff};
 use crate::error::{Error, Result};
+use crate::pipeline::Manifest;
+use crate::store::{Store, TableRef};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -13,10 +17,10 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DiffArguments {
-    /// A Parquet file
-    a: PathBuf,
+    /// A Parquet file, or a run: RUN, RUN/STAGE or RUN/STAGE/PORT, RUN being an id, a tag, HEAD or HEAD~1
+    a: String,
     /// The same, to compare with
-    b: PathBuf,
+    b: String,
     /// Columns that tell rows apart, instead of those of the schema
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     key: Vec<String>,
@@ -53,6 +57,9 @@ pub(super) struct DiffArguments {
     /// Writes every cell that differs as a row of a Parquet file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Where runs are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
     /// Ends with code 0 also where there are differences
     #[arg(long)]
     exit_zero: bool,
@@ -60,6 +67,8 @@ pub(super) struct DiffArguments {
 
 const EXAMPLES: &str = "Examples:
   calib diff monday.parquet tuesday.parquet
+  calib diff HEAD~1 HEAD
+  calib diff released/joint/parameters HEAD/joint/parameters
   calib diff a.parquet b.parquet --key robot,pose --atol x_mm=50um --ignore remark
   calib diff a.parquet b.parquet --stat --out cells.parquet
 
@@ -78,17 +87,89 @@ pub(super) fn main(arguments: &DiffArguments) -> u8 {
 
 fn execute(arguments: &DiffArguments) -> Result<u8> {
     let options = options(arguments)?;
-    let diff = diff::compare(&arguments.a, &arguments.b, &options)?;
+    let (a, b) = (Path::new(&arguments.a), Path::new(&arguments.b));
+    if a.is_file() || b.is_file() || arguments.a.ends_with(".parquet") || arguments.b.ends_with(".parquet") {
+        return tables(arguments, a, b, &options);
+    }
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let (a, b) = (place(&store, &arguments.a)?, place(&store, &arguments.b)?);
+    if let (Some(left), Some(right)) = (output(&store, &a)?, output(&store, &b)?) {
+        return tables(arguments, &store.object_path(&left), &store.object_path(&right), &options);
+    }
+    if options.out.is_some() {
+        return Err(Error::spec("--out", "is for two tables: name them as RUN/STAGE/PORT"));
+    }
+    // What is asked of columns holds where a table has them, so only what the schemas say is used for runs.
+    let options =
+        Options { limit: options.limit, reread: options.reread, by_occurrence: options.by_occurrence, ..Options::default() };
+    let diff = compare_runs(&store, &a, &b, &options)?;
+    if arguments.json {
+        let mut value = serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
+        value["same"] = diff.is_same().into();
+        emit_json(&value)?;
+    } else {
+        emit(&run_diff::text(&diff, arguments.stat))?;
+    }
+    if let Some(path) = &arguments.html {
+        let text = run_diff::text(&diff, true);
+        let notes: Vec<String> = text.lines().filter(|line| !line.is_empty()).map(String::from).collect();
+        let tables: Vec<(String, TableDiff)> =
+            diff.tables.iter().filter_map(|table| Some((table.name.clone(), table.diff.clone()?))).collect();
+        write(path, &diff::html(&format!("runs {} and {}", diff.a.run, diff.b.run), &notes, &tables)?)?;
+    }
+    let duplicates: u64 = diff.tables.iter().filter_map(|table| table.diff.as_ref()).map(TableDiff::duplicates).sum();
+    Ok(code(diff.is_same(), duplicates, arguments))
+}
+
+fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &Options) -> Result<u8> {
+    let diff = diff::compare(a, b, options)?;
     if arguments.json {
         emit_json(&json(&diff)?)?;
     } else {
         emit(&diff::text(&diff, if arguments.stat { Detail::Stat } else { Detail::Full }))?;
     }
-    let code = if diff.duplicates() > 0 { 2 } else { u8::from(!diff.is_same()) };
+    let code = code(diff.is_same(), diff.duplicates(), arguments);
     if let Some(path) = &arguments.html {
         write(path, &diff::html("calib diff", &[], &[("tables".into(), diff)])?)?;
     }
-    Ok(if arguments.exit_zero && code == 1 { 0 } else { code })
+    Ok(code)
+}
+
+fn code(same: bool, duplicates: u64, arguments: &DiffArguments) -> u8 {
+    match (duplicates, same || arguments.exit_zero) {
+        (1.., _) => 2,
+        (0, true) => 0,
+        (0, false) => 1,
+    }
+}
+
+/// `RUN`, `RUN/STAGE`, `RUN/STAGE/PORT`.
+fn place(store: &Store, text: &str) -> Result<Place> {
+    let mut parts = text.split('/').map(String::from);
+    let run = store.find_run(&parts.next().unwrap_or_default())?;
+    let place = Place { run, stage: parts.next(), port: parts.next() };
+    if parts.next().is_some() {
+        return Err(Error::spec(text, "expected a Parquet file, RUN, RUN/STAGE or RUN/STAGE/PORT"));
+    }
+    let manifest = Manifest::of(store, &place.run)?;
+    if let Some(id) = &place.stage {
+        let stages: Vec<&str> = manifest.stages.iter().map(|stage| stage.id.as_str()).collect();
+        let stage = manifest.stage(id);
+        let stage = stage.ok_or_else(|| Error::spec(text, format!("no stage `{id}`; its stages: {}", stages.join(", "))))?;
+        let ports: Vec<&str> = stage.outputs.iter().map(|output| output.port.as_str()).collect();
+        if let Some(port) = place.port.as_deref().filter(|port| !ports.contains(port)) {
+            return Err(Error::spec(text, format!("stage {id} has no table `{port}`; its tables: {}", ports.join(", "))));
+        }
+    }
+    Ok(place)
+}
+
+/// The table of a place that names one.
+fn output(store: &Store, place: &Place) -> Result<Option<TableRef>> {
+    let (Some(stage), Some(port)) = (&place.stage, &place.port) else { return Ok(None) };
+    let manifest = Manifest::of(store, &place.run)?;
+    let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| &output.port == port));
+    Ok(output.map(|output| output.table.clone()))
 }
 
 fn options(arguments: &DiffArguments) -> Result<Options> {

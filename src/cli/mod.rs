@@ -7,18 +7,26 @@ mod diagnose;
 mod diff;
 mod effects;
 mod export;
+mod explain;
 mod fleet;
+mod gc;
 mod identified;
 mod init;
+mod lineage;
+mod log;
 mod pipeline_arguments;
 mod poses;
 mod run;
+mod run_diff;
 mod schema;
 mod searches;
 mod shell;
+mod show;
 mod simulate;
 mod surroundings;
 mod tables;
+mod tag;
+mod verify;
 
 use crate::error::{Error, Result};
 use clap::{Parser, Subcommand};
@@ -45,14 +53,21 @@ enum Verb {
     Fleet(fleet::FleetArguments),
     Export(export::ExportArguments),
     Init(init::InitArguments),
+    Explain(explain::ExplainArguments),
+    Gc(gc::GcArguments),
+    Lineage(lineage::LineageArguments),
+    Log(log::LogArguments),
     Poses(poses::PosesArguments),
     Schema(schema::SchemaArguments),
+    Show(show::ShowArguments),
     Simulate(simulate::SimulateArguments),
     Completions(shell::CompletionsArguments),
     Man(shell::ManArguments),
+    Tag(tag::TagArguments),
+    Verify(verify::VerifyArguments),
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
 
 /// Runs a command line, prints what comes of it and gives the exit code.
@@ -76,11 +91,18 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Fleet(verb) => fleet::main(&verb, &arguments),
         Verb::Export(verb) => export::main(&verb, &arguments),
         Verb::Init(verb) => init::main(&verb),
+        Verb::Explain(verb) => explain::main(&verb),
+        Verb::Gc(verb) => gc::main(&verb),
+        Verb::Lineage(verb) => lineage::main(&verb),
+        Verb::Log(verb) => log::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Completions(verb) => shell::completions(&verb),
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),
+        Verb::Show(verb) => show::main(&verb),
         Verb::Simulate(verb) => simulate::main(&verb, &arguments),
+        Verb::Tag(verb) => tag::main(&verb),
+        Verb::Verify(verb) => return verify::main(&verb),
     };
     match result {
         Ok(()) => 0,

@@ -1,6 +1,7 @@
 //! Who runs calib, where and when: the only file that reads the environment and the clock.
 
 use crate::pipeline::{Host, Surroundings, Tool};
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -18,14 +19,32 @@ pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
             architecture: std::env::consts::ARCH.into(),
             cores: cores(),
         },
+        user: user(),
+        environment: environment(),
         command_line: command_line.iter().map(|part| part.to_string_lossy().into_owned()).collect(),
         now: SystemTime::now,
         run_id: ulid::Ulid::generate().to_string(),
     }
 }
 
+pub(super) fn now() -> SystemTime {
+    SystemTime::now()
+}
+
 pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Nobody where `CALIB_NO_USER` is set.
+fn user() -> Option<String> {
+    let named = || std::env::var("USER").or_else(|_| std::env::var("USERNAME")).ok();
+    if std::env::var_os("CALIB_NO_USER").is_some() { None } else { named() }
+}
+
+/// What may change speed, never results; nothing else of the environment is kept.
+fn environment() -> BTreeMap<String, String> {
+    let known = ["RAYON_NUM_THREADS", "SLURM_JOB_ID", "SLURM_ARRAY_TASK_ID", "TZ", "LANG"];
+    known.iter().filter_map(|name| Some((name.to_string(), std::env::var(name).ok()?))).collect()
 }
 
 fn host_name() -> String {

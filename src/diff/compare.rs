@@ -80,6 +80,11 @@ pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
     Ok(diff)
 }
 
+/// The content hash that a file carries.
+pub fn table_hash(path: &Path) -> Result<Option<String>> {
+    Ok(Source::open(path)?.table_hash)
+}
+
 fn side(source: &Source) -> Side {
     Side {
         path: source.path.display().to_string(),

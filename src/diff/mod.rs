@@ -12,9 +12,9 @@ mod measure;
 mod source;
 mod text;
 
-pub use compare::compare;
+pub use compare::{compare, table_hash};
 pub use html::html;
-pub use text::{Detail, text};
+pub use text::{Detail, headline, short, text};
 
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};

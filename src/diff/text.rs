@@ -58,6 +58,11 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
     text
 }
 
+/// The cell of a row that changed most.
+pub fn headline(row: &super::WorstRow) -> String {
+    row.cells.first().map(cell).unwrap_or_default()
+}
+
 /// `x_mm 1.25 -> 1.5 mm (+0.25, 3.1 sigma)`.
 pub(super) fn cell(cell: &WorstCell) -> String {
     let show = |value: &serde_json::Value| match value {
@@ -108,7 +113,7 @@ fn columns(columns: &[ColumnDiff]) -> String {
 }
 
 /// Three significant digits.
-pub(super) fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {
         "0".into()

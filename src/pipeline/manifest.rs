@@ -1,8 +1,10 @@
 //! The audit record of one run, written when it starts, after every stage and at the end.
 
 use super::overrides::Override;
-use crate::store::{ActionId, FileHash, StageKey, TableRef};
-use serde::Serialize;
+use crate::error::{Error, Result};
+use crate::store::{ActionId, FileHash, Link, StageKey, Store, TableRef};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Bumped when older readers can no longer understand a manifest.
@@ -13,20 +15,24 @@ const MANIFEST_FORMAT: u32 = 1;
 pub struct Surroundings {
     pub tool: Tool,
     pub host: Host,
+    /// Who ran it, where that is known and wanted.
+    pub user: Option<String>,
+    /// Variables that calib and its libraries look at, where they are set.
+    pub environment: BTreeMap<String, String>,
     pub command_line: Vec<String>,
     pub now: fn() -> std::time::SystemTime,
     /// A fresh id for a run.
     pub run_id: String,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tool {
     pub name: String,
     pub version: String,
     pub target: String,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Host {
     pub name: String,
     pub os: String,
@@ -34,10 +40,12 @@ pub struct Host {
     pub cores: usize,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Manifest {
     manifest_format: u32,
     pub run_id: String,
+    /// The run that ended last before this one, with the seal of its manifest.
+    pub previous: Option<Link>,
     pub status: RunStatus,
     /// What went wrong, where the status says so.
     pub error: Option<String>,
@@ -45,6 +53,8 @@ pub struct Manifest {
     pub overrides: Vec<Override>,
     pub tool: Tool,
     pub host: Host,
+    pub user: Option<String>,
+    pub environment: BTreeMap<String, String>,
     pub command_line: Vec<String>,
     pub seed: u64,
     pub jobs: usize,
@@ -55,7 +65,7 @@ pub struct Manifest {
     pub stages: Vec<StageReport>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunStatus {
     /// Running, or killed.
@@ -64,7 +74,7 @@ pub enum RunStatus {
     Failed,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PipelineRecord {
     pub name: String,
     pub file: String,
@@ -75,7 +85,7 @@ pub struct PipelineRecord {
     pub resolved: serde_json::Value,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StageStatus {
     /// Its tables were there already.
@@ -87,7 +97,7 @@ pub enum StageStatus {
 }
 
 /// What became of one stage.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StageReport {
     pub id: String,
     pub uses: String,
@@ -107,7 +117,7 @@ pub struct StageReport {
     pub wall_seconds: Option<f64>,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct InputRecord {
     pub port: String,
     /// `stage.port` that wrote it.
@@ -116,7 +126,7 @@ pub struct InputRecord {
     pub table: TableRef,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FileRecord {
     pub place: String,
     pub path: PathBuf,
@@ -125,7 +135,7 @@ pub struct FileRecord {
     pub blake3: FileHash,
 }
 
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct OutputRecord {
     pub port: String,
     pub kind: String,
@@ -136,10 +146,22 @@ pub struct OutputRecord {
 }
 
 impl Manifest {
+    /// The manifest of a run in the store.
+    pub fn of(store: &Store, run: &str) -> Result<Self> {
+        let value = store.manifest(run)?;
+        serde_json::from_value(value)
+            .map_err(|e| Error::store(format!("run {run}"), format!("not a manifest that this calib reads: {e}")))
+    }
+
+    pub fn stage(&self, id: &str) -> Option<&StageReport> {
+        self.stages.iter().find(|stage| stage.id == id)
+    }
+
     pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, jobs: usize, started: String) -> Self {
         Self {
             manifest_format: MANIFEST_FORMAT,
             run_id: surroundings.run_id.clone(),
+            previous: None,
             status: RunStatus::Running,
             error: None,
             pipeline: PipelineRecord {
@@ -152,6 +174,8 @@ impl Manifest {
             overrides: plan.overrides.clone(),
             tool: surroundings.tool.clone(),
             host: surroundings.host.clone(),
+            user: surroundings.user.clone(),
+            environment: surroundings.environment.clone(),
             command_line: surroundings.command_line.clone(),
             seed: plan.seed,
             jobs,

@@ -18,10 +18,11 @@ mod spec;
 mod tests;
 mod wiring;
 
-pub use manifest::{Host, Manifest, OutputRecord, StageReport, StageStatus, Surroundings, Tool};
+pub use manifest::{Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool};
 pub use overrides::Override;
 pub use plan::Plan;
 pub use preview::{Forecast, Prospect, preview};
+pub use reason::{Change, changes_of};
 pub use run::{Outcome, RunOptions, run};
 pub use schema::json_schema;
 pub use select::Selection;

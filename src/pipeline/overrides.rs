@@ -5,7 +5,7 @@ use crate::yaml::{self, Mark, Node, Trouble, Value};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// One `--set target=value`.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Override {
     /// A variable, `seed` or `STAGE.path.of.setting`.
     pub target: String,

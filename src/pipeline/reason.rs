@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use crate::error::Result;
-use crate::store::{FileHash, Lookup, StageKey, Store};
+use crate::store::{Lookup, StageKey, Store};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,45 +43,94 @@ fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKe
     Ok(None)
 }
 
-/// `settings changed: identify.ratios; input recording changed`.
-fn changes(before: &StageKey, now: &StageKey) -> String {
-    let mut reasons = Vec::new();
-    if before.stage != now.stage {
-        reasons.push(format!("stage {} -> {}", before.stage, now.stage));
-    }
-    if before.implementation != now.implementation {
-        reasons.push(format!("implementation {} -> {}", before.implementation, now.implementation));
-    }
+/// A part of a key that is not what it was.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Change {
+    /// `settings`, `input`, `file`, `schema of`, `seed`, `stage`, `implementation`, `key format`.
+    pub what: &'static str,
+    /// The setting, port or file.
+    pub name: String,
+    pub before: String,
+    pub now: String,
+}
+
+/// Every part in which two keys of a stage differ.
+pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let mut push = |what, name: &str, before: String, now: String| {
+        if before != now {
+            changes.push(Change { what, name: name.into(), before, now });
+        }
+    };
+    push("stage", "", before.stage.clone(), now.stage.clone());
+    push("implementation", "", before.implementation.to_string(), now.implementation.to_string());
     let mut settings = BTreeSet::new();
     differing(&before.settings, &now.settings, &now.id, &mut settings);
-    if !settings.is_empty() {
-        reasons.push(format!("settings changed: {}", few(settings.into_iter().collect())));
+    for (path, old, new) in settings {
+        push("settings", &path, old, new);
     }
-    reasons.extend(compare("input", &before.reads, &now.reads));
-    reasons.extend(compare("file", &by_name(before), &by_name(now)));
-    reasons.extend(compare("schema of", &before.schemas, &now.schemas));
-    if before.seed != now.seed {
+    let reads =
+        |key: &StageKey| key.reads.iter().flat_map(|(port, tables)| tables.iter().map(|read| input(port, read))).collect();
+    let files = |key: &StageKey| key.files.values().map(|file| (file.name.clone(), file.content.to_string())).collect();
+    type Parts = BTreeMap<String, String>;
+    let pairs: [(&'static str, Parts, Parts); 3] = [
+        ("input", reads(before), reads(now)),
+        ("file", files(before), files(now)),
+        ("schema of", before.schemas.clone(), now.schemas.clone()),
+    ];
+    for (what, old, new) in pairs {
+        let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
+        for name in names {
+            let of = |map: &BTreeMap<String, String>| map.get(name).cloned().unwrap_or_else(|| "-".into());
+            push(what, name, of(&old), of(&new));
+        }
+    }
+    push("seed", "", before.seed.to_string(), now.seed.to_string());
+    push("key format", "", before.key_format.to_string(), now.key_format.to_string());
+    changes
+}
+
+/// A port, with the stage where it takes several tables, and the table.
+fn input(port: &str, read: &crate::store::ReadKey) -> (String, String) {
+    let name = read.stage.as_ref().map_or_else(|| port.to_string(), |stage| format!("{port} ({stage})"));
+    (name, read.table.to_string())
+}
+
+/// `settings changed: identify.ratios; input recording changed`.
+fn changes(before: &StageKey, now: &StageKey) -> String {
+    let changes = changes_of(before, now);
+    let names = |what: &str| -> Vec<String> {
+        let named = changes.iter().filter(|change| change.what == what);
+        let mut names: Vec<String> = named.map(|change| change.name.split(" (").next().unwrap_or_default().to_string()).collect();
+        names.dedup();
+        names
+    };
+    let mut reasons = Vec::new();
+    for what in ["stage", "implementation"] {
+        let found = changes.iter().find(|change| change.what == what);
+        reasons.extend(found.map(|change| format!("{what} {} -> {}", change.before, change.now)));
+    }
+    let settings = names("settings");
+    if !settings.is_empty() {
+        reasons.push(format!("settings changed: {}", few(settings)));
+    }
+    for what in ["input", "file", "schema of"] {
+        let names = names(what);
+        if !names.is_empty() {
+            reasons.push(format!("{what} {} changed", few(names)));
+        }
+    }
+    if changes.iter().any(|change| change.what == "seed") {
         reasons.push("seed changed".into());
     }
-    if before.key_format != now.key_format {
+    if changes.iter().any(|change| change.what == "key format") {
         reasons.push("calib keys its results in another way now".into());
     }
     if reasons.is_empty() { "its tables are no longer in the store".into() } else { reasons.join("; ") }
 }
 
-fn by_name(key: &StageKey) -> BTreeMap<String, (&str, &FileHash)> {
-    key.files.iter().map(|(place, file)| (file.name.clone(), (place.as_str(), &file.content))).collect()
-}
-
-fn compare<T: PartialEq>(what: &str, before: &BTreeMap<String, T>, now: &BTreeMap<String, T>) -> Option<String> {
-    let names: BTreeSet<&String> = before.keys().chain(now.keys()).collect();
-    let changed: Vec<String> =
-        names.into_iter().filter(|name| before.get(*name) != now.get(*name)).map(|name| name.to_string()).collect();
-    (!changed.is_empty()).then(|| format!("{what} {} changed", few(changed)))
-}
-
-/// Paths at which two values differ.
-fn differing(before: &Value, now: &Value, path: &str, paths: &mut BTreeSet<String>) {
+/// Paths at which two values differ, with both values.
+fn differing(before: &Value, now: &Value, path: &str, paths: &mut BTreeSet<(String, String, String)>) {
     match (before, now) {
         (Value::Object(old), Value::Object(new)) => {
             let names: BTreeSet<&String> = old.keys().chain(new.keys()).collect();
@@ -92,7 +141,7 @@ fn differing(before: &Value, now: &Value, path: &str, paths: &mut BTreeSet<Strin
         }
         _ if before == now => {}
         _ => {
-            paths.insert(path.into());
+            paths.insert((path.into(), before.to_string(), now.to_string()));
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::store::Store;
 use crate::table::{Split, SplitRow, Truth, TruthRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Mutex;
@@ -100,6 +101,8 @@ fn surroundings() -> Surroundings {
     Surroundings {
         tool: Tool { name: "calib".into(), version: "0".into(), target: "test".into() },
         host: Host { name: "test".into(), os: "test".into(), architecture: "test".into(), cores: 1 },
+        user: None,
+        environment: BTreeMap::new(),
         command_line: vec!["calib".into()],
         now: std::time::SystemTime::now,
         run_id: ulid::Ulid::generate().to_string(),

@@ -11,6 +11,7 @@ use super::disk::{make_read_only, put_if_absent, refused, replace, write_synced}
 use super::frame::Frame;
 use super::key::{ActionId, FileHash, StageKey};
 use super::reader;
+use super::seal::{seal, unseal};
 use super::writer::{FinishedFile, TableWriter};
 use crate::error::{Error, Result};
 
@@ -99,6 +100,9 @@ impl Store {
             Err(e) => return Err(refused(&path, "read", &e)),
         };
         let damaged = |why: String| Ok(Lookup::Damaged(format!("{}: {why}; the stage runs again", path.display())));
+        if let Err(why) = unseal(&bytes) {
+            return damaged(why.into());
+        }
         let record: ActionRecord = match serde_json::from_slice(&bytes) {
             Ok(record) => record,
             Err(e) => return damaged(format!("not a whole action record ({e})")),
@@ -133,8 +137,7 @@ impl Store {
         let record = ActionRecord { record_format: RECORD_FORMAT, id: key.id(), key: key.clone(), tables, account };
         let path = self.record_path(&record.id);
         let aside = self.workspace()?.fresh();
-        let text = serde_json::to_vec_pretty(&record).map_err(|e| Error::Bug(e.to_string()))?;
-        write_synced(&aside, &text)?;
+        write_synced(&aside, &seal(&record)?)?;
         if put_if_absent(&aside, &path)? {
             let _ = fs::remove_file(&aside);
             return Ok(Published { record, conflict: None });

@@ -15,6 +15,10 @@ mod notes;
 mod reader;
 pub mod runs;
 pub mod schema;
+mod seal;
+mod sweep;
+mod tags;
+mod verify;
 mod view;
 mod workspace;
 pub mod writer;
@@ -22,7 +26,9 @@ pub mod writer;
 pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
-pub use runs::Run;
+pub use runs::{Link, Run, Sealed};
+pub use sweep::Sweep;
+pub use verify::Verification;
 pub use writer::{FinishedFile, TableWriter};
 
 use serde::{Deserialize, Serialize};
@@ -84,14 +90,17 @@ impl Store {
         let path = self.root.join("format.json");
         if !path.exists() {
             let aside = workspace.fresh();
-            let text = serde_json::to_vec(&Format { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))?;
-            write_synced(&aside, &text)?;
+            write_synced(&aside, &format_text()?)?;
             put_if_absent(&aside, &path)?;
             let _ = fs::remove_file(&aside);
         }
         *slot = Some(workspace.clone());
         Ok(workspace)
     }
+}
+
+fn format_text() -> Result<Vec<u8>> {
+    serde_json::to_vec(&Format { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))
 }
 
 fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -1,6 +1,8 @@
 //! The audit record of runs: `runs/<id>/manifest.json` and `events.jsonl`. Ids (ULIDs) and times are made by the caller.
+//!
+//! A manifest is sealed and names the seal of the run before it; every event carries the hash of all events up to it.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Write;
@@ -8,7 +10,8 @@ use std::path::PathBuf;
 
 use super::Store;
 use super::disk::{component, make_dir, refused, replace, sync_dir, write_synced};
-use crate::error::{Error, Result};
+use super::seal::{seal, unseal};
+use crate::error::{Error, Result, nearest};
 
 /// A run in flight.
 #[derive(Debug)]
@@ -16,7 +19,25 @@ pub struct Run {
     id: String,
     dir: PathBuf,
     events: File,
+    chain: blake3::Hasher,
 }
+
+/// A run and the seal of its manifest.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Link {
+    pub run: String,
+    pub sealed: String,
+}
+
+/// A manifest whose seal holds.
+#[derive(Debug, Clone)]
+pub struct Sealed {
+    pub manifest: Value,
+    pub sealed: String,
+}
+
+/// Hex digits of the hash that an event carries.
+const EVENT_DIGITS: usize = 16;
 
 impl Run {
     pub fn id(&self) -> &str {
@@ -28,9 +49,31 @@ impl Run {
     /// Appends one line of JSON.
     pub fn append_event(&mut self, event: &impl Serialize) -> Result<()> {
         let mut line = serde_json::to_vec(event).map_err(|e| Error::Bug(e.to_string()))?;
-        line.push(b'\n');
+        line.pop();
+        self.chain.update(&line);
+        let hash = &self.chain.finalize().to_hex()[..EVENT_DIGITS];
+        line.extend_from_slice(format!(",\"chain\":\"{hash}\"}}\n").as_bytes());
         self.events.write_all(&line).map_err(|e| refused(&self.dir.join("events.jsonl"), "write", &e))
     }
+}
+
+/// What is wrong with the events of a run, if anything; the last line of a run that was killed may be torn.
+pub(crate) fn events_fault(text: &[u8], ended: bool) -> Option<String> {
+    let mut chain = blake3::Hasher::new();
+    let mut lines = text.split_inclusive(|&byte| byte == b'\n').enumerate().peekable();
+    while let Some((number, line)) = lines.next() {
+        let tail = EVENT_DIGITS + "\"}\n".len();
+        let known = line.len().checked_sub(tail + ",\"chain\":\"".len()).map(|at| line.split_at(at));
+        let whole = known.is_some_and(|(body, end)| {
+            chain.update(body);
+            end == format!(",\"chain\":\"{}\"}}\n", &chain.finalize().to_hex()[..EVENT_DIGITS]).as_bytes()
+        });
+        let torn = !ended && lines.peek().is_none() && !line.contains(&b'}');
+        if !whole && !torn {
+            return Some(format!("event {} is not what was written", number + 1));
+        }
+    }
+    None
 }
 
 impl Store {
@@ -48,7 +91,7 @@ impl Store {
         sync_dir(&parent)?;
         let path = dir.join("events.jsonl");
         let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
-        let run = Run { id: id.into(), dir, events };
+        let run = Run { id: id.into(), dir, events, chain: blake3::Hasher::new() };
         self.write_manifest(&run, manifest)?;
         Ok(run)
     }
@@ -56,9 +99,7 @@ impl Store {
     /// Replaces the manifest of a run, atomically.
     pub fn write_manifest(&self, run: &Run, manifest: &impl Serialize) -> Result<()> {
         let aside = self.workspace()?.fresh();
-        let mut text = serde_json::to_vec_pretty(manifest).map_err(|e| Error::Bug(e.to_string()))?;
-        text.push(b'\n');
-        write_synced(&aside, &text)?;
+        write_synced(&aside, &seal(manifest)?)?;
         replace(&aside, &run.dir.join("manifest.json"))
     }
 
@@ -81,10 +122,72 @@ impl Store {
         Ok(ids)
     }
 
+    /// An id that comes after those of all runs, also where the clock went backwards: `fresh`, or the next after the last.
+    pub fn later_run_id(&self, fresh: &str) -> Result<String> {
+        let Some(last) = self.runs()?.pop().filter(|last| last.as_str() >= fresh) else { return Ok(fresh.into()) };
+        let next = ulid::Ulid::from_string(&last).ok().and_then(|last| last.increment().ok());
+        Ok(next.map_or_else(|| fresh.into(), |next| next.to_string()))
+    }
+
+    /// The last run whose manifest is whole and says that it ended.
+    pub fn last_ended(&self) -> Result<Option<Link>> {
+        for run in self.runs()?.into_iter().rev() {
+            // A manifest that cannot be read is found by a verification; it must not stop a run.
+            if let Ok(Sealed { manifest, sealed }) = self.sealed_manifest(&run)
+                && manifest["status"] != "running"
+            {
+                return Ok(Some(Link { run, sealed }));
+            }
+        }
+        Ok(None)
+    }
+
     /// The manifest of a run, as far as it was written.
     pub fn manifest(&self, id: &str) -> Result<Value> {
+        self.sealed_manifest(id).map(|found| found.manifest)
+    }
+
+    /// The manifest of a run with its seal, which holds.
+    pub fn sealed_manifest(&self, id: &str) -> Result<Sealed> {
         let path = self.run_dir(id)?.join("manifest.json");
         let bytes = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
-        serde_json::from_slice(&bytes).map_err(|e| Error::store(path.display().to_string(), format!("not a whole manifest: {e}")))
+        let damaged = |why: String| Error::store(path.display().to_string(), format!("not a whole manifest: {why}"));
+        let sealed = unseal(&bytes).map_err(|why| damaged(why.into()))?;
+        let manifest = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
+        Ok(Sealed { manifest, sealed })
+    }
+
+    /// The run that a person means: an id, the beginning or end of one, a tag, `HEAD` for the last, `HEAD~2` for two before it.
+    pub fn find_run(&self, text: &str) -> Result<String> {
+        let runs = self.runs()?;
+        let nothing = |message: String| Err(Error::spec(format!("run {text}"), message));
+        if runs.is_empty() {
+            return nothing(format!("the store {} has no runs", self.root().display()));
+        }
+        if let Some(back) = text.strip_prefix("HEAD") {
+            let back = match back.strip_prefix('~') {
+                Some("") => Some(1),
+                Some(count) => count.parse::<usize>().ok(),
+                None => back.is_empty().then_some(0),
+            };
+            return match back.and_then(|back| runs.len().checked_sub(back + 1)) {
+                Some(at) => Ok(runs[at].clone()),
+                None => nothing(format!("expected HEAD or HEAD~N; the store has {} runs", runs.len())),
+            };
+        }
+        if let Some(run) = self.tags()?.remove(text) {
+            return Ok(run);
+        }
+        let wanted = text.to_uppercase();
+        let found: Vec<&String> = runs.iter().filter(|id| id.starts_with(&wanted) || id.ends_with(&wanted)).collect();
+        match found.as_slice() {
+            [run] if !text.is_empty() => Ok((*run).clone()),
+            [] => {
+                let tags = self.tags()?;
+                let hint = nearest(text, tags.keys().map(String::as_str)).map(|near| format!("; did you mean the tag `{near}`?"));
+                nothing(format!("no such run or tag{} `calib log` lists them", hint.unwrap_or_else(|| ";".into())))
+            }
+            several => nothing(format!("{} runs begin or end so; give more of the id", several.len())),
+        }
     }
 }

@@ -54,6 +54,13 @@ impl Drop for Workspace {
     }
 }
 
+/// True while a living process has a folder below `tmp`.
+pub(super) fn in_use(tmp: &Path) -> bool {
+    let entries = fs::read_dir(tmp).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut locks = entries.filter(|path| path.extension().is_some_and(|extension| extension == "lock"));
+    locks.any(|path| File::open(path).is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock))))
+}
+
 /// Removes the folders whose owner is dead, that is, whose lock can be had. What cannot be removed stays: it harms nobody.
 fn sweep(tmp: &Path) {
     let Ok(entries) = fs::read_dir(tmp) else { return };

@@ -39,4 +39,5 @@ mod suspects;
 mod swarm;
 mod tables;
 mod transfer;
+mod trail;
 mod twin;

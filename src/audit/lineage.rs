@@ -1,0 +1,85 @@
+//! Where a table comes from: the action that made it, its input tables, theirs, down to raw files.
+
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::error::{Error, Result};
+use crate::store::{ActionRecord, Store, TableHash};
+
+/// A table with the action that made it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Node {
+    pub table_hash: TableHash,
+    /// Nothing where the store has no record of who made it.
+    pub made: Option<Made>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct Made {
+    pub stage: String,
+    pub uses: String,
+    pub implementation: u32,
+    pub port: String,
+    pub schema: String,
+    pub rows: u64,
+    pub action: String,
+    pub run: String,
+    pub when: String,
+    pub settings: serde_json::Value,
+    pub seed: u64,
+    /// Raw files: name and blake3.
+    pub files: Vec<(String, String)>,
+    /// Input tables by port; empty where they were told already.
+    pub reads: Vec<(String, Node)>,
+    pub told_before: bool,
+}
+
+/// Traces the table whose content hash begins with `start`.
+pub fn lineage(store: &Store, start: &str) -> Result<Node> {
+    let mut makers: BTreeMap<TableHash, (ActionRecord, String)> = BTreeMap::new();
+    for record in store.records()? {
+        for (port, table) in &record.tables {
+            // Of several actions that gave the same table, the first in the order of their ids.
+            makers.entry(table.table_hash.clone()).or_insert_with(|| (record.clone(), port.clone()));
+        }
+    }
+    let wanted = start.to_lowercase();
+    let found: Vec<&TableHash> = makers.keys().filter(|hash| hash.as_str().starts_with(&wanted)).collect();
+    match found.as_slice() {
+        [hash] => Ok(trace(hash, &makers, &mut BTreeSet::new())),
+        [] => Err(Error::spec(format!("table {start}"), "no action in the store made it: is it another store's? (--store DIR)")),
+        several => {
+            Err(Error::spec(format!("table {start}"), format!("{} tables begin so; give more of the hash", several.len())))
+        }
+    }
+}
+
+fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>, told: &mut BTreeSet<String>) -> Node {
+    let made = makers.get(hash).map(|(record, port)| {
+        let told_before = !told.insert(record.id.to_string());
+        let table = record.tables.get(port);
+        let reads = record.key.reads.iter().flat_map(|(port, tables)| tables.iter().map(move |table| (port, table)));
+        let reads = if told_before {
+            Vec::new()
+        } else {
+            reads.map(|(port, read)| (port.clone(), trace(&read.table, makers, told))).collect()
+        };
+        Made {
+            stage: record.key.id.clone(),
+            uses: record.key.stage.clone(),
+            implementation: record.key.implementation,
+            port: port.clone(),
+            schema: table.map(|table| table.schema.clone()).unwrap_or_default(),
+            rows: table.map_or(0, |table| table.rows),
+            action: record.id.to_string(),
+            run: record.account.run.clone(),
+            when: record.account.started.clone(),
+            settings: record.key.settings.clone(),
+            seed: record.key.seed,
+            files: record.key.files.values().map(|file| (file.name.clone(), file.content.to_string())).collect(),
+            reads,
+            told_before,
+        }
+    });
+    Node { table_hash: hash.clone(), made }
+}

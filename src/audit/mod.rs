@@ -1,0 +1,11 @@
+//! The trail: runs told, explained, compared, their tables traced to where they come from, what nothing keeps swept.
+
+mod explain;
+mod keep;
+mod lineage;
+mod runs;
+
+pub use explain::{Explanation, explain};
+pub use keep::kept_actions;
+pub use lineage::{Made, Node, lineage};
+pub use runs::{Place, RunDiff, Setting, TableChange, Told, compare_runs};

@@ -1,0 +1,134 @@
+//! Two runs compared: settings, files and seeds that differ, then every table that both have.
+
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+use crate::diff::{Options, TableDiff, compare};
+use crate::error::Result;
+use crate::pipeline::{Change, Manifest, OutputRecord, changes_of};
+use crate::store::Store;
+
+#[derive(Debug, Clone, Serialize)]
+pub struct RunDiff {
+    pub a: Told,
+    pub b: Told,
+    /// What was put in: settings, files, seeds, implementations. What follows from these is no cause.
+    pub causes: Vec<Setting>,
+    pub tables: Vec<TableChange>,
+}
+
+/// A run in a line.
+#[derive(Debug, Clone, Serialize)]
+pub struct Told {
+    pub run: String,
+    pub pipeline: String,
+    pub started: String,
+    pub version: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Setting {
+    pub stage: String,
+    #[serde(flatten)]
+    pub change: Change,
+}
+
+/// A table of one or both runs.
+#[derive(Debug, Clone, Serialize)]
+pub struct TableChange {
+    /// `stage.port`.
+    pub name: String,
+    pub kind: String,
+    pub status: &'static str,
+    /// Where both have it, their content differs, and both are still in the store.
+    pub diff: Option<TableDiff>,
+}
+
+impl RunDiff {
+    pub fn is_same(&self) -> bool {
+        self.tables.iter().all(|table| table.status == "same" || table.diff.as_ref().is_some_and(TableDiff::is_same))
+    }
+}
+
+/// Compares run `a` with run `b`: all stages or one, all its ports or one.
+pub fn compare_runs(store: &Store, a: &Place, b: &Place, options: &Options) -> Result<RunDiff> {
+    let (left, right) = (Manifest::of(store, &a.run)?, Manifest::of(store, &b.run)?);
+    let (outputs_a, outputs_b) = (outputs(&left, a), outputs(&right, b));
+    let names: BTreeSet<&String> = outputs_a.iter().chain(&outputs_b).map(|(name, _)| name).collect();
+    // In the order of the pipeline, what only A has last.
+    let mut order: Vec<&String> = outputs_b.iter().map(|(name, _)| name).collect();
+    order.extend(names.into_iter().filter(|name| !outputs_b.iter().any(|(other, _)| other == *name)));
+    let mut tables = Vec::new();
+    for name in order {
+        let of = |outputs: &[(String, OutputRecord)]| {
+            outputs.iter().find(|(other, _)| other == name).map(|(_, output)| output.clone())
+        };
+        tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
+    }
+    Ok(RunDiff { a: told(&left), b: told(&right), causes: causes(&left, &right), tables })
+}
+
+/// A run, or one stage of it, or one of its tables.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    pub run: String,
+    pub stage: Option<String>,
+    pub port: Option<String>,
+}
+
+fn told(manifest: &Manifest) -> Told {
+    Told {
+        run: manifest.run_id.clone(),
+        pipeline: manifest.pipeline.name.clone(),
+        started: manifest.started.clone(),
+        version: manifest.tool.version.clone(),
+    }
+}
+
+fn outputs(manifest: &Manifest, place: &Place) -> Vec<(String, OutputRecord)> {
+    let stages = manifest.stages.iter().filter(|stage| place.stage.as_ref().is_none_or(|id| id == &stage.id));
+    let named = stages.flat_map(|stage| stage.outputs.iter().map(move |output| (stage, output)));
+    let wanted = named.filter(|(_, output)| place.port.as_ref().is_none_or(|port| port == &output.port));
+    wanted.map(|(stage, output)| (format!("{}.{}", stage.id, output.port), output.clone())).collect()
+}
+
+fn causes(a: &Manifest, b: &Manifest) -> Vec<Setting> {
+    let mut causes = Vec::new();
+    if a.tool.version != b.tool.version {
+        let change = Change { what: "calib", name: String::new(), before: a.tool.version.clone(), now: b.tool.version.clone() };
+        causes.push(Setting { stage: String::new(), change });
+    }
+    for stage in &b.stages {
+        let before = a.stage(&stage.id);
+        if before.is_none() {
+            let change = Change { what: "stage", name: stage.id.clone(), before: "-".into(), now: stage.uses.clone() };
+            causes.push(Setting { stage: stage.id.clone(), change });
+        }
+        let (Some(old), Some(new)) = (before.and_then(|stage| stage.key.as_ref()), &stage.key) else { continue };
+        let own = changes_of(old, new).into_iter().filter(|change| change.what != "input");
+        causes.extend(own.map(|change| Setting { stage: stage.id.clone(), change }));
+    }
+    for stage in a.stages.iter().filter(|stage| b.stage(&stage.id).is_none()) {
+        let change = Change { what: "stage", name: stage.id.clone(), before: stage.uses.clone(), now: "-".into() };
+        causes.push(Setting { stage: stage.id.clone(), change });
+    }
+    causes
+}
+
+fn table(store: &Store, name: &str, a: Option<OutputRecord>, b: Option<OutputRecord>, options: &Options) -> Result<TableChange> {
+    let kind = b.as_ref().or(a.as_ref()).map(|output| output.kind.clone()).unwrap_or_default();
+    let change =
+        |status: &'static str, diff: Option<TableDiff>| TableChange { name: name.into(), kind: kind.clone(), status, diff };
+    let (Some(a), Some(b)) = (&a, &b) else {
+        return Ok(change(if a.is_some() { "only in A" } else { "only in B" }, None));
+    };
+    if a.table.table_hash == b.table.table_hash && !options.reread {
+        return Ok(change("same", None));
+    }
+    let paths = [&a.table, &b.table].map(|table| store.object_path(table));
+    if paths.iter().any(|path| !path.exists()) {
+        return Ok(change("changed, but no longer in the store", None));
+    }
+    let diff = compare(&paths[0], &paths[1], options)?;
+    Ok(change(if diff.is_same() { "within tolerance" } else { "changed" }, Some(diff)))
+}

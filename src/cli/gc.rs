@@ -1,0 +1,58 @@
+//! `calib gc`: takes away tables that no kept run needs; only when asked.
+
+use super::surroundings::{default_store, now};
+use super::{emit, emit_json};
+use crate::audit::kept_actions;
+use crate::error::{Error, Result};
+use crate::store::Store;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Take away the tables that neither tagged runs nor the last runs of any pipeline need. Manifests always stay.
+///
+/// Never runs by itself, never while a run is in flight, and leaves everything that is younger than the grace period.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib gc --dry-run
+  calib gc --keep-runs 3 --grace-hours 1")]
+pub(super) struct GcArguments {
+    /// Runs of every pipeline whose tables are kept, beside tagged ones
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    keep_runs: u32,
+    /// Leaves what was written within so many hours
+    #[arg(long, value_name = "HOURS", default_value_t = 24)]
+    grace_hours: u32,
+    /// Says what would go, and takes nothing
+    #[arg(long, short = 'n')]
+    dry_run: bool,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &GcArguments) -> Result<()> {
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let keep = kept_actions(&store, usize::try_from(arguments.keep_runs).unwrap_or(usize::MAX))?;
+    let grace = Duration::from_secs(u64::from(arguments.grace_hours) * 3600);
+    let before = now().checked_sub(grace).unwrap_or(std::time::UNIX_EPOCH);
+    let sweep = store.sweep(&keep, before, arguments.dry_run)?;
+    if arguments.json {
+        return emit_json(&serde_json::to_value(&sweep).map_err(|error| Error::Bug(error.to_string()))?);
+    }
+    let verb = if arguments.dry_run { "would take away" } else { "took away" };
+    let mut text = format!(
+        "{verb} {} tables and {} action records, {:.1} MB; {} tables stay\n",
+        sweep.objects,
+        sweep.actions,
+        sweep.bytes as f64 / 1e6,
+        sweep.kept_objects
+    );
+    if sweep.young > 0 {
+        text.push_str(&format!("{} files that nothing keeps are younger than {} hours\n", sweep.young, arguments.grace_hours));
+    }
+    emit(&text)
+}

@@ -1,0 +1,80 @@
+//! `calib lineage`: where a table comes from, down to the raw files.
+
+use super::surroundings::default_store;
+use super::{emit, emit_json};
+use crate::audit::{Node, lineage};
+use crate::diff::table_hash;
+use crate::error::{Error, Result};
+use crate::pipeline::Manifest;
+use crate::store::Store;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Trace a table: the stage and run that made it, its settings, its input tables, theirs, down to the raw files.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib lineage .calib/tables/sr210d/validate.statistics.parquet
+  calib lineage HEAD/stiffness/parameters
+  calib lineage 4f2a90c1")]
+pub(super) struct LineageArguments {
+    /// A table's file, RUN/STAGE/PORT, or the beginning of its content hash
+    #[arg(value_name = "TABLE")]
+    table: String,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let node = lineage(&store, &hash(&store, &arguments.table)?)?;
+    if arguments.json {
+        return emit_json(&serde_json::to_value(&node).map_err(|error| Error::Bug(error.to_string()))?);
+    }
+    let mut text = String::new();
+    lines(&node, "", 0, &mut text);
+    emit(&text)
+}
+
+fn hash(store: &Store, table: &str) -> Result<String> {
+    if Path::new(table).is_file() {
+        let found = table_hash(Path::new(table))?;
+        return found.ok_or_else(|| Error::spec(table, "carries no content hash: calib did not write it"));
+    }
+    let parts: Vec<&str> = table.split('/').collect();
+    let [run, stage, port] = parts[..] else { return Ok(table.into()) };
+    let manifest = Manifest::of(store, &store.find_run(run)?)?;
+    let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| output.port == port));
+    match output {
+        Some(output) => Ok(output.table.table_hash.to_string()),
+        None => Err(Error::spec(
+            table,
+            format!("run {} has no such table; calib show {run}/{stage} lists a stage's", manifest.run_id),
+        )),
+    }
+}
+
+fn lines(node: &Node, port: &str, depth: usize, text: &mut String) {
+    let indent = "  ".repeat(depth);
+    let port = if port.is_empty() { String::new() } else { format!("{port} <- ") };
+    let hash: String = node.table_hash.as_str().chars().take(12).collect();
+    let Some(made) = &node.made else {
+        text.push_str(&format!("{indent}{port}{hash}: the store has no record of who made it\n"));
+        return;
+    };
+    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {} rows", made.stage, made.port, made.rows));
+    if made.told_before {
+        text.push_str("  (as above)\n");
+        return;
+    }
+    text.push_str(&format!("  by {} {} in run {}, {:.16}\n", made.uses, made.implementation, made.run, made.when));
+    for (name, hash) in &made.files {
+        text.push_str(&format!("{indent}  file {name}  {hash:.12}\n"));
+    }
+    for (port, node) in &made.reads {
+        lines(node, port, depth + 1, text);
+    }
+}

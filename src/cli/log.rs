@@ -1,0 +1,88 @@
+//! `calib log`: the runs of a store, the last first.
+
+use super::surroundings::default_store;
+use super::{emit, emit_json};
+use crate::error::Result;
+use crate::pipeline::{Manifest, RunStatus, StageStatus};
+use crate::store::Store;
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// List the runs, the last first: when, which pipeline, what became of it.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib log
+  calib log --pipeline sr210d --limit 5
+
+Other verbs take a run as its id, the beginning or end of one, a tag, HEAD for the last, HEAD~2 for two before it.")]
+pub(super) struct LogArguments {
+    /// Runs of this pipeline only
+    #[arg(long, value_name = "NAME")]
+    pipeline: Option<String>,
+    /// Runs to show; 0 shows all
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    limit: usize,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &LogArguments) -> Result<()> {
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let tags = store.tags()?;
+    let (mut text, mut rows, mut shown) = (String::new(), Vec::new(), 0);
+    for run in store.runs()?.into_iter().rev() {
+        if arguments.limit > 0 && shown == arguments.limit {
+            text.push_str("older ones: --limit 0\n");
+            break;
+        }
+        let own: Vec<&str> = tags.iter().filter(|(_, tagged)| **tagged == run).map(|(tag, _)| tag.as_str()).collect();
+        match Manifest::of(&store, &run) {
+            Ok(manifest) if arguments.pipeline.as_ref().is_some_and(|name| name != &manifest.pipeline.name) => continue,
+            Ok(manifest) => {
+                text.push_str(&line(&manifest, &own));
+                rows.push(json!({
+                    "run": run, "started": manifest.started, "pipeline": manifest.pipeline.name, "status": manifest.status,
+                    "wall_seconds": manifest.wall_seconds, "executed": count(&manifest, StageStatus::Executed),
+                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "error": manifest.error,
+                }));
+            }
+            Err(error) => {
+                text.push_str(&format!("{run}  {error}\n"));
+                rows.push(json!({ "run": run, "status": "unreadable", "error": error.to_string(), "tags": own }));
+            }
+        }
+        shown += 1;
+    }
+    if arguments.json {
+        return emit_json(&rows.into());
+    }
+    emit(if shown == 0 { "no runs\n" } else { &text })
+}
+
+fn line(manifest: &Manifest, tags: &[&str]) -> String {
+    let status = status(manifest);
+    let (executed, cached) = (count(manifest, StageStatus::Executed), count(manifest, StageStatus::Cached));
+    let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
+    let tags = if tags.is_empty() { String::new() } else { format!("  [{}]", tags.join(", ")) };
+    format!(
+        "{}  {:.16}  {}  {status}, {executed} run, {cached} cached{seconds}{tags}\n",
+        manifest.run_id, manifest.started, manifest.pipeline.name
+    )
+}
+
+pub(super) fn status(manifest: &Manifest) -> &'static str {
+    match manifest.status {
+        RunStatus::Running => "running or killed",
+        RunStatus::Done => "done",
+        RunStatus::Failed => "failed",
+    }
+}
+
+fn count(manifest: &Manifest, status: StageStatus) -> usize {
+    manifest.stages.iter().filter(|stage| stage.status == status).count()
+}

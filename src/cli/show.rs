@@ -1,0 +1,134 @@
+//! `calib show`: one run, or one stage of it, in full.
+
+use super::surroundings::default_store;
+use super::{emit, emit_json, log};
+use crate::error::{Error, Result};
+use crate::pipeline::{Manifest, StageReport};
+use crate::store::Store;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Show a run: its pipeline, what was overridden, who ran it where, and every stage; or one stage with its inputs and tables.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib show HEAD
+  calib show HEAD~1/geometry
+  calib show released --json > manifest.json
+  calib show released --yaml > as_it_was_run.yaml")]
+pub(super) struct ShowArguments {
+    /// A run, as `calib log` names it, or RUN/STAGE
+    #[arg(value_name = "RUN[/STAGE]", default_value = "HEAD")]
+    run: String,
+    /// Prints the run's YAML as it was read, comments included
+    #[arg(long, conflicts_with = "json")]
+    yaml: bool,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints the manifest as it is
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
+    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let (run, stage) = match arguments.run.split_once('/') {
+        Some((run, stage)) => (run, Some(stage)),
+        None => (arguments.run.as_str(), None),
+    };
+    let run = store.find_run(run)?;
+    let manifest = Manifest::of(&store, &run)?;
+    let Some(id) = stage else {
+        return match (arguments.yaml, arguments.json) {
+            (true, _) => emit(&manifest.pipeline.text),
+            (_, true) => emit_json(&store.manifest(&run)?),
+            _ => emit(&whole(&manifest)),
+        };
+    };
+    let Some(stage) = manifest.stage(id) else {
+        let ids: Vec<&str> = manifest.stages.iter().map(|stage| stage.id.as_str()).collect();
+        return Err(Error::spec(format!("stage {id}"), format!("run {run} has no such stage; its stages: {}", ids.join(", "))));
+    };
+    if arguments.json {
+        return emit_json(&serde_json::to_value(stage).map_err(|error| Error::Bug(error.to_string()))?);
+    }
+    emit(&one(stage))
+}
+
+fn whole(manifest: &Manifest) -> String {
+    let mut text = format!("run {}, {}\n", manifest.run_id, log::status(manifest));
+    text.push_str(&manifest.error.as_ref().map_or_else(String::new, |error| format!("error: {error}\n")));
+    let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
+    text.push_str(&format!("started {}{seconds}\n", manifest.started));
+    text.push_str(&format!("pipeline {}, {}, seed {}\n", manifest.pipeline.name, manifest.pipeline.file, manifest.seed));
+    for set in &manifest.overrides {
+        text.push_str(&format!("set on the command line: {} = {}\n", set.target, set.value));
+    }
+    let (tool, host) = (&manifest.tool, &manifest.host);
+    let user = manifest.user.as_ref().map_or_else(String::new, |user| format!("{user} on "));
+    text.push_str(&format!(
+        "{} {} on {user}{}, {} {}, {} jobs\n",
+        tool.name, tool.version, host.name, host.os, host.architecture, manifest.jobs
+    ));
+    if let Some(previous) = &manifest.previous {
+        text.push_str(&format!("after run {}\n", previous.run));
+    }
+    let width = manifest.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0);
+    text.push('\n');
+    for stage in &manifest.stages {
+        let rows: Vec<String> = stage.outputs.iter().map(|output| format!("{} {}", output.port, output.table.rows)).collect();
+        let seconds = stage.wall_seconds.map_or_else(String::new, |seconds| format!("{seconds:.2} s"));
+        text.push_str(&format!("{:width$}  {:8}  {seconds:>9}  {}\n", stage.id, word(stage), rows.join(", ")));
+        text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| format!("{:width$}  because: {reason}\n", "")));
+        text.extend(stage.warnings.iter().map(|warning| format!("{:width$}  warning: {warning}\n", "")));
+    }
+    text
+}
+
+pub(super) fn word(stage: &StageReport) -> String {
+    serde_json::to_value(stage.status)
+        .ok()
+        .and_then(|value| value.as_str().map(|word| word.replace('_', " ")))
+        .unwrap_or_default()
+}
+
+fn one(stage: &StageReport) -> String {
+    let mut text =
+        format!("stage {} (uses {}, implementation {}): {}\n", stage.id, stage.uses, stage.implementation, word(stage));
+    text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| format!("because: {reason}\n")));
+    text.push_str(&stage.action.as_ref().map_or_else(String::new, |action| format!("action {action}\n")));
+    for file in &stage.files {
+        text.push_str(&format!(
+            "file    {} = {}, {} bytes, {:.12}\n",
+            file.place,
+            file.path.display(),
+            file.bytes,
+            file.blake3.as_str()
+        ));
+    }
+    for input in &stage.inputs {
+        text.push_str(&format!(
+            "reads   {} <- {}, {} rows, {:.12}\n",
+            input.port,
+            input.from,
+            input.table.rows,
+            input.table.table_hash.as_str()
+        ));
+    }
+    for output in &stage.outputs {
+        text.push_str(&format!(
+            "writes  {} ({}), {} rows, {:.12}\n",
+            output.port,
+            output.table.schema,
+            output.table.rows,
+            output.table.table_hash.as_str()
+        ));
+    }
+    if let Some(key) = &stage.key {
+        let settings = serde_json::to_string_pretty(&key.settings).unwrap_or_default();
+        text.push_str(&format!("seed    {}\nsettings {settings}\n", key.seed));
+    }
+    text.extend(stage.notes.iter().map(|note| format!("note    {note}\n")));
+    text.extend(stage.warnings.iter().map(|warning| format!("warning {warning}\n")));
+    text
+}

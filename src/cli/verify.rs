@@ -1,0 +1,65 @@
+//! `calib verify`: everything in a store rehashed; exit code 1 where something is not what was written.
+
+use super::surroundings::default_store;
+use super::{complain, emit, emit_json};
+use crate::error::{Error, Result};
+use crate::store::{Store, Verification};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Verify a store: read and rehash every table, record, manifest, event and tag; find what was damaged or edited.
+#[derive(Args)]
+#[command(after_help = "Exit codes: 0 all is as it was written; 1 something is not; 2 wrong usage; 75 the disk refuses.")]
+pub(super) struct VerifyArguments {
+    /// The store [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &VerifyArguments) -> u8 {
+    execute(arguments).unwrap_or_else(|error| complain(&error))
+}
+
+fn execute(arguments: &VerifyArguments) -> Result<u8> {
+    let root = arguments.store.clone().unwrap_or_else(default_store);
+    if !root.is_dir() {
+        return Err(Error::spec(root.display().to_string(), "no store here; name one with --store DIR"));
+    }
+    let found = match Store::open(&root) {
+        Ok(store) => store.verify()?,
+        // The format file itself may be what was damaged.
+        Err(Error::Store(fault)) => Verification { faults: vec![fault], ..Verification::default() },
+        Err(other) => return Err(other),
+    };
+    if arguments.json {
+        emit_json(&serde_json::to_value(&found).map_err(|error| Error::Bug(error.to_string()))?)?;
+    } else {
+        emit(&text(&found))?;
+    }
+    Ok(u8::from(!found.faults.is_empty()))
+}
+
+fn text(found: &Verification) -> String {
+    const SHOWN: usize = 50; // a store that is damaged all over need not be listed
+    let mut text: String = found.faults.iter().take(SHOWN).map(|fault| format!("{fault}\n")).collect();
+    if found.faults.len() > SHOWN {
+        text.push_str(&format!("and {} more\n", found.faults.len() - SHOWN));
+    }
+    text.push_str(&format!(
+        "{} tables ({:.1} MB), {} action records, {} runs, {} tags, {} copies for people: ",
+        found.objects,
+        found.bytes as f64 / 1e6,
+        found.actions,
+        found.runs,
+        found.tags,
+        found.copies
+    ));
+    text.push_str(&match found.faults.len() {
+        0 => "all as they were written\n".to_string(),
+        faults => format!("{faults} faults\n"),
+    });
+    text
+}

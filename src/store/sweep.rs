@@ -1,0 +1,81 @@
+//! Taking away what nothing keeps: action records first, then objects that no record names. Never by itself, never anything young.
+
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use super::Store;
+use super::disk::refused;
+use super::verify::files;
+use super::workspace;
+use crate::error::{Error, Result};
+
+/// What was swept, or would be.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Sweep {
+    pub actions: u64,
+    pub objects: u64,
+    pub bytes: u64,
+    pub kept_actions: u64,
+    pub kept_objects: u64,
+    /// Kept only because they are younger than the grace period.
+    pub young: u64,
+}
+
+impl Store {
+    /// Takes away the records of actions that are not in `keep`, the objects that no record names then, and what was set aside as
+    /// damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
+    pub fn sweep(&self, keep: &BTreeSet<String>, before: SystemTime, dry_run: bool) -> Result<Sweep> {
+        if !dry_run && workspace::in_use(&self.root().join("tmp")) {
+            let message = "a run is in flight in this store: sweep when it has ended";
+            return Err(Error::store(self.root().display().to_string(), message));
+        }
+        let mut sweep = Sweep::default();
+        let mut gone: BTreeSet<PathBuf> = BTreeSet::new();
+        for path in files(&self.root().join("actions"))? {
+            let named = path.file_stem().is_some_and(|stem| keep.contains(&*stem.to_string_lossy()));
+            if named || !old(&path, before, &mut sweep) {
+                sweep.kept_actions += 1;
+                continue;
+            }
+            sweep.actions += 1;
+            sweep.bytes += remove(&path, dry_run)?;
+            gone.insert(path);
+        }
+        let mut named: BTreeSet<String> = BTreeSet::new();
+        for path in files(&self.root().join("actions"))?.iter().filter(|path| !gone.contains(*path)) {
+            // A record that cannot be read as one may still name tables: what looks like a hash in it is kept.
+            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
+            let words = text.split(|byte| !byte.is_ascii_hexdigit()).filter(|word| word.len() == 64);
+            named.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
+        }
+        for path in files(&self.root().join("objects"))? {
+            let damaged = path.extension().is_some_and(|extension| extension == "damaged");
+            let needed = !damaged && path.file_stem().is_some_and(|stem| named.contains(&*stem.to_string_lossy()));
+            if needed || !old(&path, before, &mut sweep) {
+                sweep.kept_objects += 1;
+                continue;
+            }
+            sweep.objects += 1;
+            sweep.bytes += remove(&path, dry_run)?;
+        }
+        Ok(sweep)
+    }
+}
+
+/// True where a file was last changed before `before`; a time that lies in the future counts as young.
+fn old(path: &Path, before: SystemTime, sweep: &mut Sweep) -> bool {
+    let old = fs::metadata(path).and_then(|metadata| metadata.modified()).is_ok_and(|time| time < before);
+    sweep.young += u64::from(!old);
+    old
+}
+
+fn remove(path: &Path, dry_run: bool) -> Result<u64> {
+    let bytes = fs::metadata(path).map(|metadata| metadata.len()).unwrap_or(0);
+    if !dry_run {
+        fs::remove_file(path).map_err(|e| refused(path, "remove", &e))?;
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,232 @@
+//! Everything in a store read and rehashed: objects by their names, records and manifests by their seals, the copies for people.
+
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+
+use super::Store;
+use super::actions::ActionRecord;
+use super::disk::refused;
+use super::key::FileHash;
+use super::runs::{Sealed, events_fault};
+use super::seal::unseal;
+use crate::error::{Error, Fault, Result};
+
+/// What a verification read, and everything that it found wrong.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Verification {
+    pub objects: u64,
+    pub bytes: u64,
+    pub actions: u64,
+    pub runs: u64,
+    pub tags: u64,
+    /// Files below `tables/` and `documents/`.
+    pub copies: u64,
+    #[serde(serialize_with = "texts")]
+    pub faults: Vec<Fault>,
+}
+
+fn texts<S: serde::Serializer>(faults: &[Fault], serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_seq(faults.iter().map(Fault::to_string))
+}
+
+impl Store {
+    /// Reads and rehashes every file.
+    pub fn verify(&self) -> Result<Verification> {
+        let mut found = Verification::default();
+        let format = self.root().join("format.json");
+        if fs::read(&format).map_err(|e| refused(&format, "read", &e))? != super::format_text()? {
+            found.faults.push(fault(&format, "is not what was written; restore it: {\"calib_store\":1}"));
+        }
+        let objects = self.check_objects(&mut found)?;
+        let mut known: BTreeSet<String> = objects.keys().cloned().collect();
+        let contents = self.check_actions(&objects, &mut found)?;
+        self.check_runs(&mut known, &mut found)?;
+        match self.tags() {
+            Ok(tags) => {
+                found.tags = tags.len() as u64;
+                let runs = self.runs()?;
+                for (tag, run) in tags.into_iter().filter(|(_, run)| !runs.contains(run)) {
+                    found.faults.push(Fault::new(format!("tag {tag}"), format!("names the run {run}, which is not there")));
+                }
+            }
+            Err(Error::Store(tag)) => found.faults.push(tag),
+            Err(other) => return Err(other),
+        }
+        let advice = "is no table that a run wrote: it was edited or is damaged; calib run writes it anew";
+        self.check_copies("tables", &known, advice, &mut found)?;
+        let advice = "is no document that a run wrote: it was edited or is damaged; calib run writes it anew";
+        self.check_copies("documents", &contents, advice, &mut found)?;
+        Ok(found)
+    }
+
+    /// Objects by name, with whether they are whole.
+    fn check_objects(&self, found: &mut Verification) -> Result<BTreeMap<String, bool>> {
+        let paths = files(&self.root().join("objects"))?;
+        let hashes: Vec<(PathBuf, Result<(FileHash, u64)>)> = paths.par_iter().map(|path| (path.clone(), hash(path))).collect();
+        let mut objects = BTreeMap::new();
+        for (path, hashed) in hashes {
+            let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let (hash, bytes) = hashed?;
+            found.objects += 1;
+            found.bytes += bytes;
+            let whole = hash.as_str() == name && path.extension().is_some_and(|extension| extension == "parquet");
+            if path.extension().is_some_and(|extension| extension == "damaged") {
+                found.faults.push(fault(&path, "was set aside as damaged; calib gc takes it away"));
+            } else if !whole {
+                found.faults.push(fault(
+                    &path,
+                    "its bytes are not those that were published; calib run makes it anew where it is needed",
+                ));
+            }
+            objects.insert(name, whole);
+        }
+        Ok(objects)
+    }
+
+    /// Hashes of the documents that the records know.
+    fn check_actions(&self, objects: &BTreeMap<String, bool>, found: &mut Verification) -> Result<BTreeSet<String>> {
+        let mut contents = BTreeSet::new();
+        for path in files(&self.root().join("actions"))? {
+            found.actions += 1;
+            let record = match read_record(&path)? {
+                Ok(record) => record,
+                Err(why) => {
+                    found.faults.push(fault(&path, &format!("{why}; calib run makes it anew where it is needed")));
+                    continue;
+                }
+            };
+            for (port, table) in &record.tables {
+                if !objects.contains_key(table.file_hash.as_str()) {
+                    found
+                        .faults
+                        .push(fault(&path, &format!("its table {port} is missing from the objects; calib run makes it anew")));
+                } else if table.schema.starts_with("document/") && objects.get(table.file_hash.as_str()) == Some(&true) {
+                    let texts = self.load(table)?.read::<String>("content")?;
+                    contents.extend(texts.iter().map(|text| blake3::hash(text.as_bytes()).to_hex().to_string()));
+                }
+            }
+        }
+        Ok(contents)
+    }
+
+    fn check_runs(&self, known: &mut BTreeSet<String>, found: &mut Verification) -> Result<()> {
+        let mut seals: BTreeMap<String, Option<String>> = BTreeMap::new();
+        let mut links: Vec<(String, serde_json::Value)> = Vec::new();
+        for run in self.runs()? {
+            found.runs += 1;
+            let path = self.root().join("runs").join(&run);
+            let (manifest, sealed) = match self.sealed_manifest(&run) {
+                Ok(Sealed { manifest, sealed }) => (manifest, sealed),
+                Err(Error::Store(why)) => {
+                    seals.insert(run, None);
+                    found.faults.push(why);
+                    continue;
+                }
+                Err(other) => return Err(other),
+            };
+            if manifest["run_id"] != run.as_str() {
+                found.faults.push(fault(&path.join("manifest.json"), "is the manifest of another run"));
+            }
+            let events = path.join("events.jsonl");
+            match fs::read(&events) {
+                Ok(text) => {
+                    let ended = manifest["status"] != "running";
+                    found.faults.extend(events_fault(&text, ended).map(|why| fault(&events, &why)));
+                }
+                Err(e) => found.faults.push(fault(&events, &format!("cannot be read: {e}"))),
+            }
+            for output in manifest["stages"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .flat_map(|stage| stage["outputs"].as_array().into_iter().flatten())
+            {
+                known.extend(output["file_hash"].as_str().map(String::from));
+            }
+            links.push((run.clone(), manifest["previous"].clone()));
+            seals.insert(run, Some(sealed));
+        }
+        for (run, previous) in links.iter().filter(|(_, previous)| !previous.is_null()) {
+            let (before, sealed) = (previous["run"].as_str().unwrap_or_default(), previous["sealed"].as_str());
+            let why = match seals.get(before) {
+                None => format!("the run {before} before it is gone"),
+                // A broken seal is a fault of its own already.
+                Some(None) => continue,
+                Some(Some(found)) if Some(found.as_str()) == sealed => continue,
+                Some(Some(_)) => format!("the manifest of the run {before} before it is another one than when this run began"),
+            };
+            found.faults.push(Fault::new(format!("run {run}"), why));
+        }
+        Ok(())
+    }
+
+    fn check_copies(&self, folder: &str, known: &BTreeSet<String>, advice: &str, found: &mut Verification) -> Result<()> {
+        for path in files(&self.root().join(folder))? {
+            found.copies += 1;
+            if !known.contains(hash(&path)?.0.as_str()) {
+                found.faults.push(fault(&path, advice));
+            }
+        }
+        Ok(())
+    }
+
+    /// Every action record that can be read.
+    pub fn records(&self) -> Result<Vec<ActionRecord>> {
+        let mut records = Vec::new();
+        for path in files(&self.root().join("actions"))? {
+            records.extend(read_record(&path)?.ok());
+        }
+        Ok(records)
+    }
+}
+
+fn read_record(path: &Path) -> Result<std::result::Result<ActionRecord, String>> {
+    let bytes = fs::read(path).map_err(|e| refused(path, "read", &e))?;
+    if let Err(why) = unseal(&bytes) {
+        return Ok(Err(why.into()));
+    }
+    let record: ActionRecord = match serde_json::from_slice(&bytes) {
+        Ok(record) => record,
+        Err(e) => return Ok(Err(format!("not an action record ({e})"))),
+    };
+    let named = path.file_stem().is_some_and(|stem| stem == record.id.as_str());
+    if !named || record.key.id() != record.id {
+        return Ok(Err("the record is not of the key that its name says".into()));
+    }
+    Ok(Ok(record))
+}
+
+fn fault(path: &Path, why: &str) -> Fault {
+    Fault::new(path.display().to_string(), why)
+}
+
+fn hash(path: &Path) -> Result<(FileHash, u64)> {
+    let read = || {
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        Ok((FileHash::of_reader(file)?, bytes))
+    };
+    read().map_err(|e: std::io::Error| refused(path, "read", &e))
+}
+
+/// All files below a folder, in order of their paths; none where it is not there.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(refused(folder, "read", &e)),
+    };
+    let mut found = Vec::new();
+    for path in entries.flatten().map(|entry| entry.path()) {
+        if path.is_dir() {
+            found.extend(files(&path)?);
+        } else {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
