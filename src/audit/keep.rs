@@ -1,4 +1,4 @@
-//! What a sweep must leave: the actions of tagged runs, of the last runs of every pipeline, and of runs that did not end.
+//! What a sweep must leave: the actions of tagged runs and of fleets', of the last runs of every pipeline, and of runs that did not end.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,8 @@ use crate::store::Store;
 /// Ids of all actions that tagged runs and the `last` runs of every pipeline used. A manifest that cannot be read stops a sweep:
 /// nobody knows what it keeps.
 pub fn kept_actions(store: &Store, last: usize) -> Result<BTreeSet<String>> {
-    let tagged: BTreeSet<String> = store.tags()?.into_values().collect();
+    let mut tagged: BTreeSet<String> = store.tags()?.into_values().collect();
+    tagged.extend(store.runs_of_fleets()?);
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let mut keep = BTreeSet::new();
     for run in store.runs()?.into_iter().rev() {

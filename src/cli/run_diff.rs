@@ -90,7 +90,14 @@ fn measure(diff: &TableDiff) -> String {
         // Where every row is a quantity of its own, the worst row says more than a mean over rows.
         (Some((column, found)), _) if diff.rows.changed > 20 => {
             let sigmas = column.max_sigmas.map_or_else(String::new, |sigmas| format!(" ({} sigma)", short(sigmas)));
-            format!("; {} by {} {} rms, at most {}{sigmas}", column.name, short(found.rms), column.unit, short(found.max))
+            format!(
+                "; {} by {} {} rms, at most {} {}{sigmas}",
+                column.name,
+                short(found.rms),
+                column.unit,
+                short(found.max),
+                column.unit
+            )
         }
         (_, Some((key, cell))) => format!("; {key}: {cell}"),
         _ => String::new(),

@@ -4,14 +4,17 @@ use super::emit;
 use crate::error::{Error, Result, nearest};
 use crate::pipeline;
 use crate::stage::STAGES;
+use crate::store::read_table;
 use crate::store::schema::{self, TableSchema};
 use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
 
 /// Show what tables hold, and the schema of the pipeline's YAML.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib schema list
   calib schema show prediction
+  calib schema check .calib/tables/sr210d/joint.prediction.parquet
   calib schema pipeline > schemas/pipeline.v1.schema.json
   calib schema fleet > schemas/fleet.v1.schema.json")]
 pub(super) struct SchemaArguments {
@@ -28,6 +31,14 @@ enum SchemaVerb {
         /// The table's kind, e.g. `recording`
         kind: String,
     },
+    /// Checks a table's file: columns, types, units' columns, ranges, key, no NaN
+    Check {
+        /// A Parquet file
+        file: PathBuf,
+        /// The table that it is, where it does not say so itself
+        #[arg(long = "as", value_name = "KIND")]
+        kind: Option<String>,
+    },
     /// The JSON Schema of the pipeline's YAML, for editors
     Pipeline,
     /// The JSON Schema of FLEET.yaml, for editors
@@ -39,8 +50,15 @@ pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
         SchemaVerb::List => emit(&list()),
         SchemaVerb::Show { kind } => emit(&show(find(kind)?)),
         SchemaVerb::Fleet => emit(&crate::fleet::file::json_schema()),
+        SchemaVerb::Check { file, kind } => check(file, kind.as_deref()),
         SchemaVerb::Pipeline => emit(&pipeline::json_schema(STAGES)),
     }
+}
+
+fn check(file: &Path, kind: Option<&str>) -> Result<()> {
+    let kind = kind.map(find).transpose()?.map(|schema| schema.name.as_str());
+    let frame = read_table(file, kind)?;
+    emit(&format!("{}: sound, {} rows, {}\n", frame.schema().id(), frame.rows(), frame.table_hash()))
 }
 
 fn list() -> String {

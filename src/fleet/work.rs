@@ -106,13 +106,14 @@ impl Workshop<'_> {
     }
 
     fn compute(&self, robot: &Robot, plan: Result<Plan>, key: String, worker: usize, watcher: &dyn Watcher) -> Record {
-        let surroundings = (self.surroundings)();
+        let mut surroundings = (self.surroundings)();
         let begun = (surroundings.now)();
         let mut record = Record::blank(robot, key, &format!("{}/{worker}", self.name));
         record.log.clone_from(&self.log);
         let observer = Relay { worker, watcher };
         let options = RunOptions { selection: Selection::default(), jobs: self.threads };
         let result = plan.and_then(|plan| {
+            surroundings.run_id = self.ledger.store.reserve_run(&surroundings.run_id)?;
             record.run = Some(surroundings.run_id.clone());
             let body = || run(&plan, self.ledger.store, &options, &surroundings, &observer);
             catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|_| Err(Error::Bug("the run panicked".into())))

@@ -52,7 +52,8 @@ pub fn run(
     let begun = (surroundings.now)();
     let mut manifest = Manifest::new(plan, surroundings, options.jobs, rfc3339(begun));
     manifest.previous = store.last_ended()?;
-    let record = begin(store, &mut manifest)?;
+    manifest.run_id = store.reserve_run(&manifest.run_id)?;
+    let record = store.begin_run(&manifest.run_id, &manifest)?;
     let mut running = Running {
         desk: Desk::new(plan),
         store,
@@ -75,19 +76,6 @@ pub fn run(
     // The first error is the one that explains the others.
     result.and(finished)?;
     Ok(Outcome { manifest, documents })
-}
-
-/// Opens the record of a run under an id that comes after all others; another run may take it first.
-fn begin(store: &Store, manifest: &mut Manifest) -> Result<Run> {
-    const TRIES: usize = 20; // as many runs may begin in the same moment
-    for _ in 1..TRIES {
-        manifest.run_id = store.later_run_id(&manifest.run_id)?;
-        match store.begin_run(&manifest.run_id, manifest) {
-            Err(_) if store.runs()?.contains(&manifest.run_id) => {}
-            result => return result,
-        }
-    }
-    store.begin_run(&manifest.run_id, manifest)
 }
 
 struct Running<'a> {

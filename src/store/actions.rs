@@ -91,7 +91,7 @@ impl Store {
         self.root().join("objects").join(name.get(..2).unwrap_or("00")).join(format!("{name}.parquet"))
     }
 
-    /// Looks a stage up: done only if the record is whole and all its tables are there in full length.
+    /// Looks a stage up: done only if the record is whole and all its tables are there, byte for byte.
     pub fn action(&self, key: &StageKey) -> Result<Lookup> {
         let path = self.record_path(&key.id());
         let bytes = match fs::read(&path) {
@@ -113,7 +113,9 @@ impl Store {
         for (port, table) in &record.tables {
             let length = fs::metadata(self.object_path(table)).map(|metadata| metadata.len());
             match length {
-                Ok(length) if length == table.bytes => (),
+                // Read to its end: a stage that is cached must not stand on a table that rotted.
+                Ok(length) if length == table.bytes && same_bytes(&self.object_path(table), table) => (),
+                Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
                 Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
                 Err(e) => return damaged(format!("table {port}: {e}")),
             }

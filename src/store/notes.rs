@@ -1,4 +1,4 @@
-//! Notes below the store that are no tables: small JSON files and parts of inputs, put in place whole.
+//! Notes below the store that are no tables: small sealed JSON files, and parts of inputs, put in place whole.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use super::Store;
 use super::disk::{component, put_if_absent, refused, replace, write_synced};
+use super::seal::{seal, unseal};
 use crate::error::{Error, Result};
 
 impl Store {
@@ -19,11 +20,11 @@ impl Store {
         Ok(path)
     }
 
-    /// A note, where there is one. A torn one is none.
+    /// A note, where there is one. A torn or damaged one is none.
     pub fn note(&self, place: &[&str], name: &str) -> Result<Option<Value>> {
         let path = self.place_of_note(place, name)?;
         match fs::read(&path) {
-            Ok(bytes) => Ok(serde_json::from_slice(&bytes).ok()),
+            Ok(bytes) => Ok(read(&bytes)),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(refused(&path, "read", &error)),
         }
@@ -62,8 +63,21 @@ impl Store {
     }
 }
 
+/// What is no struct or map is put into one, so that it can be sealed.
+const LIST: &str = "list";
+
 fn text(note: &impl Serialize) -> Result<Vec<u8>> {
-    let mut text = serde_json::to_vec_pretty(note).map_err(|error| Error::Bug(error.to_string()))?;
-    text.push(b'\n');
-    Ok(text)
+    let value = serde_json::to_value(note).map_err(|error| Error::Bug(error.to_string()))?;
+    match value {
+        Value::Object(_) => seal(&value),
+        other => seal(&serde_json::json!({ LIST: other })),
+    }
+}
+
+fn read(bytes: &[u8]) -> Option<Value> {
+    unseal(bytes).ok()?;
+    let mut value: Value = serde_json::from_slice(bytes).ok()?;
+    let members = value.as_object_mut()?;
+    members.remove("sealed");
+    if members.len() == 1 && members.contains_key(LIST) { members.remove(LIST) } else { Some(value) }
 }

@@ -1,6 +1,5 @@
 //! Parquet files back to frames: the file's hash first, then schema and version, then the columns.
 
-use arrow::array::ArrayRef;
 use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::fs::{self, File};
@@ -10,8 +9,9 @@ use super::actions::TableRef;
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
 use super::key::FileHash;
+use super::migrate::{self, Columns, MIGRATIONS};
 use super::schema::{self, Version};
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
@@ -38,6 +38,7 @@ fn known_schema<'a>(path: &Path, id: &'a str) -> Result<(&'a str, Version)> {
     let known = schema::all().find(|schema| schema.name == kind).map(|schema| schema.version);
     match known {
         Some(known) if known.major == version.major && version.minor <= known.minor => Ok((kind, version)),
+        Some(known) if migrate::reaches(MIGRATIONS, kind, version.major, known.major) => Ok((kind, version)),
         Some(known) => Err(Error::store(
             place,
             format!("the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"),
@@ -57,29 +58,56 @@ fn read(path: &Path, kind: &str, version: Version) -> Result<Frame> {
     let reader = builder.with_batch_size(1 << 16).build().map_err(|e| unreadable(&e))?;
     let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|e| unreadable(&e))?;
     let batch = concat_batches(&arrow_schema, &batches).map_err(|e| unreadable(&e))?;
+    let names = arrow_schema.fields().iter().map(|field| field.name().clone());
+    let columns: Columns = names.zip(batch.columns().iter().cloned()).collect();
+    let known = schema::of(kind)?.version;
+    let (columns, version) = if version.major < known.major {
+        let columns = migrate::climb(MIGRATIONS, kind, version.major, known.major, columns);
+        (columns.map_err(|why| Error::store(path.display().to_string(), why))?, Version { minor: 0, patch: 0, ..known })
+    } else {
+        (columns, version)
+    };
     let mut frame = FrameBuilder::new(kind);
-    for (field, column) in arrow_schema.fields().iter().zip(batch.columns()) {
-        frame.push(field.name(), column.clone());
-    }
-    for (name, column) in added_since(kind, version, &batch)? {
+    let added = added_since(kind, version, &columns, batch.num_rows())?;
+    for (name, column) in columns.into_iter().chain(added) {
         frame.push(name, column);
     }
     frame.finish()
 }
 
+/// Reads a table that is not in a store, of the kind that it names or of the one that is given.
+pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Frame> {
+    let place = path.display().to_string();
+    let unreadable = |e: &dyn std::fmt::Display| Error::data(&place, format!("not a readable Parquet file: {e}"));
+    let file = File::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
+    let said = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+    let id = said.filter(|pair| pair.key == "calib.schema").find_map(|pair| pair.value.clone());
+    let (kind, version) = match (kind, &id) {
+        (None, Some(id)) => known_schema(path, id)?,
+        (Some(kind), _) => (kind, schema::of(kind)?.version),
+        (None, None) => return Err(Error::spec(place, "does not say which table it is; say so with --as KIND")),
+    };
+    read(path, kind, version).map_err(|error| match error {
+        Error::Bug(message) => Error::data(&place, message),
+        Error::Data(faults) => {
+            Error::Data(faults.into_iter().map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message)).collect())
+        }
+        other => other,
+    })
+}
+
 /// Nullable columns that a later minor version has, as nulls.
-fn added_since(kind: &str, version: Version, batch: &arrow::array::RecordBatch) -> Result<Vec<(String, ArrayRef)>> {
+fn added_since(kind: &str, version: Version, columns: &Columns, rows: usize) -> Result<Columns> {
     let schema = schema::of(kind)?;
     if version.minor == schema.version.minor {
-        return Ok(Vec::new());
+        return Ok(Columns::new());
     }
     let added = schema
         .fields
         .iter()
-        .filter(|field| field.nullable && !field.optional && !field.per_joint && batch.column_by_name(&field.name).is_none());
-    Ok(added
-        .map(|field| (field.name.clone(), arrow::array::new_null_array(&field.column_type.arrow(), batch.num_rows())))
-        .collect())
+        .filter(|field| field.nullable && !field.optional && !field.per_joint && !columns.contains_key(&field.name));
+    Ok(added.map(|field| (field.name.clone(), arrow::array::new_null_array(&field.column_type.arrow(), rows))).collect())
 }
 
 /// Takes a damaged object out of the way.

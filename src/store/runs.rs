@@ -81,19 +81,53 @@ impl Store {
         Ok(self.root().join("runs").join(component(id)?))
     }
 
-    /// Opens the record of a run; its manifest stands from the first moment on, so that a killed run leaves a trace.
+    /// Takes an id that comes after those of all runs, also where the clock went backwards: `fresh`, or one after the last. One
+    /// that was reserved already is given again.
+    pub fn reserve_run(&self, fresh: &str) -> Result<String> {
+        self.workspace()?;
+        make_dir(&self.root().join("runs"))?;
+        let reserved = fs::read_dir(self.run_dir(fresh)?).is_ok_and(|mut entries| entries.next().is_none());
+        if reserved {
+            return Ok(fresh.into());
+        }
+        let mut id = fresh.to_string();
+        loop {
+            if let Some(last) = self.runs()?.pop().filter(|last| *last >= id) {
+                let next = ulid::Ulid::from_string(&last).ok().and_then(|last| last.increment().ok());
+                id = next.map_or(id, |next| next.to_string());
+            }
+            let dir = self.run_dir(&id)?;
+            match fs::create_dir(&dir) {
+                Ok(()) => return Ok(id),
+                // Another run took it in this moment.
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
+                    let next = ulid::Ulid::from_string(&id).ok().and_then(|id| id.increment().ok());
+                    id = next.ok_or_else(|| refused(&dir, "make the folder", &e))?.to_string();
+                }
+                Err(e) => return Err(refused(&dir, "make the folder", &e)),
+            }
+        }
+    }
+
+    /// Opens the record of a run whose id was reserved; its manifest stands from then on, so that a killed run leaves a trace. Where
+    /// that fails nothing is left.
     pub fn begin_run(&self, id: &str, manifest: &impl Serialize) -> Result<Run> {
         let dir = self.run_dir(id)?;
-        let parent = self.root().join("runs");
         self.workspace()?;
-        make_dir(&parent)?;
-        fs::create_dir(&dir).map_err(|e| refused(&dir, "make the folder", &e))?;
-        sync_dir(&parent)?;
-        let path = dir.join("events.jsonl");
-        let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
-        let run = Run { id: id.into(), dir, events, chain: blake3::Hasher::new() };
-        self.write_manifest(&run, manifest)?;
-        Ok(run)
+        make_dir(&dir)?;
+        if dir.join("manifest.json").exists() {
+            return Err(Error::Bug(format!("run {id} was begun already")));
+        }
+        let begin = || {
+            let path = dir.join("events.jsonl");
+            let aside = self.workspace()?.fresh();
+            write_synced(&aside, &seal(manifest)?)?;
+            replace(&aside, &dir.join("manifest.json"))?;
+            let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
+            sync_dir(&self.root().join("runs"))?;
+            Ok(Run { id: id.into(), dir: dir.clone(), events, chain: blake3::Hasher::new() })
+        };
+        begin().inspect_err(|_| drop(fs::remove_dir_all(&dir)))
     }
 
     /// Replaces the manifest of a run, atomically.
@@ -117,16 +151,13 @@ impl Store {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
             Err(e) => return Err(refused(&dir, "read", &e)),
         };
-        let mut ids: Vec<String> = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
+        // A folder without anything is a run that was killed before it began.
+        let begun = entries
+            .flatten()
+            .filter(|entry| ["manifest.json", "events.jsonl"].iter().any(|name| entry.path().join(name).exists()));
+        let mut ids: Vec<String> = begun.filter_map(|entry| entry.file_name().into_string().ok()).collect();
         ids.sort();
         Ok(ids)
-    }
-
-    /// An id that comes after those of all runs, also where the clock went backwards: `fresh`, or the next after the last.
-    pub fn later_run_id(&self, fresh: &str) -> Result<String> {
-        let Some(last) = self.runs()?.pop().filter(|last| last.as_str() >= fresh) else { return Ok(fresh.into()) };
-        let next = ulid::Ulid::from_string(&last).ok().and_then(|last| last.increment().ok());
-        Ok(next.map_or_else(|| fresh.into(), |next| next.to_string()))
     }
 
     /// The last run whose manifest is whole and says that it ended.

@@ -12,6 +12,9 @@ use super::verify::files;
 use super::workspace;
 use crate::error::{Error, Result};
 
+/// Letters and digits of a run's id, a ULID.
+const RUN_ID: usize = 26;
+
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
@@ -25,7 +28,7 @@ pub struct Sweep {
 }
 
 impl Store {
-    /// Takes away the records of actions that are not in `keep`, the objects that no record names then, and what was set aside as
+    /// Takes away the records of actions that are not in `keep`, the objects that neither a record nor a fleet names then, and what was set aside as
     /// damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
     pub fn sweep(&self, keep: &BTreeSet<String>, before: SystemTime, dry_run: bool) -> Result<Sweep> {
         if !dry_run && workspace::in_use(&self.root().join("tmp")) {
@@ -33,10 +36,14 @@ impl Store {
             return Err(Error::store(self.root().display().to_string(), message));
         }
         let mut sweep = Sweep::default();
+        let mut named: BTreeSet<String> = BTreeSet::new();
+        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+            hashes_in(path, &mut named)?;
+        }
         let mut gone: BTreeSet<PathBuf> = BTreeSet::new();
         for path in files(&self.root().join("actions"))? {
-            let named = path.file_stem().is_some_and(|stem| keep.contains(&*stem.to_string_lossy()));
-            if named || !old(&path, before, &mut sweep) {
+            let kept = path.file_stem().is_some_and(|stem| keep.contains(&*stem.to_string_lossy()));
+            if kept || !old(&path, before, &mut sweep) {
                 sweep.kept_actions += 1;
                 continue;
             }
@@ -44,12 +51,8 @@ impl Store {
             sweep.bytes += remove(&path, dry_run)?;
             gone.insert(path);
         }
-        let mut named: BTreeSet<String> = BTreeSet::new();
         for path in files(&self.root().join("actions"))?.iter().filter(|path| !gone.contains(*path)) {
-            // A record that cannot be read as one may still name tables: what looks like a hash in it is kept.
-            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
-            let words = text.split(|byte| !byte.is_ascii_hexdigit()).filter(|word| word.len() == 64);
-            named.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
+            hashes_in(path, &mut named)?;
         }
         for path in files(&self.root().join("objects"))? {
             let damaged = path.extension().is_some_and(|extension| extension == "damaged");
@@ -65,6 +68,14 @@ impl Store {
     }
 }
 
+/// What looks like a hash in a record, also in one that cannot be read as one any more.
+fn hashes_in(path: &Path, hashes: &mut BTreeSet<String>) -> Result<()> {
+    let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
+    let words = text.split(|byte| !byte.is_ascii_hexdigit()).filter(|word| word.len() == 64);
+    hashes.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
+    Ok(())
+}
+
 /// True where a file was last changed before `before`; a time that lies in the future counts as young.
 fn old(path: &Path, before: SystemTime, sweep: &mut Sweep) -> bool {
     let old = fs::metadata(path).and_then(|metadata| metadata.modified()).is_ok_and(|time| time < before);
@@ -78,4 +89,17 @@ fn remove(path: &Path, dry_run: bool) -> Result<u64> {
         fs::remove_file(path).map_err(|e| refused(path, "remove", &e))?;
     }
     Ok(bytes)
+}
+
+impl Store {
+    /// Runs that the records of fleets name.
+    pub fn runs_of_fleets(&self) -> Result<BTreeSet<String>> {
+        let mut runs = BTreeSet::new();
+        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
+            let words = text.split(|byte| !byte.is_ascii_alphanumeric()).filter(|word| word.len() == RUN_ID);
+            runs.extend(words.map(|word| String::from_utf8_lossy(word).into_owned()));
+        }
+        Ok(runs)
+    }
 }

@@ -24,6 +24,8 @@ pub struct Verification {
     pub tags: u64,
     /// Files below `tables/` and `documents/`.
     pub copies: u64,
+    /// Sealed notes of documents and fleets.
+    pub notes: u64,
     #[serde(serialize_with = "texts")]
     pub faults: Vec<Fault>,
 }
@@ -42,7 +44,7 @@ impl Store {
         }
         let objects = self.check_objects(&mut found)?;
         let mut known: BTreeSet<String> = objects.keys().cloned().collect();
-        let contents = self.check_actions(&objects, &mut found)?;
+        self.check_actions(&objects, &mut found)?;
         self.check_runs(&mut known, &mut found)?;
         match self.tags() {
             Ok(tags) => {
@@ -56,9 +58,18 @@ impl Store {
             Err(other) => return Err(other),
         }
         let advice = "is no table that a run wrote: it was edited or is damaged; calib run writes it anew";
-        self.check_copies("tables", &known, advice, &mut found)?;
-        let advice = "is no document that a run wrote: it was edited or is damaged; calib run writes it anew";
-        self.check_copies("documents", &contents, advice, &mut found)?;
+        for path in files(&self.root().join("tables"))? {
+            found.copies += 1;
+            if !known.contains(hash(&path)?.0.as_str()) {
+                found.faults.push(fault(&path, advice));
+            }
+        }
+        self.check_documents(&mut found)?;
+        for path in files(&self.root().join("fleets"))?.iter().filter(|path| path.extension().is_some_and(|end| end == "json")) {
+            found.notes += 1;
+            let text = fs::read(path).map_err(|e| refused(path, "read", &e))?;
+            found.faults.extend(unseal(&text).err().map(|why| fault(path, &format!("{why}; calib fleet run writes it anew"))));
+        }
         Ok(found)
     }
 
@@ -86,9 +97,7 @@ impl Store {
         Ok(objects)
     }
 
-    /// Hashes of the documents that the records know.
-    fn check_actions(&self, objects: &BTreeMap<String, bool>, found: &mut Verification) -> Result<BTreeSet<String>> {
-        let mut contents = BTreeSet::new();
+    fn check_actions(&self, objects: &BTreeMap<String, bool>, found: &mut Verification) -> Result<()> {
         for path in files(&self.root().join("actions"))? {
             found.actions += 1;
             let record = match read_record(&path)? {
@@ -103,13 +112,10 @@ impl Store {
                     found
                         .faults
                         .push(fault(&path, &format!("its table {port} is missing from the objects; calib run makes it anew")));
-                } else if table.schema.starts_with("document/") && objects.get(table.file_hash.as_str()) == Some(&true) {
-                    let texts = self.load(table)?.read::<String>("content")?;
-                    contents.extend(texts.iter().map(|text| blake3::hash(text.as_bytes()).to_hex().to_string()));
                 }
             }
         }
-        Ok(contents)
+        Ok(())
     }
 
     fn check_runs(&self, known: &mut BTreeSet<String>, found: &mut Verification) -> Result<()> {
@@ -136,6 +142,8 @@ impl Store {
                     let ended = manifest["status"] != "running";
                     found.faults.extend(events_fault(&text, ended).map(|why| fault(&events, &why)));
                 }
+                // A run may be killed between its manifest and its first event.
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound && manifest["status"] == "running" => {}
                 Err(e) => found.faults.push(fault(&events, &format!("cannot be read: {e}"))),
             }
             for output in manifest["stages"]
@@ -163,13 +171,30 @@ impl Store {
         Ok(())
     }
 
-    fn check_copies(&self, folder: &str, known: &BTreeSet<String>, advice: &str, found: &mut Verification) -> Result<()> {
-        for path in files(&self.root().join(folder))? {
+    /// Documents against the hashes that were noted when they were written.
+    fn check_documents(&self, found: &mut Verification) -> Result<()> {
+        let (documents, seals) = (self.root().join("documents"), self.root().join("seals"));
+        let advice = "is not the document that was written; calib run writes it anew";
+        let mut sealed: BTreeSet<PathBuf> = BTreeSet::new();
+        for path in files(&seals)? {
+            found.notes += 1;
+            let text = fs::read(&path).map_err(|e| refused(&path, "read", &e))?;
+            let whole = unseal(&text).ok().and_then(|_| serde_json::from_slice::<serde_json::Value>(&text).ok());
+            let named = path.strip_prefix(&seals).ok().map(|name| documents.join(name.with_extension("")));
+            let (Some(note), Some(document)) = (whole, named) else {
+                found.faults.push(fault(&path, "is damaged; calib run writes it anew"));
+                continue;
+            };
             found.copies += 1;
-            if !known.contains(hash(&path)?.0.as_str()) {
-                found.faults.push(fault(&path, advice));
+            match hash(&document) {
+                Ok((hash, _)) if note["blake3"] == hash.as_str() => {}
+                Ok(_) => found.faults.push(fault(&document, advice)),
+                Err(_) => found.faults.push(fault(&document, "is gone; calib run writes it anew")),
             }
+            sealed.insert(document);
         }
+        let unsealed = files(&documents)?.into_iter().filter(|path| !sealed.contains(path));
+        found.faults.extend(unsealed.map(|path| fault(&path, "is no document that calib wrote")));
         Ok(())
     }
 

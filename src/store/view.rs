@@ -30,12 +30,18 @@ impl Store {
         entries.into_iter().any(|entry| entry.file_name().to_string_lossy().starts_with(&opening))
     }
 
-    /// Writes a document (a report) as `documents/<pipeline>/<name>`.
+    /// Writes a document (a report) as `documents/<pipeline>/<name>`, and its hash as `seals/<pipeline>/<name>.json`.
     pub fn expose_document(&self, pipeline: &str, name: &str, content: &[u8]) -> Result<PathBuf> {
         let path = self.root().join("documents").join(component(pipeline)?).join(component(name)?);
         let aside = self.workspace()?.fresh();
         write_synced(&aside, content)?;
         replace(&aside, &path)?;
+        // Afterwards: a crash in between is mended by the next run, which writes both again.
+        self.put_note(
+            &["seals", pipeline],
+            &format!("{name}.json"),
+            &serde_json::json!({ "blake3": blake3::hash(content).to_hex().as_str() }),
+        )?;
         Ok(path)
     }
 }

@@ -59,7 +59,10 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
     assert!(told.lines().count() < 20, "{told}");
     assert!(told.contains("settings geometry.effects: "), "{told}");
     assert!(told.contains("geometry.parameters") && told.contains("geometry.prediction"), "{told}");
-    assert!(told.contains("error_mm by ") && told.contains(" mm rms, at most ") && told.contains(" sigma)"), "{told}");
+    assert!(
+        told.contains("error_mm by ") && told.contains(" mm rms, at most ") && told.contains(" mm (") && told.contains(" sigma)"),
+        "{told}"
+    );
     assert!(!told.contains("nominal."), "what is the same is not told: {told}");
     let explained = said(store, &["explain", "geometry"]);
     assert!(explained.contains("executed, because: settings changed: geometry.effects"), "{explained}");
