@@ -38,6 +38,6 @@ mod store;
 mod suspects;
 mod swarm;
 mod tables;
-mod transfer;
 mod trail;
+mod transfer;
 mod twin;
