@@ -33,6 +33,7 @@ const fn about(
 pub const CATALOGUE: &[About] = &[
     about("base_frame", "base", "a rigid motion of the base", "any", "tool_offset, joint_offset of the first joint", "-"),
     about("tool_offset", "tool", "a displacement of the measured point", "any", "link_geometry of the last link", "-"),
+    about("anchor", "anchor", "the far end of a draw-wire or ballbar is elsewhere; it moves no point", "any", "base_frame", "distances"),
     about("joint_offset", "joint", "d = c", "0.1 to 5 mrad", "base_frame, link_geometry", "-"),
     about("link_geometry", "link", "lengths and tilts between two axes", "0.1 to 1 mm, 0.1 to 1 mrad", "joint_offset, tool_offset", "-"),
     about("reduction_ratio", "joint", "d = c q", "1e-5 to 1e-3", "joint_compliance, gear_cyclic of order 1", "a wide travel of the joint"),

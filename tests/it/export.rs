@@ -31,7 +31,7 @@ fn by_json(model: &Value, q: &[f64]) -> [f64; 3] {
 fn tables_and_urdf_are_the_arm_that_was_identified() {
     let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
     let urdf = exported("urdf");
-    let beside = "calib_robot: 1\nname: u\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
+    let beside = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
     let label = |text| Text { label: "robot.yaml", text };
     let robots = [
         read_calib(label(beside), Some(Text { label: "arm.urdf", text: &urdf })).expect("a URDF"),
