@@ -74,7 +74,7 @@ impl Stage for Report {
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;
-        let hashes = hashes(&reads)?;
+        let hashes = hashes(&reads);
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
@@ -130,16 +130,19 @@ impl Report {
 }
 
 /// The identity of what the report rests on.
-fn hashes(reads: &ReportReads) -> Result<Vec<(String, String)>> {
-    let mut out = vec![
-        ("robot".to_string(), reads.robot.to_frame()?.table_hash().to_string()),
-        ("recording".to_string(), reads.recording.to_frame()?.table_hash().to_string()),
-        ("split".to_string(), reads.split.to_frame()?.table_hash().to_string()),
-    ];
+fn hashes(reads: &ReportReads) -> Vec<(String, String)> {
+    let mut out = Vec::new();
+    let mut add = |name: String, frame: Result<crate::table::Frame>| {
+        // What no store would take has no hash.
+        out.extend(frame.ok().map(|frame| (name, frame.table_hash().to_string())));
+    };
+    add("robot".into(), reads.robot.to_frame());
+    add("recording".into(), reads.recording.to_frame());
+    add("split".into(), reads.split.to_frame());
     for model in &reads.models {
-        out.push((format!("parameters of {}", model.stage), model.table.to_frame()?.table_hash().to_string()));
+        add(format!("parameters of {}", model.stage), model.table.to_frame());
     }
-    Ok(out)
+    out
 }
 
 fn unlabelled<T>(tables: Vec<Labelled<T>>) -> Vec<T> {
