@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::disk::{make_dir, refused};
 use crate::error::Result;
 
-/// `tmp/<pid>.<n>/` with its lock `tmp/<pid>.<n>.lock`; the kernel frees the lock when the process dies.
+/// `tmp/<ulid>/` with its lock `tmp/<ulid>.lock`; the kernel frees the lock when the process dies. No name is ever used
+/// twice: a sweeper that still holds a dead folder's lock would otherwise remove the living folder of the same name.
 #[derive(Debug)]
 pub(super) struct Workspace {
     dir: PathBuf,
@@ -21,21 +22,14 @@ impl Workspace {
     pub(super) fn open(tmp: &Path) -> Result<Self> {
         make_dir(tmp)?;
         sweep(tmp);
-        let mut n = 0_u64;
         loop {
-            let name = format!("{}.{n}", std::process::id());
-            let lock_path = tmp.join(format!("{name}.lock"));
-            n += 1;
-            let lock = match File::create_new(&lock_path) {
-                Ok(lock) => lock,
-                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
-                Err(e) => return Err(refused(&lock_path, "write", &e)),
-            };
+            let dir = tmp.join(ulid::Ulid::generate().to_string());
+            let lock_path = dir.with_extension("lock");
+            let lock = File::create_new(&lock_path).map_err(|e| refused(&lock_path, "write", &e))?;
             // A sweeper may have come between creating and locking; then the name is gone or held: take another.
             if lock.try_lock().is_err() || !lock_path.exists() {
                 continue;
             }
-            let dir = tmp.join(&name);
             make_dir(&dir)?;
             return Ok(Self { dir, lock_path, _lock: lock, next: AtomicU64::new(0) });
         }
