@@ -4,7 +4,7 @@ use super::surroundings::default_store;
 use super::{emit, emit_json, log};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, StageReport};
-use crate::store::Store;
+use crate::store::{Store, TableRef};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -106,24 +106,11 @@ fn one(stage: &StageReport) -> String {
             file.blake3.as_str()
         ));
     }
-    for input in &stage.inputs {
-        text.push_str(&format!(
-            "reads   {} <- {}, {} rows, {:.12}\n",
-            input.port,
-            input.from,
-            input.table.rows,
-            input.table.table_hash.as_str()
-        ));
-    }
-    for output in &stage.outputs {
-        text.push_str(&format!(
-            "writes  {} ({}), {} rows, {:.12}\n",
-            output.port,
-            output.table.schema,
-            output.table.rows,
-            output.table.table_hash.as_str()
-        ));
-    }
+    let mut table = |verb: &str, what: String, table: &TableRef| {
+        text.push_str(&format!("{verb:7} {what}, {} rows, {:.12}\n", table.rows, table.table_hash.as_str()));
+    };
+    stage.inputs.iter().for_each(|input| table("reads", format!("{} <- {}", input.port, input.from), &input.table));
+    stage.outputs.iter().for_each(|output| table("writes", format!("{} ({})", output.port, output.table.schema), &output.table));
     if let Some(key) = &stage.key {
         let settings = serde_json::to_string_pretty(&key.settings).unwrap_or_default();
         text.push_str(&format!("seed    {}\nsettings {settings}\n", key.seed));

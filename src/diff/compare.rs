@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use super::bytes::same_bytes;
 use super::cells::CellWriter;
 use super::columns::{self, Comparison};
 use super::key::{self, Keys, Pairing};
-use super::measure::{self, CHANGED, Cell, SAME, Value, WITHIN};
+use super::measure::{self, Beside, CHANGED, Cell, SAME, Value, WITHIN};
 use super::source::Source;
-use super::{ColumnDiff, Examples, Finding, Options, Rows, Side, TableDiff, WorstCell, WorstRow};
+use super::{ColumnDiff, Equal, Examples, Finding, Options, Rows, Side, TableDiff, WorstCell, WorstRow};
 use crate::error::{Error, Result};
 
 /// Keys shown of rows without a partner.
@@ -28,7 +29,7 @@ pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
         a: side(&a),
         b: side(&b),
         key: Vec::new(),
-        equal_hashes: false,
+        equal: None,
         findings: schema_findings(&a, &b, options)?,
         rows: Rows::default(),
         columns: Vec::new(),
@@ -37,9 +38,10 @@ pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
     };
     diff.key = key_columns(&a, &b, options, &mut diff.findings)?;
     let comparisons = columns::plan(&a, &b, &diff.key, options, &mut diff.findings)?;
-    let equal = (a.table_hash.is_some() && a.table_hash == b.table_hash) || same_file(&a.path, &b.path);
-    if equal && !options.reread && diff.findings.is_empty() {
-        diff.equal_hashes = true;
+    if !options.reread && diff.findings.is_empty() {
+        diff.equal = equal(&a, &b);
+    }
+    if diff.equal.is_some() {
         diff.rows.same = a.rows as u64;
         if let Some(path) = &options.out {
             CellWriter::create(path, &a, &diff.key)?.close()?;
@@ -54,15 +56,16 @@ pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
     let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() { only_b.collect() } else { Vec::new() };
     drop(keys_b);
     let rows: Vec<AtomicU8> = (0..a.rows).map(|_| AtomicU8::new(SAME)).collect();
+    let files = Beside { a: &a, b: &b, pairing: &pairing, rows: &rows };
     let measured = match &options.out {
         None => {
-            let one = |comparison: &Comparison| judge(&a, &b, comparison, &pairing, &rows, options, None);
+            let one = |comparison: &Comparison| judge(files, comparison, options, None);
             comparisons.par_iter().map(one).collect::<Result<Vec<_>>>()?
         }
         Some(path) => {
             let mut writer = CellWriter::create(path, &a, &diff.key)?;
             writer.unpaired(&keys, &pairing, &only_b)?;
-            let one = |comparison: &Comparison| judge(&a, &b, comparison, &pairing, &rows, options, Some((&mut writer, &keys)));
+            let one = |comparison: &Comparison| judge(files, comparison, options, Some((&mut writer, &keys)));
             let measured = comparisons.iter().map(one).collect::<Result<Vec<_>>>()?;
             writer.close()?;
             measured
@@ -92,6 +95,17 @@ fn side(source: &Source) -> Side {
         table_hash: source.table_hash.clone(),
         rows: source.rows as u64,
     }
+}
+
+/// Whether the tables are the same without a look at their rows.
+fn equal(a: &Source, b: &Source) -> Option<Equal> {
+    if a.table_hash.is_some() && a.table_hash == b.table_hash {
+        return Some(Equal::Hash);
+    }
+    if same_file(&a.path, &b.path) {
+        return Some(Equal::File);
+    }
+    same_bytes(&a.path, &b.path).then_some(Equal::Bytes)
 }
 
 /// Two names of one file.
@@ -162,11 +176,8 @@ fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
 
 /// Measures a column and keeps its worst cells.
 fn judge(
-    a: &Source,
-    b: &Source,
+    files: Beside,
     comparison: &Comparison,
-    pairing: &Pairing,
-    rows: &[AtomicU8],
     options: &Options,
     mut out: Option<(&mut CellWriter, &Keys)>,
 ) -> Result<(ColumnDiff, Vec<Cell>)> {
@@ -182,7 +193,7 @@ fn judge(
         }
         Ok(())
     };
-    let column = measure::measure((a, b), comparison, pairing, rows, &mut sees)?;
+    let column = measure::measure(files, comparison, &mut sees)?;
     Ok((column, worst))
 }
 

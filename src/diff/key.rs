@@ -1,15 +1,15 @@
 //! Rows by their key: which row of B is the row of A, and which have no partner or several.
 //!
-//! Keys become 64-bit codes in key order (texts by their rank among all texts), so that a row costs 8 bytes a key column; rows that
-//! ascend already are merged as they are, others are sorted by index.
+//! Keys become 64-bit codes in key order (texts by their rank among all texts), and the codes of all key columns one where they fit;
+//! rows that ascend already are merged as they are, others are sorted first.
 
 use arrow::array::{Array, ArrayRef, AsArray};
 use arrow::datatypes::{Float64Type, Int64Type};
-use rayon::slice::ParallelSliceMut;
 use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::order::{Codes, InOrder, pack};
 use super::source::{Kind, Source};
 use crate::error::{Error, Result};
 
@@ -20,12 +20,11 @@ const SIGN: u64 = 1 << 63;
 /// The key columns of one file.
 pub(super) struct Keys {
     columns: Vec<KeyColumn>,
-    rows: usize,
+    codes: Codes,
 }
 
 struct KeyColumn {
     name: String,
-    codes: Vec<u64>,
     meaning: Meaning,
 }
 
@@ -64,6 +63,17 @@ impl Pairing {
     pub fn partner(&self, row: usize) -> u32 {
         if self.partner.is_empty() { row as u32 } else { self.partner[row] }
     }
+
+    /// What stands in B beside `count` rows of A from `start` on; nought where a row has no partner. All are fetched in one go, since
+    /// their places in memory are far apart.
+    pub fn beside<T: Copy + Default>(&self, theirs: &[T], start: usize, count: usize, out: &mut Vec<T>) {
+        out.clear();
+        let fetch = |at: usize| theirs.get(at).copied().unwrap_or_default();
+        match self.partner.get(start..start + count) {
+            Some(partners) => out.extend(partners.iter().map(|&partner| fetch(partner as usize))),
+            None => out.extend((start..start + count).map(fetch)),
+        }
+    }
 }
 
 impl Keys {
@@ -78,8 +88,8 @@ impl Keys {
     }
 
     pub fn cells(&self, row: usize) -> impl Iterator<Item = KeyCell> {
-        self.columns.iter().map(move |column| {
-            let code = column.codes[row];
+        self.columns.iter().enumerate().map(move |(at, column)| {
+            let code = self.codes.code(row, at);
             match &column.meaning {
                 Meaning::Int => KeyCell::Int((code ^ SIGN) as i64),
                 Meaning::Float => KeyCell::Float(f64::from_bits(if code & SIGN != 0 { code ^ SIGN } else { !code })),
@@ -87,26 +97,12 @@ impl Keys {
             }
         })
     }
-
-    fn compare(&self, row: usize, other: &Self, other_row: usize) -> Ordering {
-        let order = |(left, right): (&KeyColumn, &KeyColumn)| left.codes[row].cmp(&right.codes[other_row]);
-        self.columns.iter().zip(&other.columns).map(order).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
-    }
-
-    /// Rows in the order of the key, or none where they are so already.
-    fn order(&self) -> Option<Vec<u32>> {
-        if (1..self.rows).all(|row| self.compare(row - 1, self, row).is_le()) {
-            return None;
-        }
-        let mut order: Vec<u32> = (0..self.rows as u32).collect();
-        order.par_sort_unstable_by(|&l, &r| self.compare(l as usize, self, r as usize).then(l.cmp(&r)));
-        Some(order)
-    }
 }
 
 /// Reads the key columns of both files.
 pub(super) fn read(a: &Source, b: &Source, names: &[String]) -> Result<(Keys, Keys)> {
-    let mut keys = (Keys { columns: Vec::new(), rows: a.rows }, Keys { columns: Vec::new(), rows: b.rows });
+    let mut columns: (Vec<KeyColumn>, Vec<KeyColumn>) = (Vec::new(), Vec::new());
+    let mut all: (Vec<Vec<u64>>, Vec<Vec<u64>>) = (Vec::new(), Vec::new());
     for name in names {
         let (at_a, at_b) = (a.key_column(name)?, b.key_column(name)?);
         let (kind_a, kind_b) = (a.columns[at_a].kind, b.columns[at_b].kind);
@@ -123,10 +119,13 @@ pub(super) fn read(a: &Source, b: &Source, names: &[String]) -> Result<(Keys, Ke
             let meaning = if real { Meaning::Float } else { Meaning::Int };
             ((left?, meaning.clone()), (right?, meaning))
         };
-        keys.0.columns.push(KeyColumn { name: name.clone(), codes: left.0, meaning: left.1 });
-        keys.1.columns.push(KeyColumn { name: name.clone(), codes: right.0, meaning: right.1 });
+        columns.0.push(KeyColumn { name: name.clone(), meaning: left.1 });
+        columns.1.push(KeyColumn { name: name.clone(), meaning: right.1 });
+        all.0.push(left.0);
+        all.1.push(right.0);
     }
-    Ok(keys)
+    let (left, right) = pack(all.0, all.1);
+    Ok((Keys { columns: columns.0, codes: left }, Keys { columns: columns.1, codes: right }))
 }
 
 fn no_null(source: &Source, column: usize, array: &ArrayRef) -> Result<()> {
@@ -209,8 +208,7 @@ fn unite(mut a: (Vec<u64>, Vec<Box<str>>), mut b: (Vec<u64>, Vec<Box<str>>)) -> 
 
 /// Pairs rows by key. Where `occurrence` is set the first of equal keys goes with the first, the second with the second.
 pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
-    let (order_a, order_b) = rayon::join(|| a.order(), || b.order());
-    let row = |order: &Option<Vec<u32>>, at: usize| order.as_ref().map_or(at, |order| order[at] as usize);
+    let (a, b) = rayon::join(|| InOrder::of(&a.codes), || InOrder::of(&b.codes));
     let mut pairing = Pairing {
         partner: Vec::new(),
         paired: 0,
@@ -220,43 +218,39 @@ pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
         twice_b: Vec::new(),
         keys_twice: 0,
     };
-    let mut identity = a.rows == b.rows && order_a.is_none() && order_b.is_none();
+    let mut identity = a.rows() == b.rows() && a.as_stored() && b.as_stored();
     if !identity {
-        pairing.spell_out(a.rows);
+        pairing.spell_out(a.rows());
     }
     let (mut at_a, mut at_b) = (0, 0);
-    while at_a < a.rows || at_b < b.rows {
-        let order = match (at_a < a.rows, at_b < b.rows) {
+    while at_a < a.rows() || at_b < b.rows() {
+        let order = match (at_a < a.rows(), at_b < b.rows()) {
             (true, false) => Ordering::Less,
             (false, _) => Ordering::Greater,
-            (true, true) => a.compare(row(&order_a, at_a), b, row(&order_b, at_b)),
+            (true, true) => a.compare(at_a, &b, at_b),
         };
-        let run = |keys: &Keys, order: &Option<Vec<u32>>, at: usize| {
-            let first = row(order, at);
-            (at..keys.rows).take_while(|&next| next == at || keys.compare(first, keys, row(order, next)).is_eq()).count()
-        };
-        let count_a = if order.is_le() { run(a, &order_a, at_a) } else { 0 };
-        let count_b = if order.is_ge() { run(b, &order_b, at_b) } else { 0 };
+        let count_a = if order.is_le() { a.equal_from(at_a) } else { 0 };
+        let count_b = if order.is_ge() { b.equal_from(at_b) } else { 0 };
         let twice = count_a > 1 || count_b > 1;
         pairing.keys_twice += usize::from(twice);
         let paired = if twice && !occurrence { 0 } else { count_a.min(count_b) };
         for k in 0..paired {
-            let (left, right) = (row(&order_a, at_a + k), row(&order_b, at_b + k));
+            let (left, right) = (a.row(at_a + k), b.row(at_b + k));
             if identity && left != right {
                 identity = false;
             }
-            pairing.link(a.rows, left, right, identity);
+            pairing.link(a.rows(), left, right, identity);
         }
         let (rest_a, rest_b) = if twice && !occurrence {
             (&mut pairing.twice_a, &mut pairing.twice_b)
         } else {
             (&mut pairing.only_a, &mut pairing.only_b)
         };
-        rest_a.extend((paired..count_a).map(|k| row(&order_a, at_a + k) as u32));
-        rest_b.extend((paired..count_b).map(|k| row(&order_b, at_b + k) as u32));
+        rest_a.extend((paired..count_a).map(|k| a.row(at_a + k) as u32));
+        rest_b.extend((paired..count_b).map(|k| b.row(at_b + k) as u32));
         if paired < count_a || paired < count_b {
             identity = false;
-            pairing.spell_out(a.rows);
+            pairing.spell_out(a.rows());
         }
         (at_a, at_b) = (at_a + count_a, at_b + count_b);
     }

@@ -37,32 +37,30 @@ pub(super) enum Value {
     Text(String),
 }
 
+/// Two files side by side: which row goes with which, and the class of every row of A.
+#[derive(Clone, Copy)]
+pub(super) struct Beside<'d> {
+    pub a: &'d Source,
+    pub b: &'d Source,
+    pub pairing: &'d Pairing,
+    pub rows: &'d [AtomicU8],
+}
+
 /// Judges a comparison; `sees` is told of every pair of cells that are not the same, in the order of A.
-pub(super) fn measure(
-    (a, b): (&Source, &Source),
-    comparison: &Comparison,
-    pairing: &Pairing,
-    rows: &[AtomicU8],
-    sees: &mut dyn FnMut(&Cell) -> Result<()>,
-) -> Result<ColumnDiff> {
+pub(super) fn measure(files: Beside, comparison: &Comparison, sees: &mut Seer) -> Result<ColumnDiff> {
     let mut tally = Tally::new(comparison);
     if comparison.how == How::Text {
-        texts(a, b, comparison, pairing, rows, &mut tally, sees)?;
+        texts(files, comparison, &mut tally, sees)?;
     } else {
-        numbers(a, b, comparison, pairing, rows, &mut tally, sees)?;
+        numbers(files, comparison, &mut tally, sees)?;
     }
     Ok(tally.finish(comparison))
 }
 
-fn numbers(
-    a: &Source,
-    b: &Source,
-    comparison: &Comparison,
-    pairing: &Pairing,
-    rows: &[AtomicU8],
-    tally: &mut Tally,
-    sees: &mut dyn FnMut(&Cell) -> Result<()>,
-) -> Result<()> {
+type Seer<'s> = dyn FnMut(&Cell) -> Result<()> + 's;
+
+fn numbers(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut Seer) -> Result<()> {
+    let Beside { a, b, pairing, rows } = files;
     let size = comparison.a.len();
     let mut theirs = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
     let (scale, shift) = comparison.conversion;
@@ -77,16 +75,26 @@ fn numbers(
     wanted.extend(comparison.sigma.map(|(column, _)| column));
     let mut start = 0;
     let mut ours: Vec<Vec<f64>> = vec![Vec::new(); wanted.len()];
+    let mut beside: Vec<Vec<f64>> = vec![Vec::new(); size];
+    let no_null_there = theirs.iter().all(|(_, nulls)| nulls.is_empty());
     for batch in a.stream(&wanted)? {
         let batch = batch?;
         for (values, array) in ours.iter_mut().zip(&batch) {
             values.clear();
             push_numbers(array, values);
         }
+        for (values, (theirs, _)) in beside.iter_mut().zip(&theirs) {
+            pairing.beside(theirs, start, batch[0].len(), values);
+        }
+        let plain = size == 1 && !whole && no_null_there && batch[0].null_count() == 0;
         for at in 0..batch[0].len() {
             let row = start + at;
             let partner = pairing.partner(row);
             if partner == NONE {
+                continue;
+            }
+            if plain && ours[0][at] == beside[0][at] {
+                tally.pairs += 1;
                 continue;
             }
             let partner = partner as usize;
@@ -95,7 +103,7 @@ fn numbers(
             let difference = match (null_a, null_b) {
                 (true, true) => continue,
                 (false, false) if size == 1 => {
-                    let (left, right) = (ours[0][at], theirs[0].0[partner]);
+                    let (left, right) = (ours[0][at], beside[0][at]);
                     tally.pairs += 1;
                     let apart = if whole { apart(&batch[0], at, their_whole[partner]) } else { 0.0 };
                     if (left == right && apart == 0.0) || (left.is_nan() && right.is_nan()) {
@@ -106,7 +114,7 @@ fn numbers(
                 (false, false) => {
                     tally.pairs += 1;
                     let left: Vec<f64> = ours[..size].iter().map(|values| values[at]).collect();
-                    let right: Vec<f64> = theirs.iter().map(|(values, _)| values[partner]).collect();
+                    let right: Vec<f64> = beside.iter().map(|values| values[at]).collect();
                     if left == right {
                         continue;
                     }
@@ -114,7 +122,7 @@ fn numbers(
                 }
                 _ => f64::NAN,
             };
-            let (left, right) = (ours[0][at], theirs[0].0[partner]);
+            let (left, right) = (ours[0][at], beside[0][at]);
             let value = |null: bool, value: f64| if null { Value::Null } else { Value::Number(value) };
             let sigma = their_sigma.as_ref().and_then(|(values, nulls)| {
                 let (l, r) = (ours[size][at], values[partner]);
@@ -193,15 +201,8 @@ fn rotation(how: How, left: &[f64], right: &[f64]) -> f64 {
     if sine == 0.0 && dot == 0.0 { f64::NAN } else { 2.0 * sine.atan2(dot.abs()) }
 }
 
-fn texts(
-    a: &Source,
-    b: &Source,
-    comparison: &Comparison,
-    pairing: &Pairing,
-    rows: &[AtomicU8],
-    tally: &mut Tally,
-    sees: &mut dyn FnMut(&Cell) -> Result<()>,
-) -> Result<()> {
+fn texts(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut Seer) -> Result<()> {
+    let Beside { a, b, pairing, rows } = files;
     let (column_a, column_b) = (comparison.a[0], comparison.b[0]);
     let mut bytes = String::new();
     let mut ends: Vec<(usize, bool)> = Vec::with_capacity(b.rows);

@@ -1,14 +1,16 @@
 //! Two tables, or two runs, compared: which rows changed, by how much, in the column's unit and in sigmas.
 //!
 //! One column at a time over rows paired by key, so that memory is a few columns whatever the table; tolerances and semantics come
-//! from the schema. Equal content hashes answer at once.
+//! from the schema. Equal content hashes answer at once, equal bytes as fast as they can be read.
 
+mod bytes;
 mod cells;
 mod columns;
 mod compare;
 mod html;
 mod key;
 mod measure;
+mod order;
 mod source;
 mod text;
 
@@ -91,8 +93,8 @@ pub struct TableDiff {
     pub a: Side,
     pub b: Side,
     pub key: Vec<String>,
-    /// Equal by the hash of their content, without reading them.
-    pub equal_hashes: bool,
+    /// Equal without a look at any row: by the hash of their content, or byte by byte.
+    pub equal: Option<Equal>,
     /// What differs beside the values: columns, units, types, the schema's version.
     pub findings: Vec<Finding>,
     pub rows: Rows,
@@ -102,6 +104,28 @@ pub struct TableDiff {
     pub worst: Vec<WorstRow>,
     /// Keys that occur in one table only or more than once, some of them.
     pub examples: Examples,
+}
+
+/// Why two tables are the same whatever their rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Equal {
+    /// The files say that they have the same content.
+    Hash,
+    /// They are one file.
+    File,
+    /// They are the same byte by byte.
+    Bytes,
+}
+
+impl Equal {
+    pub fn says(self) -> &'static str {
+        match self {
+            Self::Hash => "equal by the hash of their content",
+            Self::File => "one and the same file",
+            Self::Bytes => "equal byte by byte",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]

@@ -13,8 +13,8 @@ pub enum Detail {
 
 pub fn text(diff: &TableDiff, detail: Detail) -> String {
     let rows = &diff.rows;
-    if diff.equal_hashes {
-        return format!("same: {} rows, equal by the hash of their content\n", rows.same);
+    if let Some(equal) = diff.equal {
+        return format!("same: {} rows, {}\n", rows.same, equal.says());
     }
     let mut text = format!("A  {}  {} rows\nB  {}  {} rows\n", diff.a.path, diff.a.rows, diff.b.path, diff.b.rows);
     for finding in &diff.findings {

@@ -81,6 +81,8 @@ pub fn work(workshop: &Workshop, robots: &[usize], options: &Options, watcher: &
         }
         Ok(())
     })?;
+    // Records can be seen at once; the last of them are durable from here on.
+    workshop.ledger.store.sync()?;
     if let Some(error) = failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(error);
     }

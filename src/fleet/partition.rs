@@ -26,6 +26,8 @@ pub(super) fn read(path: &Path, by: &str, variable: &str, fleet: &str, store: &S
             for (name, bytes) in &parts {
                 store.put_file(&place, &file_name(name, path), bytes)?;
             }
+            // The names say that all parts are there.
+            store.sync()?;
             let names: Vec<String> = parts.into_keys().collect();
             store.put_note(&place, "names.json", &names)?;
             names

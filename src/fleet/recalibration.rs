@@ -2,7 +2,7 @@
 
 use super::Fleet;
 use super::ledger::{Ledger, Member, Record, RunNote};
-use super::tables::{causes, load};
+use super::tables::load;
 use crate::error::{Error, Result};
 use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
 
@@ -93,14 +93,28 @@ impl Earlier {
         changed.sort_by_key(|row| row.rank);
         let mut flags: Vec<String> = changed.into_iter().map(|row| sentence(row, since)).collect();
         if let (Some(now), Some(before)) = (findings, load::<Findings>(ledger, record.last(Findings::KIND))?) {
-            let (now, before) = (causes(now), causes(&before));
-            if now != before {
-                let told = |causes: &str| if causes.is_empty() { "nothing".to_string() } else { causes.to_string() };
-                flags.push(format!("diagnosis was {} and is {}", told(&before), told(&now)));
-            }
+            flags.extend(diagnosed(&causes(&before), &causes(now), since));
         }
         Ok(flags)
     }
+}
+
+/// Single wrong points are the recording's, not the robot's.
+const OUTLIER: &str = "outlier";
+
+/// `backlash joint 2`, strongest first.
+fn causes(findings: &Findings) -> Vec<String> {
+    let physical = findings.0.iter().filter(|row| row.effect != OUTLIER);
+    physical.map(|row| format!("{} {}", row.effect, row.place)).collect()
+}
+
+/// `backlash joint 2 since 2026-04-01: diagnosed, it was not before`, for every cause that only one of two diagnoses names.
+fn diagnosed(before: &[String], now: &[String], since: &str) -> Vec<String> {
+    let come = now.iter().filter(|cause| !before.contains(cause));
+    let gone = before.iter().filter(|cause| !now.contains(cause));
+    let mut flags: Vec<String> = come.map(|cause| format!("{cause} since {since}: diagnosed, it was not before")).collect();
+    flags.extend(gone.map(|cause| format!("{cause} since {since}: diagnosed before, it is not now")));
+    flags
 }
 
 /// `zero_shift joint 3 since 2026-04-01: +0.021 +- 0.002 deg`.

@@ -68,7 +68,11 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Re
     for (port, made) in &published.record.tables {
         tables.push(ledger.store.expose(fleet.name(), STAGE, port, made)?);
     }
+    // By this note a sweep knows that the tables are needed.
+    let note = json!({ "action": published.record.id, "tables": published.record.tables });
+    ledger.store.put_note(&["fleets", fleet.name()], "tables.json", &note)?;
     let page = ledger.store.expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
+    ledger.store.sync()?;
     Ok(Told { fleet: table, changes, tables, page })
 }
 
@@ -146,7 +150,7 @@ impl Read {
 }
 
 /// `effect at place`, strongest first.
-pub(super) fn causes(findings: &Findings) -> String {
+fn causes(findings: &Findings) -> String {
     findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect::<Vec<_>>().join("; ")
 }
 

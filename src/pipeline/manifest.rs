@@ -1,4 +1,4 @@
-//! The audit record of one run, written when it starts, after every stage and at the end.
+//! The audit record of one run, written when it starts, between stages where a second of work went into them, and at the end.
 
 use super::overrides::Override;
 use crate::error::{Error, Result};

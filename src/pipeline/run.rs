@@ -13,6 +13,9 @@ use crate::store::{ActionRecord, Lookup, Run, StageKey, Store};
 use std::path::PathBuf;
 use std::time::SystemTime;
 
+/// Seconds of work that are made durable together: more than a group of syncs costs, less than one would mind doing again.
+const GROUP: f64 = 1.0;
+
 /// How to run a plan.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
@@ -64,6 +67,7 @@ pub fn run(
         manifest,
         record,
         documents: Vec::new(),
+        at_risk: 0.0,
     };
     let result = (0..plan.stages.len()).try_for_each(|index| running.stage(index));
     let Running { mut manifest, record, documents, .. } = running;
@@ -88,6 +92,8 @@ struct Running<'a> {
     manifest: Manifest,
     record: Run,
     documents: Vec<PathBuf>,
+    /// Seconds of work that a power cut would lose; a killed process loses none.
+    at_risk: f64,
 }
 
 impl Running<'_> {
@@ -152,7 +158,13 @@ impl Running<'_> {
             self.manifest.stages[index].warnings.push(conflict);
         }
         // The record of an equal earlier result may stand; the report is of this execution.
+        self.at_risk += account.wall_seconds;
         self.settle(index, ActionRecord { account, ..published.record })?;
+        if self.at_risk < GROUP {
+            return Ok(());
+        }
+        self.at_risk = 0.0;
+        self.store.sync()?;
         self.store.write_manifest(&self.record, &self.manifest)
     }
 

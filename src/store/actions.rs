@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::Store;
 use super::content::TableHash;
-use super::disk::{make_read_only, put_if_absent, refused, replace, write_synced};
+use super::disk::{make_read_only, place, put_if_absent, refused, write};
 use super::frame::Frame;
 use super::key::{ActionId, FileHash, StageKey};
 use super::reader;
@@ -123,7 +123,8 @@ impl Store {
         Ok(Lookup::Done(Box::new(record)))
     }
 
-    /// Commits what a stage made: objects first, then the record. If a whole record is there already, that one stands.
+    /// Commits what a stage made: objects first, then the record. If a whole record is there already, that one stands. All can be
+    /// seen at once and is durable after the next `sync`.
     pub fn publish(&self, key: &StageKey, products: Vec<(String, Product)>, account: Account) -> Result<Published> {
         let mut tables = BTreeMap::new();
         for (port, product) in products {
@@ -131,7 +132,7 @@ impl Store {
                 Product::Frame(frame) => self.write_frame(&frame)?,
                 Product::File(file) => file,
             };
-            let table = self.put_object(&file)?;
+            let table = self.put_object(file)?;
             if tables.insert(port.clone(), table).is_some() {
                 return Err(Error::Bug(format!("stage {}: port {port} twice", key.stage)));
             }
@@ -139,9 +140,10 @@ impl Store {
         let record = ActionRecord { record_format: RECORD_FORMAT, id: key.id(), key: key.clone(), tables, account };
         let path = self.record_path(&record.id);
         let aside = self.workspace()?.fresh();
-        write_synced(&aside, &seal(&record)?)?;
+        let file = write(&aside, &seal(&record)?)?;
         if put_if_absent(&aside, &path)? {
             let _ = fs::remove_file(&aside);
+            self.owe(&path, file)?;
             return Ok(Published { record, conflict: None });
         }
         match self.action(key)? {
@@ -150,7 +152,8 @@ impl Store {
                 Ok(Published { conflict: conflict(&standing, &record), record: *standing })
             }
             Lookup::Absent | Lookup::Damaged(_) => {
-                replace(&aside, &path)?;
+                place(&aside, &path)?;
+                self.owe(&path, file)?;
                 Ok(Published { record, conflict: None })
             }
         }
@@ -168,12 +171,16 @@ impl Store {
     }
 
     /// Moves a finished file to its place among the objects; an equal one that is there already stands.
-    fn put_object(&self, file: &FinishedFile) -> Result<TableRef> {
+    fn put_object(&self, mut file: FinishedFile) -> Result<TableRef> {
         let table = file.table().clone();
         let path = self.object_path(&table);
         if !same_bytes(&path, &table) {
             make_read_only(file.path())?;
-            replace(file.path(), &path)?;
+            place(file.path(), &path)?;
+            file.written().map_or(Ok(()), |written| self.owe(&path, written))?;
+        } else if let Ok(standing) = fs::File::open(&path) {
+            // Whoever put it there may not have made it durable yet.
+            self.owe(&path, standing)?;
         }
         Ok(table)
     }

@@ -1,4 +1,5 @@
-//! Files that survive a crash: write aside, fsync, rename or link, fsync the folder. And what to do when the disk refuses.
+//! Files that survive a crash: write aside, move into place, and make durable: at once here, or later with others in `durable`. And what
+//! to do when the disk refuses.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
@@ -33,42 +34,49 @@ pub(super) fn sync_dir(path: &Path) -> Result<()> {
     File::open(path).and_then(|dir| dir.sync_all()).map_err(|e| refused(path, "sync the folder", &e))
 }
 
-/// Writes a new file and makes its bytes (not yet its name) durable.
-pub(super) fn write_synced(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes a new file; the handle is for making it durable.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<File> {
     let write = || {
         let mut file = File::create(path)?;
         file.write_all(bytes)?;
-        file.sync_all()
+        Ok(file)
     };
     write().map_err(|e| refused(path, "write", &e))
 }
 
-/// Moves `from` to `to`, over what may be there, atomically and durably.
-pub(super) fn replace(from: &Path, to: &Path) -> Result<()> {
-    let parent = to.parent().unwrap_or(Path::new("."));
-    make_dir(parent)?;
+/// Writes a new file and makes its bytes (not yet its name) durable.
+pub(super) fn write_synced(path: &Path, bytes: &[u8]) -> Result<()> {
+    write(path, bytes)?.sync_all().map_err(|e| refused(path, "write", &e))
+}
+
+/// Moves `from` to `to`, over what may be there, atomically.
+pub(super) fn place(from: &Path, to: &Path) -> Result<()> {
+    make_dir(to.parent().unwrap_or(Path::new(".")))?;
     fs::rename(from, to).map_err(|e| refused(to, "put the file in place", &e))?;
     // Renaming one name of a file over another name of the same file does nothing, by POSIX.
     let _ = fs::remove_file(from);
-    sync_dir(parent)
+    Ok(())
 }
 
-/// Gives the finished file `from` the name `to` if that name is free, durably; false if it is taken.
+/// Moves `from` to `to`, over what may be there, atomically and durably.
+pub(super) fn replace(from: &Path, to: &Path) -> Result<()> {
+    place(from, to)?;
+    sync_dir(to.parent().unwrap_or(Path::new(".")))
+}
+
+/// Gives the finished file `from` the name `to` if that name is free; false if it is taken.
 pub(super) fn put_if_absent(from: &Path, to: &Path) -> Result<bool> {
-    let parent = to.parent().unwrap_or(Path::new("."));
-    make_dir(parent)?;
-    let fresh = match fs::hard_link(from, to) {
-        Ok(()) => true,
-        Err(e) if e.kind() == ErrorKind::AlreadyExists => false,
+    make_dir(to.parent().unwrap_or(Path::new(".")))?;
+    match fs::hard_link(from, to) {
+        Ok(()) => Ok(true),
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
         // File systems without hard links: a crash may leave a torn file, which readers treat as absent.
         Err(_) => match copy_new(from, to) {
-            Ok(()) => true,
-            Err(e) if e.kind() == ErrorKind::AlreadyExists => false,
-            Err(e) => return Err(refused(to, "write", &e)),
+            Ok(()) => Ok(true),
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
+            Err(e) => Err(refused(to, "write", &e)),
         },
-    };
-    sync_dir(parent)?;
-    Ok(fresh)
+    }
 }
 
 fn copy_new(from: &Path, to: &Path) -> io::Result<()> {

@@ -1,7 +1,8 @@
 //! Columns: schemas, checked frames, content-addressed objects, action records and runs. Knows no robot.
 //!
 //! `format.json` | `objects/ab/<file hash>.parquet` | `actions/cd/<key hash>.json` | `runs/<id>/` | `tables/`, `documents/` for
-//! people | `tmp/`. Objects and records are written aside, synced and moved into place; a crash leaves nothing visible by half.
+//! people | `tmp/`. Objects and records are written aside and moved into place, then made durable in groups; a crash leaves nothing
+//! visible by half, and what a power cut tears is told by its hash.
 
 pub mod actions;
 pub(crate) mod bytes;
@@ -9,6 +10,7 @@ mod cell;
 mod check;
 pub mod content;
 mod disk;
+mod durable;
 pub mod frame;
 pub mod key;
 mod migrate;
@@ -40,7 +42,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
-use disk::{make_dir, put_if_absent, refused, write_synced};
+use disk::{make_dir, put_if_absent, refused, sync_dir, write_synced};
+use durable::Durability;
 use workspace::Workspace;
 
 /// The layout described above.
@@ -57,6 +60,7 @@ pub struct Store {
     root: PathBuf,
     /// Opened with the first write, so that looking leaves no trace.
     workspace: Mutex<Option<Arc<Workspace>>>,
+    durability: Durability,
 }
 
 impl Store {
@@ -69,7 +73,7 @@ impl Store {
             Err(e) if e.kind() == ErrorKind::NotFound => check_vacant(&root)?,
             Err(e) => return Err(refused(&path, "read", &e)),
         }
-        Ok(Self { root, workspace: Mutex::new(None) })
+        Ok(Self { root, workspace: Mutex::new(None), durability: Durability::default() })
     }
 
     pub fn root(&self) -> &Path {
@@ -94,6 +98,7 @@ impl Store {
             let aside = workspace.fresh();
             write_synced(&aside, &format_text()?)?;
             put_if_absent(&aside, &path)?;
+            sync_dir(&self.root)?;
             let _ = fs::remove_file(&aside);
         }
         *slot = Some(workspace.clone());
@@ -118,7 +123,7 @@ fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
         )),
         Err(e) => Err(Error::store(
             place,
-            format!("not the format file of a calib store ({e}); expected {{\"calib_store\": {STORE_FORMAT}}}"),
+            format!("not the format file of a calib store ({e}); restore it: {{\"calib_store\": {STORE_FORMAT}}}"),
         )),
     }
 }

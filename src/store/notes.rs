@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use super::Store;
-use super::disk::{component, put_if_absent, refused, replace, write_synced};
+use super::disk::{component, place, put_if_absent, refused, replace, write, write_synced};
 use super::seal::{seal, unseal};
 use crate::error::{Error, Result};
 
@@ -30,27 +30,34 @@ impl Store {
         }
     }
 
-    /// Writes a note over what may be there.
+    /// Writes a note over what may be there, durably.
     pub fn put_note(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<()> {
-        self.put_file(place, name, &text(note)?)
-    }
-
-    /// Writes a note if there is none; false where one stands.
-    pub fn put_note_once(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<bool> {
         let path = self.place_of_note(place, name)?;
         let aside = self.workspace()?.fresh();
         write_synced(&aside, &text(note)?)?;
+        replace(&aside, &path)
+    }
+
+    /// Writes a note if there is none, durable after the next `sync`; false where one stands.
+    pub fn put_note_once(&self, place: &[&str], name: &str, note: &impl Serialize) -> Result<bool> {
+        let path = self.place_of_note(place, name)?;
+        let aside = self.workspace()?.fresh();
+        let file = write(&aside, &text(note)?)?;
         let fresh = put_if_absent(&aside, &path)?;
         let _ = fs::remove_file(&aside);
+        if fresh {
+            self.owe(&path, file)?;
+        }
         Ok(fresh)
     }
 
-    /// Writes a file over what may be there.
-    pub fn put_file(&self, place: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.place_of_note(place, name)?;
+    /// Writes a file over what may be there, durable after the next `sync`.
+    pub fn put_file(&self, folder: &[&str], name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.place_of_note(folder, name)?;
         let aside = self.workspace()?.fresh();
-        write_synced(&aside, bytes)?;
-        replace(&aside, &path)
+        let file = write(&aside, bytes)?;
+        place(&aside, &path)?;
+        self.owe(&path, file)
     }
 
     /// Takes a note away; nothing where there is none.

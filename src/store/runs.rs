@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::Store;
-use super::disk::{component, make_dir, refused, replace, sync_dir, write_synced};
+use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
 use super::seal::{seal, unseal};
 use crate::error::{Error, Result, nearest};
 
@@ -92,7 +92,7 @@ impl Store {
         }
         let mut id = fresh.to_string();
         loop {
-            if let Some(last) = self.runs()?.pop().filter(|last| *last >= id) {
+            if let Some(last) = self.run_folders()?.pop().filter(|last| *last >= id) {
                 let next = ulid::Ulid::from_string(&last).ok().and_then(|last| last.increment().ok());
                 id = next.map_or(id, |next| next.to_string());
             }
@@ -109,8 +109,8 @@ impl Store {
         }
     }
 
-    /// Opens the record of a run whose id was reserved; its manifest stands from then on, so that a killed run leaves a trace. Where
-    /// that fails nothing is left.
+    /// Opens the record of a run whose id was reserved; its manifest stands from then on (durable after the next `sync`), so that a
+    /// killed run leaves a trace. Where that fails nothing is left.
     pub fn begin_run(&self, id: &str, manifest: &impl Serialize) -> Result<Run> {
         let dir = self.run_dir(id)?;
         self.workspace()?;
@@ -121,10 +121,11 @@ impl Store {
         let begin = || {
             let path = dir.join("events.jsonl");
             let aside = self.workspace()?.fresh();
-            write_synced(&aside, &seal(manifest)?)?;
-            replace(&aside, &dir.join("manifest.json"))?;
+            let file = write(&aside, &seal(manifest)?)?;
+            place(&aside, &dir.join("manifest.json"))?;
+            self.owe(&dir.join("manifest.json"), file)?;
             let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
-            sync_dir(&self.root().join("runs"))?;
+            self.owe_folder(&self.root().join("runs"));
             Ok(Run { id: id.into(), dir: dir.clone(), events, chain: blake3::Hasher::new() })
         };
         begin().inspect_err(|_| drop(fs::remove_dir_all(&dir)))
@@ -137,33 +138,43 @@ impl Store {
         replace(&aside, &run.dir.join("manifest.json"))
     }
 
-    /// Closes the record of a run.
+    /// Closes the record of a run: everything that it made is durable before its last manifest is seen, and that then.
     pub fn finish_run(&self, run: Run, manifest: &impl Serialize) -> Result<()> {
-        run.events.sync_all().map_err(|e| refused(&run.dir.join("events.jsonl"), "write", &e))?;
-        self.write_manifest(&run, manifest)
+        let path = run.dir.join("manifest.json");
+        let aside = self.workspace()?.fresh();
+        self.owe(&aside, write(&aside, &seal(manifest)?)?)?;
+        self.owe(&run.dir.join("events.jsonl"), run.events)?;
+        self.sync_then(|| place(&aside, &path).map(|()| Some(path)))
     }
 
-    /// Ids of all runs, oldest first (ULIDs sort by time).
-    pub fn runs(&self) -> Result<Vec<String>> {
+    /// Folders of runs by name, also of those that did not begin.
+    fn run_folders(&self) -> Result<Vec<String>> {
         let dir = self.root().join("runs");
         let entries = match fs::read_dir(&dir) {
             Ok(entries) => entries,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
             Err(e) => return Err(refused(&dir, "read", &e)),
         };
-        // A folder without anything is a run that was killed before it began.
-        let begun = entries
-            .flatten()
-            .filter(|entry| ["manifest.json", "events.jsonl"].iter().any(|name| entry.path().join(name).exists()));
-        let mut ids: Vec<String> = begun.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-        ids.sort();
-        Ok(ids)
+        let mut names: Vec<String> = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
+        names.sort();
+        Ok(names)
+    }
+
+    /// Ids of all runs, oldest first (ULIDs sort by time).
+    pub fn runs(&self) -> Result<Vec<String>> {
+        // A folder without anything is a run that was killed before it began; a power cut may leave a file without anything, too.
+        let begun = |run: &String| {
+            let dir = self.root().join("runs").join(run);
+            let has = |name: &&str| fs::metadata(dir.join(name)).is_ok_and(|file| file.len() > 0);
+            ["manifest.json", "events.jsonl"].iter().any(has)
+        };
+        Ok(self.run_folders()?.into_iter().filter(begun).collect())
     }
 
     /// The last run whose manifest is whole and says that it ended.
     pub fn last_ended(&self) -> Result<Option<Link>> {
-        for run in self.runs()?.into_iter().rev() {
-            // A manifest that cannot be read is found by a verification; it must not stop a run.
+        for run in self.run_folders()?.into_iter().rev() {
+            // A manifest that is not there or cannot be read is found by a verification; it must not stop a run.
             if let Ok(Sealed { manifest, sealed }) = self.sealed_manifest(&run)
                 && manifest["status"] != "running"
             {

@@ -28,8 +28,8 @@ pub struct Sweep {
 }
 
 impl Store {
-    /// Takes away the records of actions that are not in `keep`, the objects that neither a record nor a fleet names then, and what was set aside as
-    /// damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
+    /// Takes away the records of actions that are neither in `keep` nor named by a fleet, the objects that neither a record nor a fleet names then,
+    /// and what was set aside as damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
     pub fn sweep(&self, keep: &BTreeSet<String>, before: SystemTime, dry_run: bool) -> Result<Sweep> {
         if !dry_run && workspace::in_use(&self.root().join("tmp")) {
             let message = "a run is in flight in this store: sweep when it has ended";
@@ -42,7 +42,8 @@ impl Store {
         }
         let mut gone: BTreeSet<PathBuf> = BTreeSet::new();
         for path in files(&self.root().join("actions"))? {
-            let kept = path.file_stem().is_some_and(|stem| keep.contains(&*stem.to_string_lossy()));
+            let asked = |stem: &str| keep.contains(stem) || named.contains(stem);
+            let kept = path.file_stem().is_some_and(|stem| asked(&stem.to_string_lossy()));
             if kept || !old(&path, before, &mut sweep) {
                 sweep.kept_actions += 1;
                 continue;

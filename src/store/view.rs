@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::Store;
 use super::actions::TableRef;
-use super::disk::{component, make_dir, refused, replace, write_synced};
+use super::disk::{component, make_dir, place, refused, write};
+use super::seal::seal;
 use crate::error::Result;
 
 impl Store {
@@ -34,14 +35,12 @@ impl Store {
     pub fn expose_document(&self, pipeline: &str, name: &str, content: &[u8]) -> Result<PathBuf> {
         let path = self.root().join("documents").join(component(pipeline)?).join(component(name)?);
         let aside = self.workspace()?.fresh();
-        write_synced(&aside, content)?;
-        replace(&aside, &path)?;
+        let file = write(&aside, content)?;
+        place(&aside, &path)?;
+        self.owe(&path, file)?;
         // Afterwards: a crash in between is mended by the next run, which writes both again.
-        self.put_note(
-            &["seals", pipeline],
-            &format!("{name}.json"),
-            &serde_json::json!({ "blake3": blake3::hash(content).to_hex().as_str() }),
-        )?;
+        let hash = serde_json::json!({ "blake3": blake3::hash(content).to_hex().as_str() });
+        self.put_file(&["seals", pipeline], &format!("{name}.json"), &seal(&hash)?)?;
         Ok(path)
     }
 }

@@ -40,6 +40,7 @@ pub struct TableWriter {
 pub struct FinishedFile {
     table: TableRef,
     path: PathBuf,
+    written: Option<File>,
     _workspace: Arc<Workspace>,
 }
 
@@ -73,11 +74,11 @@ impl TableWriter {
         self.open.as_ref().map_or(0, |open| open.rows)
     }
 
-    /// Closes the file and makes it durable.
+    /// Closes the file.
     pub fn finish(self) -> Result<FinishedFile> {
         let open = self.open.ok_or_else(|| Error::Bug(format!("table {}: finished without a chunk", self.schema.name)))?;
-        let table = open.finish(self.schema, &self.path)?;
-        Ok(FinishedFile { table, path: self.path, _workspace: self.workspace })
+        let (table, written) = open.finish(self.schema, &self.path)?;
+        Ok(FinishedFile { table, path: self.path, written: Some(written), _workspace: self.workspace })
     }
 }
 
@@ -87,6 +88,10 @@ impl FinishedFile {
     }
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+    /// The handle through which the file can be made durable.
+    pub(super) fn written(&mut self) -> Option<File> {
+        self.written.take()
     }
 }
 
@@ -144,7 +149,7 @@ impl Open {
         self.writer.write(batch).map_err(|e| parquet_refused(path, e))
     }
 
-    fn finish(mut self, schema: &'static TableSchema, path: &Path) -> Result<TableRef> {
+    fn finish(mut self, schema: &'static TableSchema, path: &Path) -> Result<(TableRef, File)> {
         if !self.waiting.is_empty() {
             let rest = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
             self.write(&rest, path)?;
@@ -152,8 +157,8 @@ impl Open {
         let table_hash = self.content.finish();
         self.writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
         let sink = self.writer.into_inner().map_err(|e| parquet_refused(path, e))?;
-        let (file_hash, bytes) = sink.close().map_err(|e| refused(path, "write", &e))?;
-        Ok(TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes })
+        let (file, file_hash, bytes) = sink.close().map_err(|e| refused(path, "write", &e))?;
+        Ok((TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes }, file))
     }
 }
 
@@ -218,9 +223,8 @@ impl Write for HashingFile {
 }
 
 impl HashingFile {
-    fn close(self) -> io::Result<(FileHash, u64)> {
+    fn close(self) -> io::Result<(File, FileHash, u64)> {
         let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        file.sync_all()?;
-        Ok((FileHash::of_hasher(&self.hasher), self.bytes))
+        Ok((file, FileHash::of_hasher(&self.hasher), self.bytes))
     }
 }

@@ -136,6 +136,26 @@ fn angles_wrap_and_a_rotation_has_two_quaternions() {
 }
 
 #[test]
+fn a_copy_is_the_same_byte_by_byte_and_one_flipped_bit_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let values: Vec<f64> = (0..400_000).map(|n| f64::from(n).sqrt()).collect();
+    let keys: Vec<i64> = (0..400_000).collect();
+    let a = file(folder.path(), "a.parquet", vec![whole("pose", &keys), real("x", &values, &[])]);
+    let b = folder.path().join("b.parquet");
+    std::fs::copy(&a, &b).unwrap();
+    let output = diff(&a, &b, &["--key", "pose"]);
+    assert_eq!((output.status.code(), said(&output)), (Some(0), "same: 400000 rows, equal byte by byte\n".to_string()));
+    let reread = json(&diff(&a, &b, &["--key", "pose", "--json", "--reread"]));
+    assert_eq!((&reread["equal"], &reread["rows"]["same"]), (&Value::Null, &400_000.into()));
+    let mut bytes = std::fs::read(&b).unwrap();
+    let place = bytes.windows(8).position(|window| window == values[300_000].to_le_bytes()).unwrap();
+    bytes[place] ^= 1;
+    std::fs::write(&b, bytes).unwrap();
+    let changed = json(&diff(&a, &b, &["--key", "pose", "--json"]));
+    assert_eq!((&changed["rows"]["changed"], &changed["rows"]["same"]), (&1.into(), &399_999.into()));
+}
+
+#[test]
 fn another_unit_is_one_finding_and_not_a_change_of_every_value() {
     let folder = tempfile::tempdir().unwrap();
     let values: Vec<f64> = (0..1000).map(|i| f64::from(i) * 0.7 + 0.1).collect();

@@ -115,6 +115,32 @@ fn broken_robots_are_listed_with_their_reasons_and_the_others_finish() {
 }
 
 #[test]
+fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
+    recordings(&cases, 3);
+    let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
+    run(&file, &store, 0);
+    // The same robot with other data: of two runs of its pipeline the earlier is a record's as well.
+    let tracker = |case: &str| cases.join("recordings").join(case).join("tracker.csv");
+    let before = std::fs::read_to_string(tracker("c0001")).unwrap();
+    let shorter = before.trim_end().rsplit_once('\n').unwrap().0;
+    std::fs::write(tracker("c0001"), format!("{shorter}\n")).unwrap();
+    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(1));
+    let (result, said) = output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    assert!(result.status.success(), "{said}");
+    std::fs::write(tracker("c0001"), before).unwrap();
+    assert_eq!(run(&file, &store, 0)["computed"].as_u64(), Some(0), "nothing that is recorded was taken");
+    let (result, _) = output(calib(&["verify", "--store"]).arg(&store));
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stdout));
+    // With its records a fleet gives its tables up.
+    std::fs::remove_dir_all(store.join("fleets")).unwrap();
+    let (result, _) = output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
+    let text = String::from_utf8_lossy(&result.stdout).into_owned();
+    assert!(text.starts_with("took away ") && !text.starts_with("took away 0 tables"), "{text}");
+}
+
+#[test]
 fn a_cancelled_run_stops_and_the_next_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));

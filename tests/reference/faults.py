@@ -199,7 +199,7 @@ class Campaign:
         for path in files(store, ".") + [store]:
             os.utime(path, (future, future))
         runs = list((store / "runs").iterdir())
-        runs[0].rename(store / "runs" / ("7" + self.random.choice("0123456789ABCDEFGHJKMNPQRSTVWXYZ") * 25))
+        runs[0].rename(store / "runs" / ("7" + self.random.choice("0123456789ABCDEFGHJKMNPQRSTVWXY") * 25))  # no id comes after 7ZZZ...
         shown = subprocess.run([self.calib, "gc", "--store", str(store), "--keep-runs", "1"], capture_output=True, text=True)
         before = self.committed(store)
         self.kept(store, before)

@@ -86,6 +86,27 @@ fn changed_robots_are_flagged_with_the_joint_and_the_others_are_not() {
 }
 
 #[test]
+fn a_robot_whose_diagnosis_changed_is_flagged_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    pipeline(folder);
+    let text = std::fs::read_to_string(folder.join("twins.yaml")).unwrap();
+    write(folder.join("twins.yaml"), &text.replace("  - uses: compare\n", "  - uses: diagnose\n  - uses: compare\n"));
+    for name in ["spring", "autumn"] {
+        list(folder, name, usize::from(name == "autumn"), |_, _| 0.0);
+        let rows = std::fs::read_to_string(folder.join(format!("{name}.csv"))).unwrap();
+        write(folder.join(format!("{name}.csv")), &rows.lines().take(3).fold(String::new(), |text, line| text + line + "\n"));
+    }
+    campaign(folder, "spring", "2026-04-01", "");
+    let gear = "{gear_cyclic: {joint: 3, order: 1, amplitude_arcsec: 60, phase_deg: 40}}";
+    let worn = format!("overrides:\n  - {{robots: [robot 1], set: {{simulate.effects: [{gear}]}}}}\n");
+    let told = campaign(folder, "autumn", "2026-10-01", &format!("previous: {{fleet: spring}}\n{worn}"));
+    let flags = |robot: usize| told["robots"][robot]["flags"].as_str().unwrap_or_default();
+    assert_eq!(flags(0), "", "{told}");
+    assert!(flags(1).contains("gear_cyclic joint 3 since 2026-04-01: diagnosed, it was not before"), "{told}");
+}
+
+#[test]
 fn robots_with_few_points_borrow_from_those_of_their_model() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
