@@ -7,7 +7,7 @@ use super::statement::sentence;
 use super::verdict::Looked;
 use super::{ALIKE, Course};
 use crate::effect::{Effect, Form, Place, Placed, Signature};
-use crate::estimate::{Fate, Kind, Screening, tail};
+use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
 use crate::units::Unit;
 use std::collections::BTreeMap;
 
@@ -240,8 +240,11 @@ const REFINEMENT: f64 = 0.1;
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
+    // What has no other explanation than that it is far out must be farther than this noise reaches.
+    let far = |s: &Suspect| s.kind != Kind::Outlier || s.statistic > screening.reach;
     let of = |kinds: fn(Kind) -> bool| -> Vec<usize> {
-        screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown).map(|s| s.row + 1).collect()
+        let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
+        own.filter(|s| far(s)).map(|s| s.row + 1).collect()
     };
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();

@@ -18,7 +18,7 @@ const CHUNK: usize = 32;
 pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, seed: u64) -> f64 {
     let lines = pool.lines;
     let mut residual = pool.residual.clone();
-    project(&state.basis, &mut residual);
+    project(state.basis.as_ref(), &mut residual);
     // Fitted residuals are too small where a row has leverage.
     let leverage = |i: usize| {
         let of = |basis: &Mat<f64>| (0..basis.ncols()).map(|k| basis[(i, k)] * basis[(i, k)]).sum::<f64>();
@@ -35,8 +35,8 @@ pub(crate) fn gate(pool: &Pool, state: &State, pose: &[usize], draws: usize, see
         drawn.extend(residual.iter().enumerate().map(|(i, value)| value * signs[pose[pool.lens.row_of(i)]]));
     }
     drawn.par_chunks_mut(CHUNK * lines).for_each(|some| {
-        project(&pool.base, some);
-        project(&state.basis, some);
+        project(pool.base.as_ref(), some);
+        project(state.basis.as_ref(), some);
     });
     let squares: Vec<f64> = drawn.chunks(lines).map(|column| super::pool::dot(column, column)).collect();
     let drawn = faer::MatRef::from_column_major_slice(&drawn, lines, draws);

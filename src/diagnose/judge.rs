@@ -1,7 +1,7 @@
 //! Held-out rows judge: what each finding is worth there, and which of two explanations that fit alike carries over.
 
 use super::pool::Pool;
-use super::{ALIKE, Chosen, Course, Question, fitted, start_of};
+use super::{ALIKE, Chosen, Course, Question, fitted, held_down, start_of};
 use crate::effect::{Effect, Form, Placed};
 use crate::robot::Measurements;
 use std::collections::BTreeMap;
@@ -112,7 +112,8 @@ pub(crate) fn judge(
                 (now, seen) = (course, other);
                 at = 0;
             }
-            None if bare.is_better_than(&seen) => {
+            // What has no name must prove itself: it has no physics to carry it to other points.
+            None if bare.is_better_than(&seen) || group.0 == "unknown" && bare.rms() < seen.rms() => {
                 *set = rest;
                 (now, seen) = (without, bare);
                 at = 0;
@@ -138,5 +139,6 @@ fn start(pool: &Pool, set: &[usize], h: usize, form: &Form) -> Chosen {
         at += pool.first[k + 1] - pool.first[*k];
     }
     let count = pool.first[h + 1] - pool.first[h];
-    Chosen { form: form.clone(), coefficients: solution.coefficients[at..at + count].to_vec(), known: Vec::new() }
+    let coefficients = solution.coefficients[at..at + count].to_vec();
+    Chosen { form: form.clone(), known: held_down(form, pool.lens.robot, &coefficients), coefficients }
 }

@@ -22,7 +22,7 @@ pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
-use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey};
+use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, Setting, Survey};
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -56,6 +56,8 @@ const SIGNIFICANT: f64 = 0.004;
 const ALIKE: f64 = 6.0;
 /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
 const SEARCHED: usize = 800;
+/// The scale of a curve's numbers in medians of their size: twice that of normal ones.
+const TYPICAL: f64 = 2.0 * 1.4826;
 /// A repeatability that changes by less than this share is settled.
 const SETTLED: f64 = 0.25;
 
@@ -94,6 +96,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     let mut asked_residual = false;
     let mut first = None;
     let mut located = None;
+    let mut seen: Vec<Vec<Form>> = Vec::new();
     let mut round = 0;
     loop {
         round += 1;
@@ -123,10 +126,13 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             found.last
         ));
         let same = same_forms(&forms, &now.chosen);
+        // A set that comes back after another goes in circles: both fit alike.
+        let circles = !same && seen.contains(&forms);
+        seen.push(forms.clone());
         let start = chosen(&lens, forms, coefficients);
         let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
         let kept_same = next.screening.kept == now.screening.kept;
-        let last_round = round >= ROUNDS;
+        let last_round = round >= ROUNDS || circles;
         if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > SIGNIFICANT {
             asked_residual = true;
             let rows = &next.screening.kept;
@@ -169,16 +175,22 @@ fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Cho
     for (i, (form, coefficients)) in forms.iter().zip(coefficients).enumerate() {
         let known: Vec<Prior> = match form {
             _ if borrowed.contains(&i) => opinion.by_ref().take(coefficients.len()).collect(),
-            // The slow part of a curve is nearly geometry: where the data cannot tell, it stays small.
-            Form::JointTable(_) => {
-                let sigmas = form.parameters(lens.robot).into_iter().map(|spec| spec.prior_sigma);
-                sigmas.map(|sigma| Prior { mean: 0.0, sigma }).collect()
-            }
-            _ => Vec::new(),
+            _ => held_down(form, lens.robot, &coefficients),
         };
         out.push(Chosen { form: form.clone(), coefficients, known });
     }
     out
+}
+
+/// What keeps the numbers of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or between
+/// sparse points: most of its numbers are of one size (empirical Bayes), and none is larger than is plausible.
+fn held_down(form: &Form, robot: &RobotModel, coefficients: &[f64]) -> Vec<Prior> {
+    let Form::JointTable(_) = form else { return Vec::new() };
+    let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
+    let middle = sizes.len() / 2;
+    let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let sigma = |spec: ParameterSpec| spec.prior_sigma.min(TYPICAL * typical).max(f64::MIN_POSITIVE.sqrt());
+    form.parameters(robot).into_iter().map(|spec| Prior { mean: 0.0, sigma: sigma(spec) }).collect()
 }
 
 /// Whether a form is a number of the torque model, seen only through what yields.

@@ -54,7 +54,7 @@ impl<'a> Pool<'a> {
         let lines = residual.len();
         let base = orthonormal(jacobian);
         let mut residual = residual.to_vec();
-        project(&base, &mut residual);
+        project(base.as_ref(), &mut residual);
         let square = dot(&residual, &residual);
         let mut pool = Self {
             lens,
@@ -99,7 +99,7 @@ impl<'a> Pool<'a> {
                     norm
                 });
                 let norms: Vec<f64> = norms.collect();
-                project(&self.base, chunk);
+                project(self.base.as_ref(), chunk);
                 norms
             })
             .collect();
@@ -206,7 +206,7 @@ pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
 }
 
 /// Removes from columns (one after another) what lies in the span of an orthonormal basis.
-pub(crate) fn project(basis: &Mat<f64>, columns: &mut [f64]) {
+pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     let lines = basis.nrows();
     let count = columns.len() / lines.max(1);
     if basis.ncols() == 0 || count == 0 {
@@ -215,7 +215,7 @@ pub(crate) fn project(basis: &Mat<f64>, columns: &mut [f64]) {
     let mut share = Mat::zeros(basis.ncols(), count);
     let mut columns = MatMut::from_column_major_slice_mut(columns, lines, count);
     matmul(share.as_mut(), Accum::Replace, basis.transpose(), columns.as_ref(), 1.0, Par::Seq);
-    matmul(columns.as_mut(), Accum::Add, basis.as_ref(), share.as_ref(), -1.0, Par::Seq);
+    matmul(columns.as_mut(), Accum::Add, basis, share.as_ref(), -1.0, Par::Seq);
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -2,8 +2,10 @@
 
 use super::gate::gate;
 use super::pool::{Pool, dot, project};
-use super::state::{State, solve};
+use super::state::{State, solve, span};
 use crate::effect::{Effect, Form, Hypothesis, Placed, Survey};
+use faer::Mat;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 
 /// How a search goes.
@@ -174,15 +176,16 @@ impl<'a, 'b> Search<'a, 'b> {
                 continue;
             }
             let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
-            let state = State::of(self.pool, &rest);
+            let beside = span(self.pool, &self.pool.columns_of(&rest));
             let mut residual = self.pool.residual.clone();
-            project(&state.basis, &mut residual);
+            project(beside.as_ref(), &mut residual);
             let mut form = self.pool.hypotheses[h].form.clone();
-            let mut most = self.gain(&form, &state, &residual);
+            let mut most = self.gain(&form, &beside, &residual);
             let mut idle = 0;
             for level in 0..LEVELS {
-                let near = form.near(self.survey, level).into_iter().map(|form| (self.gain(&form, &state, &residual), form));
-                match near.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                let near = form.near(self.survey, level).into_par_iter();
+                let near: Vec<(f64, Form)> = near.map(|form| (self.gain(&form, &beside, &residual), form)).collect();
+                match near.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
                     Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
                     _ => idle += 1,
                 }
@@ -213,16 +216,16 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    /// By how much a form would lower the squared `residual` beside the set of `state`.
-    fn gain(&self, form: &Form, state: &State, residual: &[f64]) -> f64 {
+    /// By how much a form would lower the squared `residual` beside what the columns of `beside` span.
+    fn gain(&self, form: &Form, beside: &Mat<f64>, residual: &[f64]) -> f64 {
         let lines = self.pool.lines;
         let mut columns = self.pool.lens.columns(form);
         for column in columns.chunks_mut(lines) {
             let norm = dot(column, column).sqrt().max(1e-300);
             column.iter_mut().for_each(|value| *value /= norm);
         }
-        project(&self.pool.base, &mut columns);
-        project(&state.basis, &mut columns);
+        project(self.pool.base.as_ref(), &mut columns);
+        project(beside.as_ref(), &mut columns);
         super::state::gain(&columns, lines, residual)
     }
 

@@ -1,14 +1,16 @@
 //! The problem with some hypotheses estimated: what each of the others would still gain.
 
-use super::pool::{LINES_EACH, Pool, dot};
-use faer::Mat;
+use super::pool::{LINES_EACH, Pool, dot, project};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// What is left of a squared column of unit length below this is rounding and second order, not sight.
 const INVISIBLE: f64 = 1e-6;
+
+/// Columns whose shares one thread computes at once.
+const COLUMNS: usize = 256;
 
 /// Coefficients of a set of hypotheses.
 pub(crate) struct Solution {
@@ -148,8 +150,8 @@ pub(crate) struct State {
     pub basis: Mat<f64>,
     /// Product of every column with the residual.
     pub gradient: Vec<f64>,
-    /// What the set takes off every column: rank x columns.
-    pub share: Mat<f64>,
+    /// What the set takes off every column: rank x columns, column by column.
+    share: Vec<f64>,
     /// [`State::falls`] once they are known.
     falls: OnceLock<Vec<(f64, usize)>>,
 }
@@ -159,12 +161,20 @@ impl State {
         let columns = pool.columns_of(set);
         let basis = span(pool, &columns);
         let rank = basis.ncols();
-        let mut share = Mat::zeros(rank, pool.scale.len());
-        matmul(share.as_mut(), Accum::Replace, basis.transpose(), pool.all(), 1.0, Par::Seq);
-        let along: Vec<f64> = (0..rank).map(|k| basis.col(k).iter().zip(&pool.residual).map(|(a, b)| a * b).sum()).collect();
-        let square = pool.square - along.iter().map(|value| value * value).sum::<f64>();
-        let gradient = pool.gradient.iter().enumerate();
-        let gradient = gradient.map(|(c, g)| g - (0..rank).map(|k| share[(k, c)] * along[k]).sum::<f64>()).collect();
+        let mut share = vec![0.0; rank * pool.scale.len()];
+        if rank > 0 {
+            let all = pool.all();
+            share.par_chunks_mut(rank * COLUMNS).enumerate().for_each(|(chunk, share)| {
+                let count = share.len() / rank;
+                let some = all.subcols(chunk * COLUMNS, count);
+                let share = MatMut::from_column_major_slice_mut(share, rank, count);
+                matmul(share, Accum::Replace, basis.transpose(), some, 1.0, Par::Seq);
+            });
+        }
+        let along: Vec<f64> = (0..rank).map(|k| dot(column(&basis, k), &pool.residual)).collect();
+        let square = pool.square - dot(&along, &along);
+        let of = |column: usize| &share[column * rank..(column + 1) * rank];
+        let gradient = pool.gradient.iter().enumerate().map(|(column, g)| g - dot(of(column), &along)).collect();
         Self { set: set.to_vec(), rank, square, basis, gradient, share, falls: OnceLock::new() }
     }
 
@@ -190,15 +200,17 @@ impl State {
         }
     }
 
+    fn share_of(&self, column: usize) -> &[f64] {
+        &self.share[column * self.rank..(column + 1) * self.rank]
+    }
+
     fn factor(&self, pool: &Pool, h: usize) -> Pivoted {
         let (first, q) = (pool.first[h], pool.first[h + 1] - pool.first[h]);
         let mut gram = pool.gram[h].clone();
         if self.rank > 0 {
             for i in 0..q {
-                let a = self.share.col(first + i);
                 for j in 0..=i {
-                    let b = self.share.col(first + j);
-                    gram[i * q + j] -= a.iter().zip(b.iter()).map(|(a, b)| a * b).sum::<f64>();
+                    gram[i * q + j] -= dot(self.share_of(first + i), self.share_of(first + j));
                 }
             }
         }
@@ -238,25 +250,40 @@ pub(crate) fn fall(lines: usize, square: f64, gain: f64, rank: usize, charge: f6
     n * (square / (square - gain).max(1e-300)).ln() - n.ln() * rank as f64 - charge
 }
 
+/// A column of a matrix, which are stored one after another.
+fn column(matrix: &Mat<f64>, k: usize) -> &[f64] {
+    matrix.col(k).try_as_col_major().map_or(&[], |column| column.as_slice())
+}
+
+/// Columns that are made orthonormal at once.
+const BLOCK: usize = 16;
+
 /// Orthonormal basis of some of the pool's columns; what is below [`INVISIBLE`] is left out.
-fn span(pool: &Pool, columns: &[usize]) -> Mat<f64> {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let mut rest = pool.column(*column).to_vec();
+pub(crate) fn span(pool: &Pool, columns: &[usize]) -> Mat<f64> {
+    let lines = pool.lines;
+    let mut basis: Vec<f64> = Vec::with_capacity(columns.len() * lines);
+    for block in columns.chunks(BLOCK) {
+        let mut rest: Vec<f64> = block.iter().flat_map(|column| pool.column(*column)).copied().collect();
+        // Twice is enough (Giraud, Langou and Rozloznik, 2005).
         for _ in 0..2 {
-            for direction in &basis {
-                let along = dot(&rest, direction);
-                rest.iter_mut().zip(direction).for_each(|(value, b)| *value -= along * b);
+            project(MatRef::from_column_major_slice(&basis, lines, basis.len() / lines), &mut rest);
+        }
+        let first = basis.len();
+        for column in rest.chunks_mut(lines) {
+            for _ in 0..2 {
+                for direction in basis[first..].chunks(lines) {
+                    let along = dot(column, direction);
+                    column.iter_mut().zip(direction).for_each(|(value, b)| *value -= along * b);
+                }
+            }
+            let size = dot(column, column);
+            if size > INVISIBLE {
+                let root = size.sqrt();
+                basis.extend(column.iter().map(|value| value / root));
             }
         }
-        let size = dot(&rest, &rest);
-        if size > INVISIBLE {
-            let root = size.sqrt();
-            rest.iter_mut().for_each(|value| *value /= root);
-            basis.push(rest);
-        }
     }
-    Mat::from_fn(pool.lines, basis.len(), |i, j| basis[j][i])
+    MatRef::from_column_major_slice(&basis, lines, basis.len() / lines).to_owned()
 }
 
 /// By how much columns (one after another, unit raw length, projected) lower a squared residual.

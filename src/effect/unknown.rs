@@ -66,6 +66,8 @@ pub struct Unknown {
 /// Cosines of a smooth function of one variable, and of each of two.
 const CURVE: usize = 8;
 const EACH: usize = 3;
+/// Rows within a bump's width: fewer make a bump of any single wrong point.
+const SUPPORT: usize = 5;
 /// Widths (rad) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 /// Periods of a sway as shares of the recording.
@@ -112,8 +114,9 @@ impl Unknown {
         let bumps = (survey.travel(joint) / 0.1) as usize + 1;
         for width_rad in WIDTHS {
             let count = ((high - low - 0.5 * width_rad) / width_rad).ceil().max(0.0) as usize;
-            for k in 0..count {
-                add(Signature::Bump { centre_rad: low + width_rad * (k as f64 + 0.5), width_rad }, bumps, 0.0);
+            let centres = (0..count).map(|k| low + width_rad * (k as f64 + 0.5));
+            for centre_rad in centres.filter(|centre| supported(survey, joint, *centre, width_rad)) {
+                add(Signature::Bump { centre_rad, width_rad }, bumps, 0.0);
             }
         }
         for share in [0.25, 0.5, 0.75] {
@@ -238,6 +241,12 @@ impl Effect for Unknown {
     }
 }
 
+/// Whether enough rows lie within a bump.
+fn supported(survey: &Survey, joint: usize, centre_rad: f64, width_rad: f64) -> bool {
+    let within = |row: &&usize| (survey.data.q(**row)[joint] - centre_rad).abs() < width_rad;
+    survey.rows.iter().filter(within).take(SUPPORT).count() == SUPPORT
+}
+
 impl Placed for Unknown {
     fn place(&self) -> Place {
         self.place
@@ -252,7 +261,11 @@ impl Placed for Unknown {
                 let widths = [0.75, 1.0, 1.33].map(|factor| width_rad * libm::pow(factor, power));
                 let centres = [-0.4, 0.0, 0.4].map(|share| centre_rad + share * width_rad * step);
                 let pairs = centres.into_iter().flat_map(|c| widths.map(|w| (c, w)));
-                pairs.map(|(centre_rad, width_rad)| with(Signature::Bump { centre_rad, width_rad })).collect()
+                let Place::Joint(joint) = self.place else { return Vec::new() };
+                pairs
+                    .filter(|(centre, width)| supported(survey, joint, *centre, *width))
+                    .map(|(centre_rad, width_rad)| with(Signature::Bump { centre_rad, width_rad }))
+                    .collect()
             }
             Signature::Hinge { by, from_rad, upwards } => {
                 let [low, high] = survey.range[by];

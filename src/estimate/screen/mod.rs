@@ -5,6 +5,7 @@
 
 mod distance;
 mod kind;
+mod tail;
 
 pub use kind::Kind;
 
@@ -45,6 +46,8 @@ pub struct Screening {
     pub suspects: Vec<Suspect>,
     /// Rows that stand far out, but too many of them to be mistakes: kept, and not listed.
     pub crowd: usize,
+    /// The statistic that noise with the tails of the bulk hardly ever reaches in a recording of this size.
+    pub reach: f64,
 }
 
 /// Median of the squared length of three unit normals.
@@ -83,11 +86,11 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
     let mut aside = BTreeSet::new();
     for round in 0.. {
         let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
-        let (suspects, crowd) = screen(model, data, &kept, &fitted, set, &held);
+        let Screened { suspects, crowd, reach } = screen(model, data, &kept, &fitted, set, &held);
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
         let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
         if next == kept {
-            return (fitted, Screening { kept, suspects, crowd });
+            return (fitted, Screening { kept, suspects, crowd, reach });
         }
         if 2 * next.len() < options.rows.len() {
             break;
@@ -101,7 +104,14 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
         model.x.clone_from(&start);
         fitted = fit(model, data, options);
     }
-    (fitted, Screening { kept: options.rows.to_vec(), suspects: Vec::new(), crowd: aside.len() })
+    (fitted, Screening { kept: options.rows.to_vec(), suspects: Vec::new(), crowd: aside.len(), reach: GROSS })
+}
+
+/// One look at all rows.
+struct Screened {
+    suspects: Vec<Suspect>,
+    crowd: usize,
+    reach: f64,
 }
 
 /// Suspects of a model that was fitted to the rows `kept`, and how many rows make up a crowd. Rows in `held` stay suspects.
@@ -112,7 +122,7 @@ fn screen(
     fitted: &Fitted,
     set: &[usize],
     held: &BTreeSet<usize>,
-) -> (Vec<Suspect>, usize) {
+) -> Screened {
     let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
     let problem = Problem { data, rows: kept, unmodelled: fitted.beyond() };
     let mut standings = leave_one_out(&problem, model, &free);
@@ -132,7 +142,8 @@ fn screen(
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
         }
     }
-    (suspects, crowd)
+    let bulk: Vec<f64> = standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect();
+    Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()) }
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
