@@ -65,6 +65,11 @@ impl Finding {
     pub fn is_physics(&self) -> bool {
         !FAULTS.contains(&self.effect)
     }
+
+    /// Whether nothing but a shape stands behind it.
+    pub fn has_no_law(&self) -> bool {
+        !self.forms.is_empty() && self.forms.iter().all(|form| matches!(form, Form::Unknown(_)))
+    }
 }
 
 /// The chosen causes as findings, strongest first.
@@ -83,6 +88,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         let name = match form {
             Form::JointTable(_) if is_wavy(values) => "gear_cyclic",
             Form::JointHardening(law) if law.is_lost_motion(values, looked.survey.load(law.joint())) => "backlash",
+            Form::Unknown(unknown) if unknown.is_hose() => "cable_drag",
             _ => form.name(),
         };
         groups.entry((name, form.place().to_string())).or_default().push(i);
@@ -345,7 +351,8 @@ fn exact(effect: &str, forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
             Form::GearCyclic(gear) if gear.order() == 1 => add("counterbalance", place),
             Form::Unknown(unknown) => match unknown.signature() {
                 Signature::Periodic { by, .. } => add("axis_wobble", &Place::Joint(by).to_string()),
-                // A hose that two joints bend does the same where no motor current tells of its pull.
+                // No motor current tells of a pull.
+                _ if effect == "cable_drag" => add("unknown", place),
                 Signature::Product { .. } | Signature::Surface { .. } if place.starts_with("joint") => add("cable_drag", place),
                 _ => (),
             },

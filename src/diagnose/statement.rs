@@ -63,9 +63,10 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             }
         }
         "counterbalance" => format!("a balancer (spring or gas) acts on {place} and is missing from the torque model"),
-        "cable_drag" => {
-            format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model")
-        }
+        "cable_drag" => match forms.iter().find_map(|form| if let Form::Unknown(shape) = form { Some(shape) } else { None }) {
+            Some(shape) => format!("something pulls on {place} as a hose package does: {}", shape.signature()),
+            None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
+        },
         "link_mass" => format!("the mass or centre of {place} in the torque model is wrong"),
         "payload_error" => match first {
             Some(n) => format!("the payload is {:+.1} % of what was declared off", n.value * 100.0),

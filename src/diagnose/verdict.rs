@@ -146,7 +146,7 @@ pub(crate) fn conclude(
     // A small rest that has no name beside strong findings is what their shapes leave: no cause of its own.
     let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
     let small = |finding: &Finding| {
-        finding.effect == "unknown" && finding.evidence.is_some_and(|e| e.gain < REST * strongest && e.delta_bic < WEAK)
+        finding.has_no_law() && finding.evidence.is_some_and(|e| e.gain < REST * strongest && e.delta_bic < WEAK)
     };
     let (rest, findings): (Vec<Finding>, Vec<Finding>) = findings.into_iter().partition(small);
     let mut signature =

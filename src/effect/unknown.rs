@@ -84,6 +84,16 @@ impl Unknown {
         self.signature
     }
 
+    /// Whether a joint follows a function of its own angle and a neighbour's, as where a hose runs along both and pulls.
+    pub fn is_hose(&self) -> bool {
+        match (self.signature, self.place) {
+            (Signature::Product { a, b } | Signature::Surface { a, b, .. }, Place::Joint(joint)) => {
+                (a == joint || b == joint) && a.abs_diff(b) == 1
+            }
+            _ => false,
+        }
+    }
+
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
         let mut add = |place, signature, tried, charge: f64| {
