@@ -6,8 +6,8 @@ use super::factor::Tall;
 use super::model::Model;
 use super::piece::{self, Piece};
 use super::problem::Problem;
+use super::triangle::Triangle;
 use crate::effect::Scratch;
-use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -17,7 +17,7 @@ const SOLE: f64 = 0.98;
 const CHUNK: usize = 256;
 
 /// A root of the covariance of the `free` parameters (upper triangular, p x p) whose factor's inverse is `inverse`, priors included.
-pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], inverse: &Mat<f64>, poses: &[Vec<usize>]) -> Mat<f64> {
+pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], inverse: &Triangle, poses: &[Vec<usize>]) -> Triangle {
     let p = free.len();
     let mut column = vec![usize::MAX; model.stack.specs().len()];
     for (j, parameter) in free.iter().enumerate() {
@@ -41,7 +41,7 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
                         });
                         errors.extend((piece.error * share).iter());
                         visible.extend((0..p).map(|k| {
-                            let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse[(j, k)]).sum();
+                            let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse.at(j, k)).sum();
                             seen * share
                         }));
                     }
@@ -52,7 +52,7 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
         )
         .collect();
     let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
-    let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse[(j, k)] * weight }));
+    let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse.at(j, k) * weight }));
     triangle(p, lines.into_iter().chain(told))
 }
 
@@ -67,7 +67,7 @@ fn pieces(problem: &Problem, model: &Model, row: usize, point: &Vector3<f64>, sc
 }
 
 /// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.
-fn influence(visible: &DMatrix<f64>, errors: &DVector<f64>, inverse: &Mat<f64>) -> Vec<f64> {
+fn influence(visible: &DMatrix<f64>, errors: &DVector<f64>, inverse: &Triangle) -> Vec<f64> {
     let eigen = SymmetricEigen::new(visible * visible.transpose());
     let mut along = eigen.eigenvectors.tr_mul(errors);
     for (value, share) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
@@ -78,25 +78,24 @@ fn influence(visible: &DMatrix<f64>, errors: &DVector<f64>, inverse: &Mat<f64>) 
 }
 
 /// R^-1 times a vector.
-fn upwards(inverse: &Mat<f64>, vector: impl Fn(usize) -> f64) -> Vec<f64> {
-    let p = inverse.ncols();
-    (0..p).map(|j| (j..p).map(|k| inverse[(j, k)] * vector(k)).sum()).collect()
+fn upwards(inverse: &Triangle, vector: impl Fn(usize) -> f64) -> Vec<f64> {
+    let p = inverse.size();
+    (0..p).map(|j| (j..p).map(|k| inverse.at(j, k) * vector(k)).sum()).collect()
 }
 
 /// The upper triangular root of A' A: columns are factored last first, and the factor turned over.
-fn triangle(p: usize, lines: impl Iterator<Item = Vec<f64>>) -> Mat<f64> {
+fn triangle(p: usize, lines: impl Iterator<Item = Vec<f64>>) -> Triangle {
     let mut tall = Tall::new(p + 1, CHUNK);
     let lines: Vec<Vec<f64>> = lines.collect();
     for some in lines.chunks(CHUNK) {
         let mut chunk = tall.chunk(some.len());
         for (i, line) in some.iter().enumerate() {
-            for (j, value) in line.iter().rev().enumerate() {
-                chunk[(i, j)] = *value;
+            for (column, value) in chunk.iter_mut().zip(line.iter().rev()) {
+                column[i] = *value;
             }
         }
         tall.absorb(some.len());
     }
     let factor = tall.factor();
-    let columns: Vec<Vec<f64>> = (0..p).map(|j| factor.column(j)).collect();
-    Mat::from_fn(p, p, |a, b| columns[p - 1 - a][p - 1 - b])
+    Triangle::from_fn(p, |a, b| factor.entry(p - 1 - b, p - 1 - a))
 }

@@ -2,8 +2,8 @@
 
 use super::factor::Factor;
 use super::model::Model;
+use super::triangle::{Triangle, dot};
 use crate::robot::Measurements;
-use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -12,8 +12,8 @@ use rayon::prelude::*;
 pub struct Covariance {
     /// Positions of the free parameters in the stack.
     free: Vec<usize>,
-    /// Upper triangular, p x p.
-    root: Mat<f64>,
+    /// p x p.
+    root: Triangle,
 }
 
 impl Covariance {
@@ -22,8 +22,8 @@ impl Covariance {
         Some(Self { free: free.to_vec(), root: factor.inverse()? })
     }
 
-    /// From an upper triangular root.
-    pub(crate) fn of_root(root: Mat<f64>, free: &[usize]) -> Self {
+    /// From a root.
+    pub(crate) fn of_root(root: Triangle, free: &[usize]) -> Self {
         Self { free: free.to_vec(), root }
     }
 
@@ -33,7 +33,7 @@ impl Covariance {
     }
 
     fn product(&self, a: usize, b: usize) -> f64 {
-        (0..self.free.len()).map(|column| self.root[(a, column)] * self.root[(b, column)]).sum()
+        (a.max(b)..self.free.len()).map(|column| self.root.at(a, column) * self.root.at(b, column)).sum()
     }
 
     /// The other free parameter that a parameter of the stack is most correlated with, and the correlation.
@@ -56,16 +56,19 @@ impl Covariance {
         (0..data.rows())
             .into_par_iter()
             .map_init(
-                || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
-                |(scratch, jacobian), row| {
+                || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p], [(); 3].map(|()| vec![0.0; p])),
+                |(scratch, jacobian, lines), row| {
                     jacobian.fill(Vector3::zeros());
                     model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
                         if let Some(sum) = jacobian.get_mut(column[parameter]) {
                             *sum += derivative;
                         }
                     });
-                    let direction = |k: usize| (0..=k).map(|i| jacobian[i] * self.root[(i, k)]).sum::<Vector3<f64>>();
-                    (0..p).map(|k| direction(k).norm_squared()).sum::<f64>().sqrt()
+                    for (axis, line) in lines.iter_mut().enumerate() {
+                        line.iter_mut().zip(&*jacobian).for_each(|(value, derivative)| *value = derivative[axis]);
+                    }
+                    let along = |k: usize| lines.iter().map(|line| dot(line, self.root.column(k)).powi(2)).sum::<f64>();
+                    (0..p).map(along).sum::<f64>().sqrt()
                 },
             )
             .collect()

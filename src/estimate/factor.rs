@@ -1,14 +1,15 @@
 //! The triangular factor of a tall least-squares problem, built chunk by chunk: bounded memory, no squared condition number.
 
+use super::triangle::{Triangle, axpy, dot};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
-use faer::{Mat, MatMut, Par};
+use faer::{Mat, Par};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
 #[derive(Debug, Clone)]
 pub struct Factor {
-    /// (p + 1) x (p + 1), upper triangular.
-    r: Mat<f64>,
+    /// (p + 1) x (p + 1).
+    r: Triangle,
 }
 
 /// Rows `[J | r]` on their way into a factor: chunks are written below the factor of those before them.
@@ -29,9 +30,14 @@ impl Tall {
         Self { rows: Mat::zeros(height, columns), top: 0, reflectors: Mat::zeros(block, columns), memory }
     }
 
-    /// The next chunk of `height` rows; all zero.
-    pub fn chunk(&mut self, height: usize) -> MatMut<'_, f64> {
-        self.rows.as_mut().subrows_mut(self.top, height)
+    /// The columns of the next chunk of `height` rows; all zero.
+    pub fn chunk(&mut self, height: usize) -> Vec<&mut [f64]> {
+        let top = self.top;
+        let columns = self.rows.col_iter_mut().map(|column| {
+            let column = column.try_as_col_major_mut().expect("stored by column");
+            &mut column.as_slice_mut()[top..top + height]
+        });
+        columns.collect()
     }
 
     /// Takes the `height` rows written to [`Tall::chunk`] into the factor.
@@ -44,14 +50,13 @@ impl Tall {
         for j in 0..columns {
             // What faer leaves below the diagonal are its reflectors.
             let below = (j + 1).min(used);
-            self.rows.as_mut().col_mut(j).subrows_mut(below, used - below).fill(0.0);
+            self.rows.col_as_slice_mut(j)[below..used].fill(0.0);
         }
     }
 
     /// The factor of all chunks.
     pub fn factor(&self) -> Factor {
-        let columns = self.rows.ncols();
-        Factor { r: Mat::from_fn(columns, columns, |i, j| if i <= j && i < self.top { self.rows[(i, j)] } else { 0.0 }) }
+        Factor { r: Triangle::from_fn(self.rows.ncols(), |i, j| if i < self.top { self.rows.col_as_slice(j)[i] } else { 0.0 }) }
     }
 }
 
@@ -59,116 +64,114 @@ impl Factor {
     /// The factor of rows `[J | r]` (m x (p + 1)).
     pub fn of(rows: &Mat<f64>) -> Self {
         let mut tall = Tall::new(rows.ncols(), rows.nrows());
-        tall.chunk(rows.nrows()).copy_from(rows);
+        for (j, column) in tall.chunk(rows.nrows()).into_iter().enumerate() {
+            column.copy_from_slice(rows.col_as_slice(j));
+        }
         tall.absorb(rows.nrows());
+        tall.factor()
+    }
+
+    /// The factor of rows made of some of this one's columns above each other's.
+    fn of_columns<'a>(height: usize, columns: impl ExactSizeIterator<Item = [&'a [f64]; 2]>) -> Self {
+        let mut tall = Tall::new(columns.len(), 2 * height);
+        for (to, [above, below]) in tall.chunk(2 * height).into_iter().zip(columns) {
+            to[..above.len()].copy_from_slice(above);
+            to[height..height + below.len()].copy_from_slice(below);
+        }
+        tall.absorb(2 * height);
         tall.factor()
     }
 
     /// The factor of both sets of rows together.
     pub fn stack(&self, other: &Factor) -> Self {
-        let columns = self.r.ncols();
-        let rows =
-            Mat::from_fn(2 * columns, columns, |i, j| if i < columns { self.r[(i, j)] } else { other.r[(i - columns, j)] });
-        Self::of(&rows)
+        let columns = self.r.size();
+        Self::of_columns(columns, (0..columns).map(|j| [self.r.column(j), other.r.column(j)]))
     }
 
     /// The factor of the problem in some of the parameters only.
     pub fn select(&self, parameters: &[usize]) -> Self {
-        let columns = self.r.ncols();
         let p = self.parameters();
-        Self::of(&Mat::from_fn(columns, parameters.len() + 1, |i, j| self.r[(i, parameters.get(j).copied().unwrap_or(p))]))
+        if parameters.iter().copied().eq(0..p) {
+            return self.clone();
+        }
+        let columns: Vec<usize> = parameters.iter().copied().chain([p]).collect();
+        Self::of_columns(p + 1, columns.iter().map(|j| [self.r.column(*j), &[]]))
     }
 
     /// The problem that is left in the parameters without an entry when the others take the given steps.
     pub fn given(&self, steps: &[Option<f64>]) -> Self {
         let p = self.parameters();
-        let open: Vec<usize> = (0..p).filter(|j| steps[*j].is_none()).collect();
-        let mut rows = Mat::from_fn(p + 1, open.len() + 1, |i, j| self.r[(i, open.get(j).copied().unwrap_or(p))]);
+        let mut right = self.r.column(p).to_vec();
         for (j, step) in steps.iter().enumerate() {
-            for i in 0..=j {
-                rows[(i, open.len())] -= self.r[(i, j)] * step.unwrap_or_default();
-            }
+            axpy(-step.unwrap_or_default(), self.r.column(j), &mut right);
         }
-        Self::of(&rows)
+        let open: Vec<usize> = (0..p).filter(|j| steps[*j].is_none()).collect();
+        let columns: Vec<&[f64]> = open.iter().map(|j| self.r.column(*j)).chain([&right[..]]).collect();
+        Self::of_columns(p + 1, columns.iter().map(|column| [column, &[][..]]))
     }
 
     /// The factor of the same rows, all multiplied by `weight`.
-    pub fn weighted(mut self, weight: f64) -> Self {
-        for j in 0..self.r.ncols() {
-            for i in 0..=j {
-                self.r[(i, j)] *= weight;
-            }
-        }
-        self
+    pub fn weighted(self, weight: f64) -> Self {
+        Self { r: self.r.scaled(weight) }
     }
 
     /// An entry of R; row and column p are the right-hand side's.
     pub(super) fn entry(&self, i: usize, j: usize) -> f64 {
-        self.r[(i, j)]
+        self.r.at(i, j)
     }
 
     pub fn parameters(&self) -> usize {
-        self.r.ncols() - 1
+        self.r.size() - 1
     }
 
-    /// Column `j` of R (without the right-hand side's row), above the diagonal and on it.
-    pub fn column(&self, j: usize) -> Vec<f64> {
-        (0..self.parameters()).map(|i| self.r[(i, j)]).collect()
+    /// Column `j` of R down to the diagonal.
+    pub fn column(&self, j: usize) -> &[f64] {
+        self.r.column(j)
+    }
+
+    /// The right-hand side's rows beside R.
+    fn right(&self) -> &[f64] {
+        let p = self.parameters();
+        &self.r.column(p)[..p]
     }
 
     /// Norm of column j of the Jacobian.
     pub fn column_norm(&self, j: usize) -> f64 {
-        (0..self.parameters()).map(|i| self.r[(i, j)].powi(2)).sum::<f64>().sqrt()
+        dot(self.r.column(j), self.r.column(j)).sqrt()
     }
 
     /// J^T r.
     pub fn gradient(&self) -> Vec<f64> {
-        let p = self.parameters();
-        (0..p).map(|j| (0..=j).map(|i| self.r[(i, j)] * self.r[(i, p)]).sum()).collect()
+        (0..self.parameters()).map(|j| dot(self.r.column(j), self.right())).collect()
     }
 
     /// The step of least |J dx - r|^2 + damping |D dx|^2, D the column norms (Marquardt's scaling). `None` if singular.
     pub fn solve(&self, damping: f64) -> Option<Vec<f64>> {
         let p = self.parameters();
-        let scale: Vec<f64> = (0..p).map(|j| self.column_norm(j)).collect();
+        let mut scale: Vec<f64> = (0..p).map(|j| self.column_norm(j)).collect();
         if scale.iter().any(|norm| *norm <= 0.0 || !norm.is_finite()) {
             return None;
         }
-        let scaled = |i: usize, j: usize| if j < p { self.r[(i, j)] / scale[j] } else { self.r[(i, p)] };
+        scale.push(1.0);
+        let scaled = Triangle::from_fn(p + 1, |i, j| self.r.at(i, j) / scale[j]);
         let small = if damping == 0.0 {
-            Self { r: Mat::from_fn(p, p + 1, scaled) }
+            scaled
         } else {
             let root = damping.sqrt();
-            let damped = |i: usize, j: usize| if i - p == j { root } else { 0.0 };
-            Self::of(&Mat::from_fn(2 * p, p + 1, |i, j| if i < p { scaled(i, j) } else { damped(i, j) }))
+            let damped = Triangle::from_fn(p + 1, |i, j| if i == j && j < p { root } else { 0.0 });
+            Self { r: scaled }.stack(&Self { r: damped }).r
         };
-        let mut step = vec![0.0; p];
-        for i in (0..p).rev() {
-            let diagonal = small.r[(i, i)];
-            if diagonal.abs() < 1e-14 {
-                return None;
-            }
-            let known: f64 = (i + 1..p).map(|j| small.r[(i, j)] * step[j]).sum();
-            step[i] = (small.r[(i, p)] - known) / diagonal;
+        if (0..p).any(|j| small.at(j, j).abs() < 1e-14) {
+            return None;
         }
+        let mut step = small.column(p)[..p].to_vec();
+        small.solve(&mut step);
         Some(step.iter().zip(&scale).map(|(value, norm)| value / norm).collect())
     }
 
     /// The inverse of R (p x p), so that the covariance is `inverse * inverse^T`. `None` if singular.
-    pub fn inverse(&self) -> Option<Mat<f64>> {
-        let p = self.parameters();
-        let mut inverse = Mat::zeros(p, p);
-        for column in 0..p {
-            for i in (0..=column).rev() {
-                let diagonal = self.r[(i, i)];
-                if diagonal == 0.0 {
-                    return None;
-                }
-                let known: f64 = (i + 1..=column).map(|j| self.r[(i, j)] * inverse[(j, column)]).sum();
-                inverse[(i, column)] = (if i == column { 1.0 } else { 0.0 } - known) / diagonal;
-            }
-        }
-        Some(inverse)
+    pub fn inverse(&self) -> Option<Triangle> {
+        self.r.head(self.parameters()).inverse()
     }
 
     /// Singular values of J with columns scaled by `scale`, largest first.
@@ -177,7 +180,7 @@ impl Factor {
         if p == 0 {
             return Vec::new();
         }
-        let scaled = Mat::from_fn(p, p, |i, j| self.r[(i, j)] * scale[j]);
+        let scaled = Mat::from_fn(p, p, |i, j| self.r.at(i, j) * scale[j]);
         scaled.singular_values().unwrap_or_default()
     }
 }

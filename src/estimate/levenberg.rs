@@ -3,6 +3,7 @@
 use super::factor::Factor;
 use super::model::Model;
 use super::problem::{Evaluation, Problem};
+use super::triangle::{axpy, dot};
 
 /// Why the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -125,11 +126,9 @@ fn step_norm(factor: &Factor, step: &[f64]) -> f64 {
     let p = step.len();
     let mut moved = vec![0.0; p];
     for (j, change) in step.iter().enumerate() {
-        for (sum, entry) in moved.iter_mut().zip(factor.column(j)) {
-            *sum += entry * change;
-        }
+        axpy(*change, factor.column(j), &mut moved);
     }
-    moved.iter().map(|value| value * value).sum::<f64>().sqrt()
+    dot(&moved, &moved).sqrt()
 }
 
 /// Largest cosine between the residual and a column of J that no bound stops; zero at the minimum.

@@ -23,6 +23,7 @@ mod screen;
 mod standing;
 pub mod swarm;
 pub mod threads;
+mod triangle;
 
 pub use align::align;
 pub use change::{Change, Session, changes};

@@ -4,6 +4,7 @@
 //! value and says with whom it is redundant. Indices after Sun and Hollerbach, ICRA 2008.
 
 use super::factor::Factor;
+use super::triangle::{axpy, dot};
 
 /// What became of a candidate parameter.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,21 +28,20 @@ pub(crate) fn visibility(factor: &Factor, prior_sigma: &[f64]) -> Vec<Visibility
     let mut out = Vec::with_capacity(prior_sigma.len());
     for (j, prior) in prior_sigma.iter().enumerate() {
         let column = factor.column(j);
-        let norm = length(&column);
+        let norm = length(column);
         if norm * prior < 1.0 {
             out.push(Visibility::Unseen);
             continue;
         }
-        let mut rest = column.clone();
+        let mut rest = column.to_vec();
         let mut shares = vec![0.0; basis.len()];
         // Twice is enough: classical result on Gram-Schmidt with one reorthogonalisation.
         for _ in 0..2 {
             for (share, direction) in shares.iter_mut().zip(&basis) {
-                let along: f64 = rest.iter().zip(direction).map(|(a, b)| a * b).sum();
+                // Columns are as long as they are far from the first.
+                let along = dot(&rest, direction);
                 *share += along;
-                for (value, b) in rest.iter_mut().zip(direction) {
-                    *value -= along * b;
-                }
+                axpy(-along, direction, &mut rest);
             }
         }
         let left = length(&rest);
@@ -80,7 +80,7 @@ fn combination(triangle: &[Vec<f64>], kept: &[usize], shares: &[f64], factor: &F
 }
 
 fn length(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>().sqrt()
+    dot(values, values).sqrt()
 }
 
 /// Condition and observability indices of singular values (largest first) from `rows` measured points.

@@ -100,14 +100,10 @@ impl Problem<'_> {
                 piece.derivatives(model, point, scratch, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
                         let derivative = derivative * share;
-                        for axis in 0..3 {
-                            lines[(first + axis, j)] += derivative[axis];
-                        }
+                        add(&mut lines[j][first..first + 3], &derivative);
                     }
                 });
-                for axis in 0..3 {
-                    lines[(first + axis, p)] = piece.error[axis] * share;
-                }
+                add(&mut lines[p][first..first + 3], &(piece.error * share));
             };
             for (i, &row) in chunk.iter().enumerate() {
                 let first = 3 * (1 + extra) * i;
@@ -133,6 +129,12 @@ impl Problem<'_> {
         }
         Span { residuals, rests, factor: tall.factor() }
     }
+}
+
+fn add(to: &mut [f64], value: &Vector3<f64>) {
+    to[0] += value.x;
+    to[1] += value.y;
+    to[2] += value.z;
 }
 
 /// What a thread makes of its rows.

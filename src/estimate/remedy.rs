@@ -86,10 +86,8 @@ fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usiz
     let mut rows = Mat::zeros(2 * p, p + new.len() + 1);
     for j in 0..p {
         let second = new.iter().position(|other| *other == j).map_or(place(j), |extra| known + extra);
-        for (i, (one, other)) in own.column(j).into_iter().zip(more.column(j)).enumerate() {
-            rows[(i, place(j))] = one;
-            rows[(p + i, second)] = other;
-        }
+        rows.col_as_slice_mut(place(j))[..=j].copy_from_slice(own.column(j));
+        rows.col_as_slice_mut(second)[p..=p + j].copy_from_slice(more.column(j));
     }
     let mut sigma = vec![TARGET_PRIOR; p + new.len()];
     for (j, prior) in prior.iter().enumerate() {

@@ -3,8 +3,8 @@
 use super::sight::Sight;
 use crate::effect::{EffectStack, Load, Setting, entry};
 use crate::estimate::model::Model;
+use crate::estimate::triangle::{axpy, dot};
 use crate::robot::Measurements;
-use faer::Mat;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
@@ -57,10 +57,9 @@ pub(super) fn order(poses: &Measurements, ranges: &[[f64; 2]]) -> Vec<usize> {
 /// Sides of approach (+1, -1; row-major) under which an error by direction is least imitated by seen parameters and by the same
 /// error of earlier joints; and the least share of it, over the joints, that stays visible.
 pub(super) fn approach(model: &Model, sight: &Sight, poses: &Measurements, seed: u64) -> (Vec<f64>, f64) {
-    let (rows, joints, p) = (poses.rows(), poses.joints, sight.free().len());
-    let values = sight.rows(model, poses);
-    let q = Mat::from_fn(3 * rows, p, |i, j| values[i * p + j]).qr().compute_thin_Q();
-    let mut basis: Vec<Vec<f64>> = (0..q.ncols()).map(|j| (0..3 * rows).map(|i| q[(i, j)]).collect()).collect();
+    let (rows, joints) = (poses.rows(), poses.joints);
+    let q = sight.rows(model, poses).qr().compute_thin_Q();
+    let mut basis: Vec<Vec<f64>> = (0..q.ncols()).map(|j| q.col_as_slice(j).to_vec()).collect();
     let turns = turns(model, poses);
     let mut draw = ChaCha8Rng::seed_from_u64(seed.wrapping_add(3));
     let mut out = vec![1.0; rows * joints];
@@ -89,7 +88,7 @@ pub(super) fn approach(model: &Model, sight: &Sight, poses: &Measurements, seed:
         let mut rest: Vec<f64> = (0..3 * rows).map(|i| side[i / 3] * turn(i)).collect();
         let whole = length(&rest);
         for (along, sum) in basis.iter().zip(&sums) {
-            rest.iter_mut().zip(along).for_each(|(value, b)| *value -= sum * b);
+            axpy(-sum, along, &mut rest);
         }
         let visible = length(&rest);
         // A joint that does not move the measured point has nothing to show.
@@ -125,5 +124,5 @@ fn turns(model: &Model, poses: &Measurements) -> Vec<f64> {
 }
 
 fn length(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum::<f64>().sqrt()
+    dot(values, values).sqrt()
 }

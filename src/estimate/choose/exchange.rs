@@ -3,12 +3,13 @@
 //! Each term is a weighted log determinant over its own seen parameters, in coordinates in which the random candidates are
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
-use super::sight::Sight;
+use super::sight::{Sight, factor, product};
 use crate::estimate::model::Model;
+use crate::estimate::triangle::axpy;
 use crate::robot::Measurements;
-use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, Matrix3};
-use rayon::prelude::*;
 
 /// Information in every direction before the first pose, in units of an average candidate's: makes the first steps defined.
 const RIDGE: f64 = 1e-3;
@@ -34,21 +35,14 @@ impl Term {
     /// `None` where the candidates do not tell the parameters.
     pub fn new(weight: f64, sight: Sight, model: &Model, drawn: &Measurements) -> Option<Self> {
         let scale = (drawn.rows() as f64).sqrt();
-        let inverse = sight.factor(model, drawn).inverse()?;
-        let round = Mat::from_fn(inverse.nrows(), inverse.ncols(), |i, j| inverse[(i, j)] * scale);
+        let inverse = factor(&sight.rows(model, drawn)).inverse()?;
+        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j) * scale);
         Some(Self { weight, sight, round })
     }
 
     fn state(&self, model: &Model, pool: &Measurements) -> State {
-        let p = self.sight.free().len();
-        let mut rows = self.sight.rows(model, pool);
-        rows.par_chunks_mut(p.max(1)).with_min_len(256).for_each(|row| {
-            // Upper triangular and from the right: in place.
-            for j in (0..p).rev() {
-                row[j] = (0..=j).map(|i| row[i] * self.round[(i, j)]).sum();
-            }
-        });
-        State { weight: self.weight, p, rows, cover: Vec::new(), spread: vec![Matrix3::zeros(); pool.rows()] }
+        let rows = product(self.sight.rows(model, pool).as_ref(), self.round.as_ref());
+        State { weight: self.weight, p: self.round.ncols(), rows, cover: Mat::zeros(0, 0), spread: vec![[0.0; 6]; pool.rows()] }
     }
 }
 
@@ -56,87 +50,84 @@ impl Term {
 struct State {
     weight: f64,
     p: usize,
-    rows: Vec<f64>,
+    /// A of all candidates, three rows each.
+    rows: Mat<f64>,
     /// V, p x p.
-    cover: Vec<f64>,
-    /// A V A^T of every candidate.
-    spread: Vec<Matrix3<f64>>,
+    cover: Mat<f64>,
+    /// A V A^T of every candidate: xx, yy, zz, xy, xz, yz.
+    spread: Vec<[f64; 6]>,
 }
 
+/// Entry of a symmetric 3 x 3 matrix in the order of [`State::spread`].
+const PLACE: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
+
 impl State {
-    fn block(&self, candidate: usize) -> &[f64] {
-        &self.rows[3 * self.p * candidate..3 * self.p * (candidate + 1)]
+    fn block(&self, candidate: usize) -> MatRef<'_, f64> {
+        self.rows.as_ref().subrows(3 * candidate, 3)
     }
 
     /// V and all spreads anew.
     fn reset(&mut self, chosen: &[usize]) {
         let p = self.p;
+        let mut seen = Mat::zeros(3 * chosen.len(), p);
+        for (i, candidate) in chosen.iter().enumerate() {
+            seen.as_mut().subrows_mut(3 * i, 3).copy_from(self.block(*candidate));
+        }
         let mut information = DMatrix::<f64>::identity(p, p) * RIDGE;
-        for candidate in chosen {
-            let block = DMatrix::from_row_slice(3, p, self.block(*candidate));
-            information += block.transpose() * &block;
+        let squares = product(seen.transpose(), seen.as_ref());
+        for j in 0..p {
+            axpy(1.0, squares.col_as_slice(j), information.column_mut(j).as_mut_slice());
         }
         // Positive definite by its ridge.
         let cover = information.cholesky().map_or_else(|| DMatrix::identity(p, p), |factor| factor.inverse());
-        self.cover = cover.as_slice().to_vec();
-        let (rows, cover) = (&self.rows, &self.cover);
-        self.spread.par_iter_mut().enumerate().with_min_len(64).for_each(|(candidate, spread)| {
-            let block = &rows[3 * p * candidate..3 * p * (candidate + 1)];
-            *spread = product(block, &times(cover, block, p), p);
-        });
+        self.cover = Mat::from_fn(p, p, |i, j| cover[(i, j)]);
+        let wide = product(self.rows.as_ref(), self.cover.as_ref());
+        self.spread.fill([0.0; 6]);
+        for j in 0..p {
+            let (rows, wide) = (self.rows.col_as_slice(j), wide.col_as_slice(j));
+            for (candidate, spread) in self.spread.iter_mut().enumerate() {
+                let (a, b) = (&rows[3 * candidate..3 * candidate + 3], &wide[3 * candidate..3 * candidate + 3]);
+                spread[0] += a[0] * b[0];
+                spread[1] += a[1] * b[1];
+                spread[2] += a[2] * b[2];
+                spread[3] += a[0] * b[1];
+                spread[4] += a[0] * b[2];
+                spread[5] += a[1] * b[2];
+            }
+        }
     }
 
     /// Takes a pose in (`sign` 1) or out (-1).
     fn update(&mut self, candidate: usize, sign: f64) {
-        let p = self.p;
-        let wide = times(&self.cover, self.block(candidate), p);
-        let Some(small) = (Matrix3::identity() * sign + self.spread[candidate]).try_inverse() else { return };
-        for i in 0..p {
-            let left: [f64; 3] = [0, 1, 2].map(|c| (0..3).map(|a| wide[a * p + i] * small[(a, c)]).sum::<f64>());
-            for j in 0..p {
-                self.cover[i * p + j] -= left[0] * wide[j] + left[1] * wide[p + j] + left[2] * wide[2 * p + j];
-            }
+        let wide = product(self.cover.as_ref(), self.block(candidate).transpose());
+        let own = Matrix3::from_fn(|a, c| self.spread[candidate][PLACE[a][c]]);
+        let Some(small) = (Matrix3::identity() * sign + own).try_inverse() else { return };
+        let small = Mat::from_fn(3, 3, |a, c| small[(a, c)]);
+        let left = product(wide.as_ref(), small.as_ref());
+        matmul(&mut self.cover, Accum::Add, &left, wide.transpose(), -1.0, Par::Seq);
+        let across = product(self.rows.as_ref(), wide.as_ref());
+        let inside = product(across.as_ref(), small.as_ref());
+        let [across, inside] = [&across, &inside].map(|m| [m.col_as_slice(0), m.col_as_slice(1), m.col_as_slice(2)]);
+        for (other, spread) in self.spread.iter_mut().enumerate() {
+            let (x, y, z) = (3 * other, 3 * other + 1, 3 * other + 2);
+            let part =
+                |a: usize, c: usize| inside[0][a] * across[0][c] + inside[1][a] * across[1][c] + inside[2][a] * across[2][c];
+            spread[0] -= part(x, x);
+            spread[1] -= part(y, y);
+            spread[2] -= part(z, z);
+            spread[3] -= part(x, y);
+            spread[4] -= part(x, z);
+            spread[5] -= part(y, z);
         }
-        let rows = &self.rows;
-        self.spread.par_iter_mut().enumerate().with_min_len(256).for_each(|(other, spread)| {
-            let across = product(&rows[3 * p * other..3 * p * (other + 1)], &wide, p);
-            *spread -= across * small * across.transpose();
-        });
     }
 
     /// What the log determinant gains by a pose.
     fn gain(&self, candidate: usize) -> f64 {
-        self.weight * (Matrix3::identity() + self.spread[candidate]).determinant().max(f64::MIN_POSITIVE).ln()
+        let [x, y, z, xy, xz, yz] = self.spread[candidate];
+        let (x, y, z) = (1.0 + x, 1.0 + y, 1.0 + z);
+        let determinant = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz);
+        self.weight * determinant.max(f64::MIN_POSITIVE).ln()
     }
-}
-
-/// V A^T as three vectors.
-fn times(cover: &[f64], block: &[f64], p: usize) -> Vec<f64> {
-    let mut out = vec![0.0; 3 * p];
-    for (axis, row) in block.chunks_exact(p).enumerate() {
-        for (value, line) in out[axis * p..(axis + 1) * p].iter_mut().zip(cover.chunks_exact(p)) {
-            *value = dot(line, row);
-        }
-    }
-    out
-}
-
-/// A W for three rows and three vectors.
-fn product(block: &[f64], wide: &[f64], p: usize) -> Matrix3<f64> {
-    Matrix3::from_fn(|a, c| dot(&block[a * p..(a + 1) * p], &wide[c * p..(c + 1) * p]))
-}
-
-/// Four sums at once: three times as fast, and in a fixed order.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (left, right) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in left.zip(right) {
-        for lane in 0..4 {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 impl Criterion {
@@ -181,15 +172,9 @@ impl Criterion {
 
 /// The free candidate of most gain; the first of equals.
 fn best(states: &[State], taken: &[bool]) -> Option<(usize, f64)> {
-    let gains: Vec<f64> = (0..taken.len())
-        .into_par_iter()
-        .with_min_len(256)
-        .map(
-            |candidate| if taken[candidate] { f64::NEG_INFINITY } else { states.iter().map(|state| state.gain(candidate)).sum() },
-        )
-        .collect();
     let mut found: Option<(usize, f64)> = None;
-    for (candidate, gain) in gains.into_iter().enumerate() {
+    for candidate in (0..taken.len()).filter(|candidate| !taken[*candidate]) {
+        let gain: f64 = states.iter().map(|state| state.gain(candidate)).sum();
         if gain.is_finite() && found.is_none_or(|(_, most)| gain > most) {
             found = Some((candidate, gain));
         }

@@ -18,6 +18,7 @@ use exchange::{Criterion, Term};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
+use sight::gather;
 
 /// What the poses are for.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,9 +116,10 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
     let whole = whole.clone();
     let (direction, approach_seen) = drive::approach(&model, &whole, &poses, wish.seed);
 
-    let sets: Vec<Measurements> = random_sets(&drawn, wish.count, wish.seed).iter().map(|rows| subset(&drawn, rows)).collect();
-    let random: Vec<Score> = sets.par_iter().map(|set| whole.score(&model, set, &workspace)).collect();
-    let score = whole.score(&model, &poses, &workspace);
+    let sets = random_sets(&drawn, wish.count, wish.seed);
+    let (rows, around) = (whole.rows(&model, &drawn), whole.rows(&model, &workspace));
+    let random: Vec<Score> = sets.par_iter().map(|set| whole.score_rows(&gather(&rows, set), &around, &workspace)).collect();
+    let score = whole.score_rows(&whole.rows(&model, &poses), &around, &workspace);
     let separation = match &wish.aim {
         Aim::Information => Vec::new(),
         Aim::Separation(names) => separations(&model, names, &drawn, &poses, &sets)?,
@@ -160,7 +162,7 @@ fn separations(
     [a, b]: &[String; 2],
     drawn: &Measurements,
     poses: &Measurements,
-    sets: &[Measurements],
+    sets: &[Vec<usize>],
 ) -> Result<Vec<Separation>, String> {
     let mut out = Vec::new();
     for (effect, rival) in [(a, b), (b, a)] {
@@ -168,8 +170,9 @@ fn separations(
         let rest: Vec<usize> = (0..model.stack.specs().len()).filter(|k| !own.contains(k) && !other.contains(k)).collect();
         let sight = Sight::of(model, drawn, &[&rest[..], &other, &own].concat());
         let told: Vec<usize> = sight.free().iter().copied().filter(|k| own.contains(k)).collect();
-        let (log, sigma) = sight.remainder(model, poses, told.len());
-        let random: Vec<(f64, Vec<f64>)> = sets.par_iter().map(|set| sight.remainder(model, set, told.len())).collect();
+        let (log, sigma) = sight.remainder(&sight.rows(model, poses), told.len());
+        let rows = sight.rows(model, drawn);
+        let random: Vec<(f64, Vec<f64>)> = sets.par_iter().map(|set| sight.remainder(&gather(&rows, set), told.len())).collect();
         let usual = median(random.iter().map(|(log, _)| *log).collect());
         let sigma = told
             .iter()

@@ -1,14 +1,19 @@
 //! What poses would tell: the seen parameters, rows of their whitened Jacobian, and what would follow for the estimate.
 
 use super::median;
-use crate::estimate::factor::Factor;
+use crate::estimate::factor::{Factor, Tall};
 use crate::estimate::model::Model;
-use crate::estimate::observe::{Visibility, indices, visibility};
+use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::piece::Unmodelled;
 use crate::estimate::problem::Problem;
 use crate::robot::Measurements;
-use faer::Mat;
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use nalgebra::Vector3;
 use rayon::prelude::*;
+
+/// Rows that are factored at once.
+const CHUNK: usize = 900;
 
 /// Parameters that are told by candidate poses as a whole, in order of precedence.
 #[derive(Debug, Clone)]
@@ -48,77 +53,116 @@ impl Sight {
         &self.free
     }
 
-    /// Three rows a pose, row-major: derivatives by the free parameters in units of prior sigma, over the point's sigma.
-    pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Vec<f64> {
+    /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma.
+    pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Mat<f64> {
         let p = self.free.len();
         let mut column = vec![usize::MAX; model.stack.specs().len()];
         for (j, parameter) in self.free.iter().enumerate() {
             column[*parameter] = j;
         }
-        let mut out = vec![0.0; 3 * p * data.rows()];
-        out.par_chunks_mut((3 * p).max(1)).enumerate().with_min_len(32).for_each_init(
-            || model.stack.scratch(&model.robot),
-            |scratch, (row, block)| {
-                model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
-                    let j = column[parameter];
-                    if j != usize::MAX {
-                        for axis in 0..3 {
-                            block[axis * p + j] += derivative[axis] * self.prior[j] / data.sigma[row][axis];
+        let poses: Vec<Vec<Vector3<f64>>> = (0..data.rows())
+            .into_par_iter()
+            .with_min_len(32)
+            .map_init(
+                || model.stack.scratch(&model.robot),
+                |scratch, row| {
+                    let mut line = vec![Vector3::zeros(); p];
+                    model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
+                        if let Some(sum) = line.get_mut(column[parameter]) {
+                            *sum += derivative;
                         }
-                    }
-                });
-            },
-        );
+                    });
+                    line
+                },
+            )
+            .collect();
+        let mut out = Mat::zeros(3 * data.rows(), p);
+        for (j, prior) in self.prior.iter().enumerate() {
+            let column = out.col_as_slice_mut(j);
+            for (row, (line, sigma)) in poses.iter().zip(&data.sigma).enumerate() {
+                let derivative = line[j] * *prior;
+                column[3 * row] = derivative.x / sigma.x;
+                column[3 * row + 1] = derivative.y / sigma.y;
+                column[3 * row + 2] = derivative.z / sigma.z;
+            }
+        }
         out
-    }
-
-    /// The factor of these rows; the right-hand side is zero.
-    pub(super) fn factor(&self, model: &Model, data: &Measurements) -> Factor {
-        let p = self.free.len();
-        let rows = self.rows(model, data);
-        // Chunks keep the memory small for many candidates.
-        let factors = rows.chunks((300 * p).max(1)).map(|chunk| {
-            Factor::of(&Mat::from_fn(chunk.len() / p.max(1), p + 1, |i, j| if j < p { chunk[i * p + j] } else { 0.0 }))
-        });
-        factors.reduce(|sum, factor| sum.stack(&factor)).unwrap_or_else(|| Factor::of(&Mat::zeros(1, p + 1)))
     }
 
     /// What measuring `data` would give, with the prediction's uncertainty at the poses of `workspace`.
     pub fn score(&self, model: &Model, data: &Measurements, workspace: &Measurements) -> Score {
-        let p = self.free.len();
-        let factor = self.factor(model, data);
-        let singular = factor.singular_values(&vec![1.0; p]);
-        let o1 = indices(&singular, data.rows()).into_iter().find(|(name, ..)| *name == "O1").map_or(0.0, |(_, value, _)| value);
-        let Some(inverse) = factor.inverse() else {
-            let (sigma, none) = (vec![f64::INFINITY; p], f64::INFINITY);
-            return Score { points: data.rows(), o1, sigma, median: none, p95: none, max: none };
-        };
-        let sigma = (0..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse[(i, j)])));
-        let rows = self.rows(model, workspace);
-        let mut lengths: Vec<f64> = (0..workspace.rows())
-            .map(|row| {
-                let parts = (0..3).map(|axis| {
-                    let derivative = &rows[(3 * row + axis) * p..(3 * row + axis + 1) * p];
-                    let along = |j: usize| (0..=j).map(|i| derivative[i] * inverse[(i, j)]).sum::<f64>();
-                    norm((0..p).map(along)) * workspace.sigma[row][axis]
-                });
-                norm(parts)
-            })
-            .collect();
-        lengths.sort_by(f64::total_cmp);
-        let at = |share: f64| lengths.get((share * (lengths.len() - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN);
-        Score { points: data.rows(), o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: median(lengths) }
+        self.score_rows(&self.rows(model, data), &self.rows(model, workspace), workspace)
     }
 
-    /// Log determinant of what is left of the last `count` parameters when all others were fitted, and their sigmas (SI).
-    pub(super) fn remainder(&self, model: &Model, data: &Measurements, count: usize) -> (f64, Vec<f64>) {
-        let p = self.free.len();
-        let factor = self.factor(model, data);
-        let diagonal = |j: usize| factor.column(j).get(j).map_or(0.0, |value| value.abs());
-        let log = (p - count..p).map(|j| 2.0 * diagonal(j).ln()).sum();
-        let Some(inverse) = factor.inverse() else { return (log, vec![f64::INFINITY; count]) };
-        (log, (p - count..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse[(i, j)]))).collect())
+    /// The same of [`Self::rows`] of the data and of the workspace.
+    pub(super) fn score_rows(&self, rows: &Mat<f64>, around: &Mat<f64>, workspace: &Measurements) -> Score {
+        let (p, points) = (self.free.len(), rows.nrows() / 3);
+        let factor = factor(rows);
+        // The singular values' product is that of the diagonal.
+        let mean_log = (0..p).map(|j| factor.column(j)[j].abs().ln()).sum::<f64>() / p as f64;
+        let o1 = mean_log.exp() / (points as f64).sqrt();
+        let Some(inverse) = factor.inverse() else {
+            let (sigma, none) = (vec![f64::INFINITY; p], f64::INFINITY);
+            return Score { points, o1, sigma, median: none, p95: none, max: none };
+        };
+        let inverse = Mat::from_fn(p, p, |i, j| inverse.at(i, j));
+        let sigma = (0..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse[(i, j)])));
+        let spread = product(around.as_ref(), inverse.as_ref());
+        let mut squares = vec![0.0; around.nrows()];
+        for j in 0..p {
+            for (sum, value) in squares.iter_mut().zip(spread.col_as_slice(j)) {
+                *sum += value * value;
+            }
+        }
+        let length = |(squares, sigma): (&[f64], &Vector3<f64>)| norm((0..3).map(|axis| squares[axis].sqrt() * sigma[axis]));
+        let mut lengths: Vec<f64> = squares.chunks_exact(3).zip(&workspace.sigma).map(length).collect();
+        lengths.sort_by(f64::total_cmp);
+        let at = |share: f64| lengths.get((share * (lengths.len() - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN);
+        Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: median(lengths) }
     }
+
+    /// Of [`Self::rows`]: the log determinant of what is left of the last `count` parameters when all others were fitted, and their
+    /// sigmas (SI).
+    pub(super) fn remainder(&self, rows: &Mat<f64>, count: usize) -> (f64, Vec<f64>) {
+        let p = self.free.len();
+        let factor = factor(rows);
+        let log = (p - count..p).map(|j| 2.0 * factor.column(j)[j].abs().ln()).sum();
+        let Some(inverse) = factor.inverse() else { return (log, vec![f64::INFINITY; count]) };
+        (log, (p - count..p).map(|i| self.prior[i] * norm((i..p).map(|j| inverse.at(i, j)))).collect())
+    }
+}
+
+/// Rows of chosen poses.
+pub(super) fn gather(rows: &Mat<f64>, poses: &[usize]) -> Mat<f64> {
+    let mut out = Mat::zeros(3 * poses.len(), rows.ncols());
+    for j in 0..rows.ncols() {
+        let (from, to) = (rows.col_as_slice(j), out.col_as_slice_mut(j));
+        for (i, pose) in poses.iter().enumerate() {
+            to[3 * i..3 * i + 3].copy_from_slice(&from[3 * pose..3 * pose + 3]);
+        }
+    }
+    out
+}
+
+/// The factor of such rows; the right-hand side is zero.
+pub(super) fn factor(rows: &Mat<f64>) -> Factor {
+    let p = rows.ncols();
+    let mut tall = Tall::new(p + 1, rows.nrows().min(CHUNK));
+    for start in (0..rows.nrows()).step_by(CHUNK) {
+        let height = CHUNK.min(rows.nrows() - start);
+        for (j, column) in tall.chunk(height).into_iter().take(p).enumerate() {
+            column.copy_from_slice(&rows.col_as_slice(j)[start..start + height]);
+        }
+        tall.absorb(height);
+    }
+    tall.factor()
+}
+
+/// The product of two matrices.
+pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut out = Mat::zeros(a.nrows(), b.ncols());
+    matmul(&mut out, Accum::Replace, a, b, 1.0, Par::Seq);
+    out
 }
 
 fn norm(values: impl Iterator<Item = f64>) -> f64 {

@@ -6,7 +6,7 @@
 use crate::estimate::model::Model;
 use crate::estimate::piece::{HUBER, Weight};
 use crate::estimate::problem::Problem;
-use faer::Mat;
+use crate::estimate::triangle::Triangle;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -73,10 +73,10 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
 }
 
 /// H = G G', G = J R^-1 whitened, R^-1 upper triangular.
-fn leverage(jacobian: &[Vector3<f64>], inverse: &Mat<f64>, scale: &Weight) -> Matrix3<f64> {
+fn leverage(jacobian: &[Vector3<f64>], inverse: &Triangle, scale: &Weight) -> Matrix3<f64> {
     let mut leverage = Matrix3::zeros();
     for column in 0..jacobian.len() {
-        let g: Vector3<f64> = (0..=column).map(|i| jacobian[i] * inverse[(i, column)]).sum();
+        let g: Vector3<f64> = jacobian.iter().zip(inverse.column(column)).map(|(derivative, share)| derivative * *share).sum();
         let g = scale.apply(&g);
         leverage += g * g.transpose();
     }
