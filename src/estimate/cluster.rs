@@ -57,7 +57,13 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
 }
 
 /// What a row measured, after the stack's `point` of it.
-fn pieces(problem: &Problem, model: &Model, row: usize, point: &Vector3<f64>, scratch: &Scratch) -> [Option<Piece>; 3] {
+pub(super) fn pieces(
+    problem: &Problem,
+    model: &Model,
+    row: usize,
+    point: &Vector3<f64>,
+    scratch: &Scratch,
+) -> [Option<Piece>; 3] {
     let (data, beyond) = (problem.data, problem.unmodelled);
     let own = piece::point(data, row, &data.residual(row, point), beyond);
     let turn = piece::turn(model, data, row, scratch).map(|rest| Piece::of_turn(&rest, beyond));

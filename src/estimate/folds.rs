@@ -1,15 +1,28 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
 //! blocks. Rows of one pose stay together: a pose that was seen is no test.
+//!
+//! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
+//! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
 
+use super::cluster::pieces;
+use super::factor::Factor;
 use super::fit::{Fate, FitOptions, Fitted, fit};
 use super::model::Model;
 use super::piece::miss;
+use super::problem::Problem;
 use super::repeats::Poses;
 use crate::robot::Measurements;
+use faer::Mat;
+use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
+
+/// Least share of what is known in any direction that must be left without a fold: with less, other parameters may be seen.
+const LEFT: f64 = 0.02;
+/// Departure from a straight line (of the fold's errors) up to which a step is small.
+const STRAIGHT: f64 = 0.01;
 
 /// Errors (m) of rows under fits without them, in the order of the fitted rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,9 +34,9 @@ pub struct Folds {
     pub blocks: Vec<f64>,
 }
 
-/// Repeats a fit `2 * count` times, each without a part of its rows. `None` where the poses are too few for it.
+/// Takes `2 * count` parts of its rows off a fit, each in turn. `None` where the poses are too few for it.
 ///
-/// Each starts at the whole fit's solution and estimates what that one saw; which rows were set aside is taken over.
+/// What the whole fit saw is estimated; which rows were set aside is taken over.
 pub fn cross_validate(
     model: &Model,
     data: &Measurements,
@@ -44,7 +57,13 @@ pub fn cross_validate(
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let random = deal(&order, rows.len(), count);
     let parts: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
-    let errors: Vec<Vec<f64>> = parts.par_iter().map(|part| without(model, data, rows, &candidates, part)).collect();
+    let problem = Problem { data, rows, unmodelled: fitted.beyond() };
+    let near = Near::of(&problem, model, fitted);
+    let one = |part: &&Vec<usize>| {
+        let close = near.as_ref().and_then(|near| near.without(&problem, model, part));
+        close.unwrap_or_else(|| without(model, data, rows, &candidates, part))
+    };
+    let errors: Vec<Vec<f64>> = parts.par_iter().map(one).collect();
     let (one, other) = errors.split_at(count);
     Some(Folds { count, random: gather(data, rows, &random, one), blocks: gather(data, rows, &blocks, other) })
 }
@@ -64,6 +83,95 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
         fold.sort_unstable();
     }
     folds
+}
+
+/// The problem at the whole fit's solution.
+struct Near {
+    free: Vec<usize>,
+    factor: Factor,
+    inverse: Mat<f64>,
+}
+
+impl Near {
+    /// `None` where bounds are in the way or the factor is singular.
+    fn of(problem: &Problem, model: &Model, fitted: &Fitted) -> Option<Self> {
+        if model.known.values().any(|known| known.bounds.is_some()) {
+            return None;
+        }
+        let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+        let factor = problem.evaluate(model, &free).factor;
+        let inverse = factor.inverse()?;
+        let inverse = Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j));
+        Some(Self { free, factor, inverse })
+    }
+
+    /// Errors of the rows `part` under a fit to the others. `None` where that is farther than a small step.
+    fn without(&self, problem: &Problem, model: &Model, part: &[usize]) -> Option<Vec<f64>> {
+        let p = self.free.len();
+        let (jacobian, errors, shares) = self.linear(problem, model, part);
+        let seen = &jacobian * &self.inverse;
+        let taken = seen.transpose() * &seen;
+        let left = DMatrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)) - taken[(i, j)]);
+        let factor = left.cholesky()?;
+        if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < LEFT) {
+            return None;
+        }
+        let gradient = |j: usize| errors.iter().zip(seen.col_as_slice(j)).map(|(error, seen)| error * seen).sum::<f64>();
+        let along = factor.solve(&DVector::from_fn(p, |j, _| self.factor.entry(j, p) - gradient(j)));
+        let mut other = model.clone();
+        for (i, parameter) in self.free.iter().enumerate() {
+            other.x[*parameter] += (i..p).map(|j| self.inverse[(i, j)] * along[j]).sum::<f64>();
+        }
+        let mut scratch = other.stack.scratch(&other.robot);
+        let after = part.iter().flat_map(|row| {
+            let point = other.stack.point(&other.robot, problem.data, *row, &other.x, &mut scratch);
+            pieces(problem, &other, *row, &point, &scratch).into_iter().flatten().map(|piece| piece.error).collect::<Vec<_>>()
+        });
+        let after: Vec<f64> = after.zip(&shares).flat_map(|(error, share)| <[f64; 3]>::from(error * *share)).collect();
+        let (mut bend, mut whole) = (0.0, 0.0);
+        for (i, (before, after)) in errors.iter().zip(&after).enumerate() {
+            let straight = before - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>();
+            whole += straight * straight;
+            bend += (after - straight).powi(2);
+        }
+        if bend > STRAIGHT * STRAIGHT * whole {
+            return None;
+        }
+        Some(part.iter().map(|row| miss(&other, problem.data, *row, &mut scratch).length).collect())
+    }
+
+    /// Whitened derivatives and errors of the pieces of some rows, three lines each, and the root of each one's Huber weight.
+    fn linear(&self, problem: &Problem, model: &Model, part: &[usize]) -> (Mat<f64>, Vec<f64>, Vec<f64>) {
+        let p = self.free.len();
+        let mut column = vec![usize::MAX; model.stack.specs().len()];
+        for (j, parameter) in self.free.iter().enumerate() {
+            column[*parameter] = j;
+        }
+        let mut scratch = model.stack.scratch(&model.robot);
+        let (mut lines, mut errors, mut shares) = (Vec::new(), Vec::new(), Vec::new());
+        for row in part {
+            let point = model.stack.point(&model.robot, problem.data, *row, &model.x, &mut scratch);
+            for piece in pieces(problem, model, *row, &point, &scratch).into_iter().flatten() {
+                let share = piece.share();
+                let mut line = vec![Vector3::zeros(); p];
+                piece.derivatives(model, &point, &mut scratch, |parameter, derivative| {
+                    if let Some(sum) = line.get_mut(column[parameter]) {
+                        *sum += derivative * share;
+                    }
+                });
+                lines.push(line);
+                errors.extend(<[f64; 3]>::from(piece.error * share));
+                shares.push(share);
+            }
+        }
+        let mut jacobian = Mat::zeros(errors.len(), p);
+        for j in 0..p {
+            for (to, line) in jacobian.col_as_slice_mut(j).chunks_exact_mut(3).zip(&lines) {
+                to.copy_from_slice(line[j].as_slice());
+            }
+        }
+        (jacobian, errors, shares)
+    }
 }
 
 /// Errors of the rows `part` under a fit to the others.

@@ -50,6 +50,31 @@ fn folds_of_a_complete_model_show_the_noise_and_what_its_parameters_cost() {
     assert!(rms(&training) < 0.95 * SIGMA * 3f64.sqrt());
 }
 
+/// One step from the whole fit is as good as ten more fits: to 1 % of the noise, outliers among the rows or not.
+#[test]
+fn a_fold_is_what_a_fit_without_its_rows_says() {
+    let effects = [&GEOMETRY[..], &["reduction_ratio"]].concat();
+    for (seed, outlier) in [(230, 0.0), (231, 6e-4)] {
+        let (mut data, _) = recording(&fixture::offset_wrist(), &effects, 80, seed);
+        data.position[33].x += outlier;
+        let found = folds(&data, &effects, 5).expect("enough poses").blocks;
+        let robot = RobotModel::new(fixture::offset_wrist());
+        let mut differences = Vec::new();
+        for block in 0..5 {
+            let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
+            let mut model = model(&robot, align(&robot, &data, &kept), &effects);
+            let candidates: Vec<usize> = (0..model.x.len()).collect();
+            fit(&mut model, &data, &FitOptions { rows: &kept, candidates: &candidates });
+            let predicted = model.predict(&data);
+            differences
+                .extend((16 * block..16 * (block + 1)).map(|row| found[row] - (data.position[row] - predicted[row]).norm()));
+        }
+        let off = rms(&differences) / (SIGMA * 3f64.sqrt());
+        println!("folds against refits: {off:.1e} of the noise");
+        assert!(off < 0.01, "outlier {outlier}: {off:.4} of the noise");
+    }
+}
+
 #[test]
 fn rows_of_one_pose_are_never_on_both_sides() {
     let (once, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 60, 5);
