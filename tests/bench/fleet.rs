@@ -83,7 +83,7 @@ fn add(spent: &mut BTreeMap<&str, f64>, part: &'static str, since: f64) -> f64 {
 }
 
 /// CPU time of all threads, s.
-fn cpu_seconds() -> f64 {
+pub fn cpu_seconds() -> f64 {
     let threads = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
     let nanoseconds = threads.filter_map(|thread| {
         let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
