@@ -59,7 +59,8 @@ fn whole(manifest: &Manifest) -> String {
     let mut text = format!("run {}, {}\n", manifest.run_id, log::status(manifest));
     text.push_str(&manifest.error.as_ref().map_or_else(String::new, |error| format!("error: {error}\n")));
     let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
-    text.push_str(&format!("started {}{seconds}\n", manifest.started));
+    let memory = manifest.peak_memory_bytes.map_or_else(String::new, |bytes| format!(", {:.0} MB at most", bytes as f64 / 1e6));
+    text.push_str(&format!("started {}{seconds}{memory}\n", manifest.started));
     text.push_str(&format!("pipeline {}, {}, seed {}\n", manifest.pipeline.name, manifest.pipeline.file, manifest.seed));
     for set in &manifest.overrides {
         text.push_str(&format!("set on the command line: {} = {}\n", set.target, set.value));

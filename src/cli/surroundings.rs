@@ -12,6 +12,8 @@ pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
             name: env!("CARGO_PKG_NAME").into(),
             version: env!("CARGO_PKG_VERSION").into(),
             target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+            revision: option_env!("CALIB_REVISION").map(Into::into),
+            rustc: option_env!("CALIB_RUSTC").map(Into::into),
         },
         host: Host {
             name: host_name(),
@@ -23,12 +25,20 @@ pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
         environment: environment(),
         command_line: command_line.iter().map(|part| part.to_string_lossy().into_owned()).collect(),
         now: SystemTime::now,
+        peak_memory,
         run_id: ulid::Ulid::generate().to_string(),
     }
 }
 
 pub(super) fn now() -> SystemTime {
     SystemTime::now()
+}
+
+/// Of this process so far, bytes; the kernel tells it on Linux alone.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
 }
 
 pub(super) fn cores() -> usize {

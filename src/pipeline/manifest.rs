@@ -21,6 +21,8 @@ pub struct Surroundings {
     pub environment: BTreeMap<String, String>,
     pub command_line: Vec<String>,
     pub now: fn() -> std::time::SystemTime,
+    /// Bytes that this process had in use at most, where that is known.
+    pub peak_memory: fn() -> Option<u64>,
     /// A fresh id for a run.
     pub run_id: String,
 }
@@ -30,6 +32,11 @@ pub struct Tool {
     pub name: String,
     pub version: String,
     pub target: String,
+    /// Of the sources and of the compiler, where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
+    #[serde(default)]
+    pub revision: Option<String>,
+    #[serde(default)]
+    pub rustc: Option<String>,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -62,6 +69,9 @@ pub struct Manifest {
     pub started: String,
     pub ended: Option<String>,
     pub wall_seconds: Option<f64>,
+    /// Of the whole process up to the end of this run.
+    #[serde(default)]
+    pub peak_memory_bytes: Option<u64>,
     pub stages: Vec<StageReport>,
 }
 
@@ -182,6 +192,7 @@ impl Manifest {
             started,
             ended: None,
             wall_seconds: None,
+            peak_memory_bytes: None,
             stages: plan.stages.iter().map(StageReport::pending).collect(),
         }
     }

@@ -74,6 +74,7 @@ pub fn run(
     let ended = (surroundings.now)();
     manifest.ended = Some(rfc3339(ended));
     manifest.wall_seconds = Some(seconds(begun, ended));
+    manifest.peak_memory_bytes = (surroundings.peak_memory)();
     manifest.status = if result.is_ok() { RunStatus::Done } else { RunStatus::Failed };
     manifest.error = result.as_ref().err().map(ToString::to_string);
     let finished = store.finish_run(record, &manifest);

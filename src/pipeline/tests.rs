@@ -99,12 +99,13 @@ impl Observer for Ear {
 
 fn surroundings() -> Surroundings {
     Surroundings {
-        tool: Tool { name: "calib".into(), version: "0".into(), target: "test".into() },
+        tool: Tool { name: "calib".into(), version: "0".into(), target: "test".into(), revision: None, rustc: None },
         host: Host { name: "test".into(), os: "test".into(), architecture: "test".into(), cores: 1 },
         user: None,
         environment: BTreeMap::new(),
         command_line: vec!["calib".into()],
         now: std::time::SystemTime::now,
+        peak_memory: || None,
         run_id: ulid::Ulid::generate().to_string(),
     }
 }

@@ -26,6 +26,8 @@ use crate::error::{Error, Result};
 
 /// Rows of a row group: a few MB of a recording, so that readers can skip and writers stay small.
 const GROUP_ROWS: usize = 1 << 16;
+/// Tables below this are packed by snappy: making ready a zstd state for every column costs more than what it saves on some kB.
+const SMALL_ROWS: u64 = 4096;
 
 /// Writes one table chunk by chunk; keys ascend within and across chunks.
 pub struct TableWriter {
@@ -45,7 +47,9 @@ pub struct FinishedFile {
 }
 
 struct Open {
-    writer: ArrowWriter<HashingFile>,
+    /// Made into a writer with the first row group, when it is known whether the table is small.
+    file: Option<File>,
+    writer: Option<ArrowWriter<HashingFile>>,
     arrow_schema: SchemaRef,
     content: ContentHasher,
     waiting: Vec<RecordBatch>,
@@ -104,11 +108,19 @@ impl Drop for FinishedFile {
 impl Open {
     fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
         let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
-        let sink = HashingFile { file: BufWriter::with_capacity(1 << 18, file), hasher: blake3::Hasher::new(), bytes: 0 };
-        let arrow_schema = chunk.arrow_schema();
-        let writer = ArrowWriter::try_new(sink, arrow_schema.clone(), Some(properties(schema, &arrow_schema)?));
-        let writer = writer.map_err(|e| parquet_refused(path, e))?;
-        Ok(Self { writer, arrow_schema, content: ContentHasher::new(schema), waiting: Vec::new(), last: None, rows: 0 })
+        let (arrow_schema, content) = (chunk.arrow_schema(), ContentHasher::new(schema));
+        Ok(Self { file: Some(file), writer: None, arrow_schema, content, waiting: Vec::new(), last: None, rows: 0 })
+    }
+
+    fn writer(&mut self, schema: &TableSchema, path: &Path) -> Result<&mut ArrowWriter<HashingFile>> {
+        if let Some(file) = self.file.take() {
+            let capacity = if self.rows < SMALL_ROWS { 1 << 14 } else { 1 << 18 };
+            let sink = HashingFile { file: BufWriter::with_capacity(capacity, file), hasher: blake3::Hasher::new(), bytes: 0 };
+            let properties = properties(schema, &self.arrow_schema, self.rows)?;
+            let writer = ArrowWriter::try_new(sink, self.arrow_schema.clone(), Some(properties));
+            self.writer = Some(writer.map_err(|e| parquet_refused(path, e))?);
+        }
+        self.writer.as_mut().ok_or_else(|| Error::Bug(format!("table {}: no file to write to", schema.name)))
     }
 
     fn push(&mut self, schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<()> {
@@ -130,33 +142,35 @@ impl Open {
         self.rows += batch.num_rows() as u64;
         self.waiting.push(batch.clone());
         let waiting: usize = self.waiting.iter().map(RecordBatch::num_rows).sum();
-        if waiting >= GROUP_ROWS { self.write_groups(path) } else { Ok(()) }
+        if waiting >= GROUP_ROWS { self.write_groups(schema, path) } else { Ok(()) }
     }
 
     /// Writes whole row groups from what is waiting, so that their borders do not depend on the chunks.
-    fn write_groups(&mut self, path: &Path) -> Result<()> {
+    fn write_groups(&mut self, schema: &TableSchema, path: &Path) -> Result<()> {
         let all = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
         let whole = all.num_rows() / GROUP_ROWS * GROUP_ROWS;
         for start in (0..whole).step_by(GROUP_ROWS) {
-            self.write(&all.slice(start, GROUP_ROWS), path)?;
+            self.write(&all.slice(start, GROUP_ROWS), schema, path)?;
         }
         let rest = all.slice(whole, all.num_rows() - whole);
         self.waiting = if rest.num_rows() > 0 { vec![rest] } else { Vec::new() };
         Ok(())
     }
 
-    fn write(&mut self, batch: &RecordBatch, path: &Path) -> Result<()> {
-        self.writer.write(batch).map_err(|e| parquet_refused(path, e))
+    fn write(&mut self, batch: &RecordBatch, schema: &TableSchema, path: &Path) -> Result<()> {
+        self.writer(schema, path)?.write(batch).map_err(|e| parquet_refused(path, e))
     }
 
     fn finish(mut self, schema: &'static TableSchema, path: &Path) -> Result<(TableRef, File)> {
         if !self.waiting.is_empty() {
             let rest = concat_batches(&self.arrow_schema, &self.waiting).map_err(|e| Error::Bug(e.to_string()))?;
-            self.write(&rest, path)?;
+            self.write(&rest, schema, path)?;
         }
+        self.writer(schema, path)?;
+        let Some(mut writer) = self.writer else { return Err(Error::Bug(format!("table {}: no writer", schema.name))) };
         let table_hash = self.content.finish();
-        self.writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
-        let sink = self.writer.into_inner().map_err(|e| parquet_refused(path, e))?;
+        writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
+        let sink = writer.into_inner().map_err(|e| parquet_refused(path, e))?;
         let (file, file_hash, bytes) = sink.close().map_err(|e| refused(path, "write", &e))?;
         Ok((TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes }, file))
     }
@@ -164,7 +178,7 @@ impl Open {
 
 /// Everything that shapes the bytes, so that equal tables make equal files. Schema, key and units are plain key-values besides,
 /// for readers that do not see Arrow's field metadata.
-fn properties(schema: &TableSchema, arrow_schema: &SchemaRef) -> Result<WriterProperties> {
+fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, rows: u64) -> Result<WriterProperties> {
     let index = |name: &String| {
         arrow_schema.index_of(name).map(|i| SortingColumn { column_idx: i as i32, descending: false, nulls_first: false })
     };
@@ -180,8 +194,9 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef) -> Result<WriterPr
         ("calib.units", super::key::canonical(&units.into())),
     ];
     let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
+    let compression = if rows < SMALL_ROWS { Compression::SNAPPY } else { Compression::ZSTD(level) };
     let mut properties = WriterProperties::builder()
-        .set_compression(Compression::ZSTD(level))
+        .set_compression(compression)
         .set_max_row_group_row_count(Some(GROUP_ROWS))
         .set_sorting_columns(Some(sorting))
         .set_key_value_metadata(Some(key_values.map(|(key, value)| KeyValue::new(key.into(), value)).into()))
