@@ -170,8 +170,9 @@ impl Open {
         let Some(mut writer) = self.writer else { return Err(Error::Bug(format!("table {}: no writer", schema.name))) };
         let table_hash = self.content.finish();
         writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
-        let sink = writer.into_inner().map_err(|e| parquet_refused(path, e))?;
-        let (file, file_hash, bytes) = sink.close().map_err(|e| refused(path, "write", &e))?;
+        // Not `into_inner`, which hides what the disk said of the last bytes.
+        writer.finish().map_err(|e| parquet_refused(path, e))?;
+        let (file, file_hash, bytes) = writer.inner_mut().close().map_err(|e| refused(path, "write", &e))?;
         Ok((TableRef { schema: schema.id(), table_hash, file_hash, rows: self.rows, bytes }, file))
     }
 }
@@ -238,8 +239,8 @@ impl Write for HashingFile {
 }
 
 impl HashingFile {
-    fn close(self) -> io::Result<(File, FileHash, u64)> {
-        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        Ok((file, FileHash::of_hasher(&self.hasher), self.bytes))
+    fn close(&mut self) -> io::Result<(File, FileHash, u64)> {
+        self.file.flush()?;
+        Ok((self.file.get_ref().try_clone()?, FileHash::of_hasher(&self.hasher), self.bytes))
     }
 }
