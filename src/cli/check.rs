@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::pipeline::{Override, Plan};
 use crate::stage::STAGES;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Check a pipeline: print the graph of its stages and tables, or every fault with its line.
 #[derive(Args)]
@@ -22,7 +22,21 @@ pub(super) struct CheckArguments {
 }
 
 pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
-    emit(&graph(&Plan::load(&arguments.pipeline, &arguments.set, STAGES)?))
+    let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
+    let files = plan.stages.iter().filter(|stage| stage.entry.name == "robot").flat_map(|stage| &stage.files);
+    let described = files.map(|file| file.path.as_path()).chain(std::iter::once(arguments.pipeline.as_path()));
+    let marks: String = described.filter_map(marked).collect();
+    emit(&(graph(&plan) + &marks))
+}
+
+/// A warning where lines are left that `calib init` marked for the user to fill in.
+fn marked(path: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let lines = text.lines().filter(|line| line.split_once('#').is_some_and(|(_, comment)| comment.contains("REPLACE"))).count();
+    let line = if lines == 1 { "a line is" } else { "lines are" };
+    let path = path.display();
+    (lines > 0)
+        .then(|| format!("\nwarning: {path}: {lines} {line} still marked REPLACE; put your own there and delete the mark\n"))
 }
 
 fn graph(plan: &Plan) -> String {

@@ -2,6 +2,7 @@
 
 mod columns;
 mod correct;
+mod decimal;
 mod parquet;
 mod program;
 mod text;

@@ -1,17 +1,15 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
-use super::surroundings::{cores, default_store, surroundings};
+use super::means::Means;
 use crate::compensate::{Arm, Coverage, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
-use crate::pipeline::{Override, Plan, RunOptions, Selection, run};
-use crate::progress::{Progress, Verbosity};
+use crate::pipeline::Selection;
 use crate::robot::description::RobotDescription;
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements, RobotModel};
-use crate::stage::STAGES;
 use crate::store::frame::FrameBuilder;
 use crate::store::{Store, TableRef};
 use crate::table::{Network, Parameters, Recording, Robot, Table};
@@ -35,15 +33,8 @@ pub(super) struct ModelArguments {
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
     #[arg(long, value_name = "FILE")]
     robot: Option<PathBuf>,
-    /// Overrides a variable, the seed, or a setting of a stage of the pipeline
-    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
-    set: Vec<Override>,
-    /// Where tables and records are kept [default: .calib in the working directory]
-    #[arg(long, value_name = "DIR")]
-    store: Option<PathBuf>,
-    /// Worker threads; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    means: Means,
     /// Prints no progress and no summary; warnings and errors remain
     #[arg(long, short)]
     pub quiet: bool,
@@ -86,7 +77,7 @@ struct TableRecord {
 
 impl ModelArguments {
     pub fn jobs(&self) -> usize {
-        self.jobs.map_or_else(cores, usize::from)
+        self.means.jobs()
     }
 
     /// Loads the model; runs the pipeline's stages that are not done.
@@ -95,9 +86,9 @@ impl ModelArguments {
         if ending == "parquet" {
             return self.of_table();
         }
-        let store = Store::open(self.store.clone().unwrap_or_else(default_store))?;
+        let store = self.means.store()?;
         let record = if matches!(ending.as_str(), "yaml" | "yml") {
-            let plan = Plan::load(&self.model, &self.set, STAGES)?;
+            let plan = self.means.plan(&self.model)?;
             let last = plan
                 .stages
                 .iter()
@@ -107,12 +98,8 @@ impl ModelArguments {
                 return Err(Error::spec(self.model.display().to_string(), message));
             };
             let plan = plan.needed_for(last);
-            let verbosity = if self.quiet { Verbosity::Quiet } else { Verbosity::Normal };
-            let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-            let options = RunOptions { selection: Selection::default(), jobs: self.jobs() };
-            let outcome = run(&plan, &store, &options, &surroundings(command_line), &progress);
-            progress.finish();
-            serde_json::to_value(&outcome?.manifest).map_err(|error| Error::Bug(error.to_string()))?
+            let outcome = self.means.run(&plan, &store, Selection::default(), self.quiet, command_line)?;
+            serde_json::to_value(&outcome.manifest).map_err(|error| Error::Bug(error.to_string()))?
         } else {
             store.manifest(&self.run(&store)?)?
         };

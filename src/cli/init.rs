@@ -1,6 +1,7 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
 mod columns;
+mod names;
 mod robots;
 
 use super::emit;
@@ -77,6 +78,11 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
     emit(&closing(arguments, &found, &robot, &pipeline))
 }
 
+/// Whether no file has columns of joints, or of the measured point.
+fn missing(found: &[Found]) -> [bool; 2] {
+    [found.iter().all(|file| file.joints.is_empty()), found.iter().all(|file| file.point.len() < 3)]
+}
+
 fn closing(arguments: &InitArguments, found: &[Found], robot: &Path, pipeline: &Path) -> String {
     let mut text = String::new();
     for (path, file) in arguments.data.iter().zip(found) {
@@ -89,7 +95,14 @@ fn closing(arguments: &InitArguments, found: &[Found], robot: &Path, pipeline: &
     } else {
         text.push_str(&format!("  1. {robot}: say where the measured point sits on the tool\n"));
     }
-    text.push_str(&format!("  2. {pipeline}: look at the lines marked CHECK\n"));
+    let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(found)).filter(|(_, missing)| *missing);
+    let unknown: Vec<&str> = unknown.map(|(what, _)| what).collect();
+    let name = if found.is_empty() || unknown.is_empty() {
+        String::new()
+    } else {
+        format!("; name {} where it says REPLACE: they were not recognised", unknown.join(" and "))
+    };
+    text.push_str(&format!("  2. {pipeline}: look at the lines marked CHECK{name}\n"));
     text.push_str(&format!("  3. calib check {pipeline}\n  4. calib run {pipeline}\n"));
     text
 }
@@ -121,9 +134,11 @@ fn pipeline_text(arguments: &InitArguments, found: &[Found]) -> String {
     if found.is_empty() {
         out.push_str(EMPTY);
     }
-    for (path, file) in arguments.data.iter().zip(found) {
+    let missing = missing(found);
+    for (k, (path, file)) in arguments.data.iter().zip(found).enumerate() {
         out.push_str(&format!("        - file: {}\n", from_folder(&arguments.folder, path)));
-        out.push_str(&file.yaml());
+        // Joints come first, in the controller's file; the tracker's is the last.
+        out.push_str(&file.yaml([missing[0] && k == 0, missing[1] && k + 1 == found.len()]));
     }
     if found.len() == 2 {
         let by_id = found.iter().all(|file| file.id.is_some());
@@ -180,6 +195,6 @@ const STAGES: &str = "
   - uses: report
     with:
       # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is kept
-      # identity: {operator: , serial: , tool: , tracker: , date: }
-      title: null
+      # identity: {operator: A. Meier, robot serial: 4711, tracker: AT960 no. 123, date: 2026-11-21}     # stands on the report as given
+      title: null                              # the heading; null: the robot's name
 ";

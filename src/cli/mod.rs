@@ -14,6 +14,7 @@ mod identified;
 mod init;
 mod lineage;
 mod log;
+mod means;
 mod pipeline_arguments;
 mod poses;
 mod run;

@@ -1,11 +1,9 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::surroundings::{cores, default_store, surroundings};
+use super::means::Means;
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
-use crate::progress::{Progress, Verbosity};
-use crate::stage::STAGES;
+use crate::pipeline::{Outcome, Plan, Selection};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;
@@ -17,15 +15,8 @@ pub(super) struct PipelineArguments {
     /// The pipeline's YAML file
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
-    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
-    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
-    set: Vec<Override>,
-    /// Where tables and records are kept [default: .calib in the working directory]
-    #[arg(long, value_name = "DIR")]
-    store: Option<PathBuf>,
-    /// Worker threads; no result depends on it [default: all cores]
-    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    means: Means,
     /// Prints one JSON document on stdout
     #[arg(long)]
     pub json: bool,
@@ -36,21 +27,16 @@ pub(super) struct PipelineArguments {
 
 impl PipelineArguments {
     pub fn plan(&self) -> Result<Plan> {
-        Plan::load(&self.pipeline, &self.set, STAGES)
+        self.means.plan(&self.pipeline)
     }
 
     pub fn store(&self) -> Result<Store> {
-        Store::open(self.store.clone().unwrap_or_else(default_store))
+        self.means.store()
     }
 
     /// Runs the selected stages with progress.
     pub fn run(&self, plan: &Plan, store: &Store, selection: Selection, command_line: &[OsString]) -> Result<Outcome> {
-        let verbosity = if self.quiet { Verbosity::Quiet } else { Verbosity::Normal };
-        let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-        let options = RunOptions { selection, jobs: self.jobs.map_or_else(cores, usize::from) };
-        let result = run(plan, store, &options, &surroundings(command_line), &progress);
-        progress.finish();
-        result
+        self.means.run(plan, store, selection, self.quiet, command_line)
     }
 
     /// The result, whose failure is also a document where one is asked for.

@@ -86,13 +86,9 @@ impl Arm {
             direction: Some(vec![0.0; joints]),
             ..Measurements::default()
         };
-        Reach {
-            arm: self,
-            scratch: self.model.stack.scratch(&self.model.robot),
-            data,
-            velocities: vec![Twist::zeros(); joints],
-            sources: Vec::new(),
-        }
+        let mut scratch = self.model.stack.scratch(&self.model.robot);
+        scratch.only_points(true);
+        Reach { arm: self, scratch, data, velocities: vec![Twist::zeros(); joints], sources: Vec::new() }
     }
 }
 
@@ -111,9 +107,13 @@ impl Reach<'_> {
         let Circumstance { payload, temperature, time, direction, current } = circumstance;
         self.data.payload[0] = *payload;
         self.data.temperature = temperature.map(|value| vec![value]);
-        self.data.time = Some(vec![*time]);
-        self.data.direction = Some(direction.clone());
+        let clock = self.data.time.get_or_insert_default();
+        clock.clear();
+        clock.push(*time);
+        self.data.direction.get_or_insert_default().clone_from(direction);
         self.data.current.clone_from(current);
+        // What is computed for one target must not depend on the one before.
+        self.scratch.near(false);
     }
 
     /// How much of the learned correction applies at the command placed last: 1 inside its range, 0 far outside; 1 without one.
@@ -127,7 +127,9 @@ impl Reach<'_> {
     pub(super) fn derivatives(&mut self, q: &[f64], emit: impl FnMut(usize, Vector3<f64>)) {
         self.data.q.copy_from_slice(q);
         let Model { robot, stack, x, .. } = &self.arm.model;
+        self.scratch.only_points(false);
         stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
+        self.scratch.only_points(true);
     }
 
     fn fill_sources(&mut self) {
@@ -142,6 +144,7 @@ impl Chain for Reach<'_> {
         self.data.q.copy_from_slice(q);
         let Model { robot, stack, x, .. } = &self.arm.model;
         stack.point(robot, &self.data, 0, x, &mut self.scratch);
+        self.scratch.near(true);
         let base = &self.arm.base;
         let mut pose = stack.tool(robot, &self.scratch, &mut self.velocities);
         if let Some(correction) = &self.arm.correction {

@@ -2,7 +2,7 @@
 
 use crate::robot::{RobotModel, Travel};
 use crate::spatial::{Pose, Twist};
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 /// m (rad at an arm's length of 1 m): nearer than this the wanted point is reached; controllers round to a micrometre.
 pub const SETTLED: f64 = 1e-10;
@@ -149,20 +149,27 @@ fn harder(damping: f64) -> f64 {
     if damping == 0.0 { 1e-6 } else { damping * 10.0 }
 }
 
-/// J J^T, with ones where an orientation does not count.
-fn normal(jacobian: &[Twist], oriented: bool) -> Matrix6<f64> {
-    let mut sum = Matrix6::zeros();
-    for column in jacobian {
-        sum += column * column.transpose();
-    }
-    if !oriented {
-        for k in 3..6 {
-            sum.row_mut(k).fill(0.0);
-            sum.column_mut(k).fill(0.0);
-            sum[(k, k)] = sum[(0, 0)] + sum[(1, 1)] + sum[(2, 2)];
+/// (J J^T + damping)^-1 of a twist, or of a displacement where the orientation does not count; none where the arm is singular.
+fn solved(jacobian: &[Twist], damping: f64, rest: &Twist, oriented: bool) -> Option<Vector6<f64>> {
+    let solved = if oriented {
+        let mut normal = Matrix6::zeros();
+        for column in jacobian {
+            normal += column * column.transpose();
         }
-    }
-    sum
+        let damping = damping * normal.trace() / 6.0;
+        (normal + Matrix6::identity() * damping).cholesky()?.solve(rest)
+    } else {
+        let mut normal = Matrix3::zeros();
+        for column in jacobian {
+            let v: Vector3<f64> = column.fixed_rows::<3>(0).into();
+            normal += v * v.transpose();
+        }
+        let damping = damping * normal.trace() / 3.0;
+        let rest: Vector3<f64> = rest.fixed_rows::<3>(0).into();
+        let v = (normal + Matrix3::identity() * damping).cholesky()?.solve(&rest);
+        Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0)
+    };
+    solved.iter().all(|value| value.is_finite()).then_some(solved)
 }
 
 /// d + J^T (J J^T + damping)^-1 (e - J d), d the way back to `home`; none where the arm is singular.
@@ -173,8 +180,6 @@ fn step<'a>(
     q: &'a [f64],
     home: &'a [f64],
 ) -> Option<impl Iterator<Item = f64> + 'a> {
-    let normal = normal(jacobian, oriented);
-    let damping_scaled = damping * normal.trace() / 6.0;
     // Pulled home, a damped step would rest between home and the wanted point.
     let pull = if damping == 0.0 { 1.0 } else { 0.0 };
     let back = move |(q, home): (&f64, &f64)| pull * (home - q);
@@ -182,13 +187,7 @@ fn step<'a>(
     for (column, d) in jacobian.iter().zip(q.iter().zip(home).map(back)) {
         rest -= column * d;
     }
-    if !oriented {
-        rest.fixed_rows_mut::<3>(3).fill(0.0);
-    }
-    let solved: Vector6<f64> = (normal + Matrix6::identity() * damping_scaled).cholesky()?.solve(&rest);
-    if !solved.iter().all(|value| value.is_finite()) {
-        return None;
-    }
+    let solved = solved(jacobian, damping, &rest, oriented)?;
     let raw = move |(column, d): (&Twist, f64)| d + column.dot(&solved);
     let largest = jacobian.iter().zip(q.iter().zip(home).map(back)).map(raw).fold(0.0, |most: f64, by| most.max(by.abs()));
     let share = if largest > STRIDE { STRIDE / largest } else { 1.0 };

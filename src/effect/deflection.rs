@@ -29,6 +29,8 @@ pub struct Deflection {
     pub yielding: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
     pub partials: Vec<(usize, Direction)>,
+    /// Whether no partials are kept, where only the motions are wanted.
+    pub(crate) bare: bool,
     first: usize,
     kept: Kept,
 }
@@ -50,6 +52,7 @@ impl Deflection {
             joint,
             station,
             partials: Vec::new(),
+            bare: false,
             first: 0,
             kept: Kept::default(),
         }
@@ -83,10 +86,16 @@ impl Deflection {
         self.first = first;
     }
 
+    fn partial(&mut self, parameter: usize, direction: Direction) {
+        if !self.bare {
+            self.partials.push((self.first + parameter, direction));
+        }
+    }
+
     /// Moves a joint by `p[parameter] * rate`.
     pub fn turn(&mut self, parameter: usize, p: &[f64], joint: usize, rate: f64) {
         self.joint[joint] += p[parameter] * rate;
-        self.partials.push((self.first + parameter, Direction::Joint(joint, rate)));
+        self.partial(parameter, Direction::Joint(joint, rate));
     }
 
     /// Says that a joint yields to a torque more by `compliance` (rad/Nm).
@@ -97,13 +106,13 @@ impl Deflection {
     /// Moves everything beyond a station by the twist `p[parameter] * rate`.
     pub fn shift(&mut self, parameter: usize, p: &[f64], station: usize, rate: Twist) {
         self.station[station] += rate * p[parameter];
-        self.partials.push((self.first + parameter, Direction::Station(station, rate)));
+        self.partial(parameter, Direction::Station(station, rate));
     }
 
     /// Moves the row's anchor by `p[parameter] * rate` (m per unit); no effect that needs torques does.
     pub fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
         self.anchor += rate * p[parameter];
-        self.partials.push((self.first + parameter, Direction::Anchor(rate)));
+        self.partial(parameter, Direction::Anchor(rate));
     }
 
     /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).
@@ -116,6 +125,6 @@ impl Deflection {
 
     /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is the effect's burden.
     pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
-        self.partials.push((self.first + parameter, Direction::Torque(joint, rate)));
+        self.partial(parameter, Direction::Torque(joint, rate));
     }
 }

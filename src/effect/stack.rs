@@ -32,6 +32,20 @@ pub struct Scratch {
     by_joint: Vec<Vector3<f64>>,
     /// The row's target.
     target: Option<usize>,
+    /// Whether `commanded` is near the next row's joints.
+    near: bool,
+}
+
+impl Scratch {
+    /// Whether only points are wanted from now on: then there are no partials.
+    pub(crate) fn only_points(&mut self, only: bool) {
+        self.deflection.bare = only;
+    }
+
+    /// Whether the next row's joints are near those placed last; their sines then follow by addition theorems.
+    pub(crate) fn near(&mut self, near: bool) {
+        self.near = near;
+    }
 }
 
 /// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
@@ -88,6 +102,7 @@ impl EffectStack {
             by_station: vec![Matrix3x6::zeros(); n + 1],
             by_joint: vec![Vector3::zeros(); n],
             target: None,
+            near: false,
         }
     }
 
@@ -97,7 +112,7 @@ impl EffectStack {
     /// the wind-up (rad) cubed.
     pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
         for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
-            *travel = Travel::new(*q);
+            *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
         }
         scratch.deflection.clear();
         scratch.target = robot.gauging().target(data.target(row));

@@ -163,6 +163,7 @@ fn kinds(tables: &Tables) -> Vec<(&'static str, String)> {
         ("fit", of(tables.fit.iter().map(|t| t.0.len()).collect())),
         ("observability", of(tables.observability.iter().map(|t| t.0.len()).collect())),
         ("training", of(tables.training.iter().map(|t| t.0.len()).collect())),
+        ("corrections", of(tables.corrections.iter().map(|t| t.0.len()).collect())),
         ("prediction", of(tables.prediction.iter().map(|t| t.0.len()).collect())),
         ("statistics", of(vec![tables.statistics.0.len()])),
         ("suspects", of(tables.suspects.iter().map(|t| t.0.len()).collect())),

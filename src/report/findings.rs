@@ -16,7 +16,7 @@ pub(super) struct Section {
     kind: &'static str,
     sentence: String,
     /// Name, mean, rms, max.
-    errors: Vec<(&'static str, [String; 3])>,
+    errors: Vec<[String; 4]>,
     facts: Vec<(&'static str, String)>,
     findings: Vec<Finding>,
     not_observable: Vec<String>,
@@ -45,7 +45,8 @@ impl Section {
     pub fn new(tables: &Tables) -> Option<Self> {
         let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
         let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
-        let three = |a: Option<f64>, b: Option<f64>, c: Option<f64>| [a, b, c].map(|v| v.map_or_else(|| "\u{2013}".into(), mm));
+        let figure = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), mm);
+        let errors = |name: &str, mean, rms, max| [name.to_string(), figure(mean), figure(rms), figure(max)];
         let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
         Some(Self {
             kind: match verdict.verdict.as_str() {
@@ -54,11 +55,13 @@ impl Section {
             },
             sentence: sentence(verdict),
             errors: vec![
-                (
+                errors(
                     "before: geometry, zeros and ratios identified",
-                    three(verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
+                    verdict.before_mean_mm,
+                    verdict.before_rms_mm,
+                    verdict.before_max_mm,
                 ),
-                ("after: with the findings", three(verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm)),
+                errors("after: with the findings", verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
             ],
             facts: vec![
                 ("noise of one point, rms", format!("{} mm", mm(verdict.noise_floor_mm))),
@@ -90,12 +93,17 @@ fn sentence(verdict: &VerdictRow) -> String {
     }
 }
 
+/// A chance; what floating point no longer holds is not zero.
+fn chance(p: f64) -> String {
+    if p > 0.0 { significant(p, 2) } else { "< 1e-300".into() }
+}
+
 fn finding(row: &FindingRow, tables: &Tables) -> Finding {
     let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
     let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
     let evidence = [
         ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
-        ("p", row.p_value.map(|v| significant(v, 2)), "chance of such a gain from noise alone"),
+        ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
         ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),
         ("held-out gain", row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))), "rms of unseen points without it minus with it"),
         ("size", row.effect_rms_mm.map(|v| format!("{} mm", mm(v))), "rms of the whole effect at the tool"),

@@ -1,7 +1,8 @@
 //! A fleet as one self-contained page: every robot a row, sorted and filtered in the browser without a request.
 
-use crate::error::{Error, Result};
-use crate::report::svg::Svg;
+use super::page::render;
+use super::svg::Svg;
+use crate::error::Result;
 use crate::table::{FleetChanges, FleetRow, FleetTable};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -9,6 +10,8 @@ use std::collections::BTreeMap;
 #[derive(Serialize)]
 struct Page<'a> {
     name: &'a str,
+    title: String,
+    policy: &'static str,
     version: &'static str,
     style: &'static str,
     script: &'static str,
@@ -66,6 +69,8 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
     }
     let page = Page {
         name,
+        title: format!("Fleet {name}"),
+        policy: "; script-src 'unsafe-inline'; img-src data:",
         version: env!("CARGO_PKG_VERSION"),
         style: include_str!("fleet.css"),
         script: include_str!("fleet.js"),
@@ -77,12 +82,7 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
         compared: fleet.0.iter().any(|row| row.changes.is_some()),
         grouped: fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
     };
-    let mut environment = minijinja::Environment::new();
-    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    environment
-        .add_template("fleet.html", include_str!("fleet.html"))
-        .and_then(|()| environment.get_template("fleet.html")?.render(minijinja::value::Serde(&page)))
-        .map_err(|error| Error::Bug(format!("the fleet's page: {error}")))
+    render("fleet.html", include_str!("fleet.html"), &page)
 }
 
 fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Row<'a> {

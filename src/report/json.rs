@@ -26,6 +26,12 @@ pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement:
     let parameters = tables.parameters.0.iter().map(|row| {
         json!({ "name": row.name, "where": row.place, "unit": row.unit, "nominal": row.nominal, "value": row.value, "sigma": row.sigma, "status": row.status })
     });
+    let corrections = tables.corrections.iter().flat_map(|table| &table.0).map(|row| {
+        json!({
+            "step": row.step, "rival": row.rival, "chosen": row.chosen, "reason": row.reason, "before_mm": row.before_mm, "mean_mm": row.mean_mm,
+            "rms_mm": row.rms_mm, "max_mm": row.max_mm, "gain_mm": row.gain_mm, "gain_sigma_mm": row.gain_sigma_mm, "numbers": row.numbers,
+        })
+    });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         json!({ "step": row.step, "verdict": row.verdict, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
             "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>() })
@@ -44,6 +50,7 @@ pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement:
         "statistics": statistics.collect::<Vec<_>>(),
         "diagnosis": diagnosis,
         "findings": findings.collect::<Vec<_>>(),
+        "corrections": corrections.collect::<Vec<_>>(),
         "parameters": parameters.collect::<Vec<_>>(),
         "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
         "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),

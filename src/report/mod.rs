@@ -3,6 +3,7 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod axis;
+mod corrections;
 mod course;
 mod data;
 mod distribution;
@@ -13,16 +14,17 @@ pub mod fleet;
 mod json;
 mod limits;
 mod number;
+mod page;
 mod parameters;
 mod svg;
 mod workspace;
 
 pub use limits::Limits;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::table::{
-    Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot,
-    Split, Statistics, Suspects, Training, Verdict,
+    Corrections, Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected,
+    Rivals, Robot, Split, Statistics, Suspects, Training, Verdict,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -40,6 +42,7 @@ pub struct Tables {
     pub fit: Vec<Fit>,
     pub observability: Vec<Observability>,
     pub training: Vec<Training>,
+    pub corrections: Vec<Corrections>,
     pub verdict: Vec<Verdict>,
     pub findings: Vec<Findings>,
     pub finding_numbers: Vec<FindingNumbers>,
@@ -63,6 +66,7 @@ pub struct Wishes<'a> {
 #[derive(Serialize)]
 struct Page<'a> {
     title: String,
+    policy: &'static str,
     style: &'static str,
     version: &'static str,
     robot: String,
@@ -74,6 +78,7 @@ struct Page<'a> {
     workspace: Option<errors::Workspace>,
     parameters: parameters::Section,
     fits: fits::Section,
+    comparisons: Vec<corrections::Comparison>,
     data: data::Section,
     choices: Vec<(&'static str, &'a str)>,
 }
@@ -93,6 +98,7 @@ pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
     let json = json::document(tables, wishes, &title, judgement.as_ref())?;
     let page = Page {
         title,
+        policy: "",
         judgement: judgement.as_ref(),
         identity: wishes.identity.iter().collect(),
         hashes: &wishes.hashes,
@@ -103,6 +109,7 @@ pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
         workspace: errors::Workspace::new(&tables.prediction),
         parameters: parameters::Section::new(&tables.parameters),
         fits: fits::Section::new(tables, &steps),
+        comparisons: corrections::comparisons(tables),
         data: data::Section::new(tables),
         choices: [("title", wishes.title), ("set", wishes.set)]
             .into_iter()
@@ -110,12 +117,6 @@ pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
             .collect(),
         robot,
     };
-    let mut environment = minijinja::Environment::new();
-    // A name in the template that does not exist is a bug, not an empty cell.
-    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    let html = environment
-        .add_template("report.html", include_str!("report.html"))
-        .and_then(|()| environment.get_template("report.html")?.render(minijinja::value::Serde(&page)))
-        .map_err(|e| Error::Bug(format!("report template: {e:#}")))?;
+    let html = page::render("report.html", include_str!("report.html"), &page)?;
     Ok(Pages { html, json })
 }

@@ -6,8 +6,8 @@ use crate::report::{Limits, Tables, Wishes, pages};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording,
-    Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict,
+    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
+    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,7 @@ reads! {
         fit: Vec<Labelled<Fit>>,
         observability: Vec<Labelled<Observability>>,
         training: Vec<Labelled<Training>>,
+        corrections: Vec<Labelled<Corrections>>,
         models: Vec<Labelled<Parameters>>,
         verdict: Vec<Labelled<Verdict>>,
         findings: Vec<Labelled<Findings>>,
@@ -68,13 +69,13 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;
-        let hashes = hashes(&reads);
+        let hashes = hashes(&reads)?;
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
@@ -87,6 +88,7 @@ impl Stage for Report {
             fit: unlabelled(reads.fit),
             observability: unlabelled(reads.observability),
             training: unlabelled(reads.training),
+            corrections: unlabelled(reads.corrections),
             verdict: unlabelled(reads.verdict),
             findings: unlabelled(reads.findings),
             finding_numbers: unlabelled(reads.finding_numbers),
@@ -130,19 +132,16 @@ impl Report {
 }
 
 /// The identity of what the report rests on.
-fn hashes(reads: &ReportReads) -> Vec<(String, String)> {
+fn hashes(reads: &ReportReads) -> Result<Vec<(String, String)>> {
     let mut out = Vec::new();
-    let mut add = |name: String, frame: Result<crate::table::Frame>| {
-        // What no store would take has no hash.
-        out.extend(frame.ok().map(|frame| (name, frame.table_hash().to_string())));
-    };
-    add("robot".into(), reads.robot.to_frame());
-    add("recording".into(), reads.recording.to_frame());
-    add("split".into(), reads.split.to_frame());
+    let mut add = |name: String, frame: Frame| out.push((name, frame.table_hash().to_string()));
+    add("robot".into(), reads.robot.to_frame()?);
+    add("recording".into(), reads.recording.to_frame()?);
+    add("split".into(), reads.split.to_frame()?);
     for model in &reads.models {
-        add(format!("parameters of {}", model.stage), model.table.to_frame());
+        add(format!("parameters of {}", model.stage), model.table.to_frame()?);
     }
-    out
+    Ok(out)
 }
 
 fn unlabelled<T>(tables: Vec<Labelled<T>>) -> Vec<T> {

@@ -43,6 +43,46 @@ fn what_init_writes_is_understood_and_never_overwrites() {
 }
 
 #[test]
+fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut table = String::from(
+        "Messpunkt;Achse1 [\u{b0}];Achse2 [\u{b0}];Achse3 [\u{b0}];Achse4 [\u{b0}];Achse5 [\u{b0}];Achse6 [\u{b0}];X_soll [mm];Y_soll [mm];Z_soll [mm];X_ist [mm];Y_ist [mm];Z_ist [mm];Bemerkung\r\n",
+    );
+    for k in 0..12 {
+        let q: Vec<String> = (0..6).map(|j| format!("{:.4}", 70.0 * f64::from(k * 5 + j).sin()).replace('.', ",")).collect();
+        write!(table, "P{k:03};{};1000,5;{k},0;900,0;1000,7;{k},1;900,2;ok\r\n", q.join(";")).expect("text");
+    }
+    std::fs::write(folder.path().join("messung.csv"), table).expect("a file");
+    let output = calib(folder.path(), &["init", ".", "--data", "messung.csv"], "");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
+    for part in [
+        "point_id: {column: \"Messpunkt\"}",
+        "q: {column: \"Achse{j} [\u{b0}]\", unit: deg}\n",
+        "x: {column: \"X_ist [mm]\", unit: mm}\n",
+        "z: {column: \"Z_ist [mm]\", unit: mm}\n",
+        "not used: \"X_soll [mm]\"",
+    ] {
+        assert!(pipeline.contains(part), "{part} in\n{pipeline}");
+    }
+    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
+    assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
+    let said = String::from_utf8_lossy(&check.stdout).into_owned();
+    assert!(said.contains("robot.yaml: 4 lines are still marked REPLACE"), "{said}");
+    let identified = pipeline.replace("# limits:", "limits:").replace("# identity:", "identity:");
+    std::fs::write(folder.path().join("pipeline.yaml"), identified).expect("a file");
+    let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
+    assert!(check.status.success(), "the commented settings are none: {}", String::from_utf8_lossy(&check.stderr));
+
+    std::fs::write(folder.path().join("bare.csv"), "a;b;c;d\n1;2;3;4\n").expect("a file");
+    let output = calib(folder.path(), &["init", "bare", "--data", "bare.csv"], "");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("name columns of joints and the measured point where it says REPLACE"), "{said}");
+    let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
+    assert!(String::from_utf8_lossy(&check.stdout).contains("pipeline.yaml: 4 lines are still marked REPLACE"));
+}
+
+#[test]
 fn every_kind_of_robot_that_init_writes_is_read() {
     for kind in ["spherical6", "offset6", "seven", "dh6"] {
         let folder = tempfile::tempdir().expect("a folder");

@@ -181,6 +181,26 @@ fn reference_figures_stand_beside_ours_only_where_there_are_any() {
 }
 
 #[test]
+fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
+    let page = html(Report::default(), tables("Heavy 6R, cell 4"));
+    let section = page.split("id=\"corrections\"").nth(1).and_then(|rest| rest.split("</section>").next()).expect("a section");
+    assert!(section.contains("the mean error falls from 0.810 to 0.550 mm on rows that it did not see"), "{section}");
+    assert!(section.contains(
+        "kept</span> network, started by BSO</th><td>0.550</td><td>0.605</td><td>1.650</td><td>+0.260 \u{b1} 0.021</td>"
+    ));
+    assert!(section.contains("0.070 mm behind mlp_bso &lt;b&gt;</td>"), "{section}");
+    assert!(section.contains("joint curves</th><td></td><td></td><td></td><td></td>"), "{section}");
+    let mut reads = tables("Heavy 6R, cell 4");
+    let rows = &mut reads.corrections[0].table.0;
+    (rows[0].chosen, rows[2].chosen) = (true, false);
+    rows[0].reason = "nothing that was tried helps clearly".into();
+    assert!(html(Report::default(), reads).contains("no correction was kept: nothing that was tried helps clearly."));
+    let mut reads = tables("Heavy 6R, cell 4");
+    reads.corrections = Vec::new();
+    assert!(!html(Report::default(), reads).contains("id=\"corrections\""));
+}
+
+#[test]
 fn the_same_tables_give_the_same_bytes() {
     let make = || html(Report::default(), tables("Heavy 6R, cell 4"));
     assert_eq!(make(), make());
@@ -203,10 +223,10 @@ fn empty_tables_make_a_report_that_says_so() {
     reads.statistics = Statistics::default();
     reads.parameters = Parameters::default();
     reads.robot = Robot::default();
-    reads.recording = Recording::default();
+    reads.recording = Recording { joints: 3, prismatic: vec![false; 3], ..Recording::default() };
     reads.split = Split::default();
     (reads.intake, reads.rejected, reads.fit) = (Vec::new(), Vec::new(), Vec::new());
-    (reads.observability, reads.training) = (Vec::new(), Vec::new());
+    (reads.observability, reads.training, reads.corrections) = (Vec::new(), Vec::new(), Vec::new());
     let page = html(Report::default(), reads);
     assert_eq!(pictures(&page), 0);
     for sentence in ["No point was held out", "identified no parameters", "No row was rejected", "No file was read"] {

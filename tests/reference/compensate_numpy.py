@@ -8,6 +8,7 @@ residual below a nanometre); calib reads the targets as text, solves its whole m
 """
 
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -57,10 +58,10 @@ def main(model_file, calib, source, count):
     limits = np.array([joint["limits"] for joint in model["joints"]])
     middle, half = limits.mean(1), 0.4 * (limits[:, 1] - limits[:, 0])
     q = np.random.default_rng(1).uniform(middle - half, middle + half, size=(int(count), len(limits)))
-    begun = time.perf_counter()
+    begun, cpu = time.perf_counter(), time.process_time()
     worst = max(newton(real, nominal, part)[1] for part in np.array_split(q, max(1, len(q) // 20000)))
-    numpy_rate = len(q) / (time.perf_counter() - begun)
-    print(f"numpy Newton: {numpy_rate:,.0f} targets/s, residual {worst * 1e3:.1e} mm at most")
+    numpy_rate, numpy_cpu = len(q) / (time.perf_counter() - begun), (time.process_time() - cpu) / len(q)
+    print(f"numpy Newton: {numpy_rate:,.0f} targets/s, {1e6 * numpy_cpu:.1f} us CPU each, residual {worst * 1e3:.1e} mm at most")
 
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as targets:
         targets.write(",".join(f"q{j + 1}_rad" for j in range(len(limits))) + "\n")
@@ -68,11 +69,21 @@ def main(model_file, calib, source, count):
         targets.flush()
         for more in ([], ["--no-sigma"]):
             command = [calib, "compensate", source, targets.name, "--out", targets.name + ".out.csv", "--quiet", *more]
-            begun = time.perf_counter()
+            begun, cpu = time.perf_counter(), children()
             subprocess.run(command, check=True)
-            rate = len(q) / (time.perf_counter() - begun)
+            rate, each = len(q) / (time.perf_counter() - begun), (children() - cpu) / len(q)
             peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-            print(f"calib {' '.join(more)}: {rate:,.0f} targets/s ({rate / numpy_rate:.1f} x), text in and out, peak {peak:.0f} MB")
+            print(
+                f"calib {' '.join(more)}: {rate:,.0f} targets/s ({rate / numpy_rate:.1f} x), {1e6 * each:.1f} us CPU each "
+                f"({numpy_cpu / each:.1f} x), text in and out, peak {peak:.0f} MB"
+            )
+        os.remove(targets.name + ".out.csv")
+
+
+def children():
+    """CPU seconds of the processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":

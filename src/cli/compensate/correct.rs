@@ -85,7 +85,8 @@ pub(super) struct Tally {
 }
 
 struct Job {
-    wanted: Wanted,
+    /// None: the point that the nominal robot reaches at `home`.
+    wanted: Option<Wanted>,
     home: Vec<f64>,
     circumstance: Circumstance,
 }
@@ -120,17 +121,15 @@ impl<'a> Corrector<'a> {
     fn prepare(&mut self, target: Target) -> Job {
         let robot: &RobotModel = &self.arm.model().robot;
         let n = robot.joints();
-        let seed = target.q.clone().or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
-        let (wanted, home) = match (&target.q, target.point) {
-            (Some(q), point) if !(self.manner.cartesian && point.is_some()) => {
-                (Wanted { pose: robot.forward(q), oriented: self.manner.oriented }, q.clone())
-            }
-            (_, point) => {
+        let (wanted, home) = match (target.q, target.point) {
+            (Some(q), point) if !(self.manner.cartesian && point.is_some()) => (None, q),
+            (q, point) => {
+                let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
                 let oriented = target.rotation.is_some();
                 let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
                 let wanted = Wanted { pose, oriented };
                 let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
-                (wanted, home)
+                (Some(wanted), home)
             }
         };
         if let Some(last) = &self.last {
@@ -140,7 +139,7 @@ impl<'a> Corrector<'a> {
                 }
             }
         }
-        self.last = Some(home.clone());
+        self.last.get_or_insert_default().clone_from(&home);
         let fixed = self.manner.direction.map(|direction| vec![direction; n]);
         let circumstance = Circumstance {
             payload: target.payload.unwrap_or(self.manner.payload),
@@ -154,9 +153,13 @@ impl<'a> Corrector<'a> {
 
     fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> Answer {
         reach.under(&job.circumstance);
-        let found: Found =
-            if self.manner.one_step { one_step(reach, nominal, &job.wanted, &job.home) } else { self.reached(reach, job) };
-        let turned = job.wanted.oriented && found.turn > REACHED;
+        let wanted = job.wanted.unwrap_or_else(|| Wanted { pose: nominal.place(&job.home), oriented: self.manner.oriented });
+        let found: Found = if self.manner.one_step {
+            one_step(reach, nominal, &wanted, &job.home)
+        } else {
+            Self::reached(reach, &wanted, &job.home)
+        };
+        let turned = wanted.oriented && found.turn > REACHED;
         let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
         let reached = self.manner.one_step || found.residual < REACHED;
         let mut remarks = Vec::new();
@@ -188,14 +191,14 @@ impl<'a> Corrector<'a> {
 
 impl Corrector<'_> {
     /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
-    fn reached(&self, reach: &mut Reach, job: &Job) -> Found {
-        let found = least_change(reach, &job.wanted, &job.home, &job.home);
-        if !job.wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
+    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> Found {
+        let found = least_change(reach, wanted, home, home);
+        if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
             return found;
         }
-        let point = Wanted { oriented: false, ..job.wanted };
-        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, &job.home, &job.home);
-        let turn = job.wanted.turn_left(&reach.place(&q));
+        let point = Wanted { oriented: false, ..*wanted };
+        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
+        let turn = wanted.turn_left(&reach.place(&q));
         Found { q, residual, turn, before, iterations: iterations + found.iterations }
     }
 }

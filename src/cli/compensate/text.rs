@@ -2,16 +2,21 @@
 
 use super::columns::{Columns, Role, Units};
 use super::correct::{Answer, Corrector, Target};
+use super::decimal;
 use crate::error::{Error, Fault, Result};
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::Unit;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::io::{BufRead, Write};
 use std::ops::Range;
 
 /// Rows held in memory at a time.
 const BATCH: usize = 1 << 13;
+
+/// Rows that one thread writes at a time.
+const CHUNK: usize = 256;
 
 /// Faults told of one file.
 const FAULTS: usize = 20;
@@ -43,25 +48,27 @@ pub(super) fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &L
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
-    let names: Vec<String> = fields(body.trim_start_matches('\u{feff}'), delimiter).into_iter().map(|field| field.1).collect();
+    let names: Vec<String> =
+        fields(body.trim_start_matches('\u{feff}'), delimiter).into_iter().map(|field| field.1.into_owned()).collect();
     let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
-    let table = Sheet { layout, columns: &columns, delimiter };
+    let mut joints: Vec<(usize, usize, Unit)> =
+        columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
+    joints.sort_unstable_by_key(|(index, ..)| *index);
+    let table = Sheet { layout, columns: &columns, joints, delimiter };
     put(output, &format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())))?;
+    let mut block = Block::default();
     loop {
-        let mut lines = Vec::with_capacity(BATCH);
         let first = number + 1;
-        while lines.len() < BATCH {
-            let Some(line) = next(input, layout.place)? else { break };
-            number += 1;
-            lines.push(line);
-        }
+        block.fill(input, layout.place)?;
+        let lines: Vec<&str> = block.lines()?;
+        number += lines.len();
         if lines.is_empty() {
             return match output.flush() {
                 Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(refused(&error)),
                 _ => Ok(()),
             };
         }
-        let parsed: Vec<Result<Option<Target>, String>> =
+        let parsed: Vec<Result<Option<(Target, Spans)>, String>> =
             lines.par_iter().map(|line| if line.trim().is_empty() { Ok(None) } else { table.target(line).map(Some) }).collect();
         let faults: Vec<Fault> = (parsed.iter().enumerate())
             .filter_map(|(k, row)| Some(Fault::new(format!("{}:{}", layout.place, first + k), row.as_ref().err()?)))
@@ -70,20 +77,57 @@ pub(super) fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &L
         if !faults.is_empty() {
             return Err(Error::Data(faults));
         }
-        let given: Vec<Option<Target>> = parsed.into_iter().filter_map(Result::ok).collect();
-        let filled: Vec<bool> = given.iter().map(Option::is_some).collect();
-        let mut answers = corrector.batch(given.into_iter().flatten().collect()).into_iter();
-        let pairs: Vec<(&String, Option<Answer>)> =
-            lines.iter().zip(filled).map(|(line, filled)| (line, if filled { answers.next() } else { None })).collect();
-        let written: Vec<String> = pairs
-            .par_iter()
-            .map(|(line, answer)| answer.as_ref().map_or_else(|| (*line).clone(), |a| table.line(line, a)))
+        let (mut targets, mut spans) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
+        for row in parsed.into_iter().filter_map(Result::ok) {
+            let (target, span) = row.unzip();
+            targets.extend(target);
+            spans.push(span);
+        }
+        let mut answers = corrector.batch(targets).into_iter();
+        let rows: Vec<(&str, Option<(Spans, Answer)>)> = lines
+            .into_iter()
+            .zip(spans)
+            .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
             .collect();
-        for line in &written {
-            if !put(output, line)? {
+        let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
+        for text in &written {
+            if !put(output, text)? {
                 return Ok(());
             }
         }
+    }
+}
+
+/// Lines of the input as they stand there, a batch at a time.
+#[derive(Default)]
+struct Block {
+    bytes: Vec<u8>,
+    ends: Vec<usize>,
+    place: String,
+}
+
+impl Block {
+    /// Reads the next batch; none at the end of the input.
+    fn fill(&mut self, input: &mut dyn BufRead, place: &str) -> Result<()> {
+        self.bytes.clear();
+        self.ends.clear();
+        place.clone_into(&mut self.place);
+        while self.ends.len() < BATCH {
+            let read = input
+                .read_until(b'\n', &mut self.bytes)
+                .map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
+            if read == 0 {
+                break;
+            }
+            self.ends.push(self.bytes.len());
+        }
+        Ok(())
+    }
+
+    fn lines(&self) -> Result<Vec<&str>> {
+        let text = std::str::from_utf8(&self.bytes).map_err(|_| Error::data(&*self.place, "is no text in UTF-8"))?;
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        Ok(starts.zip(&self.ends).map(|(start, end)| &text[start..*end]).collect())
     }
 }
 
@@ -122,28 +166,38 @@ fn delimiter(header: &str) -> char {
 }
 
 /// Where each field stands, and its text without quotes.
-fn fields(line: &str, delimiter: char) -> Vec<(Range<usize>, String)> {
-    let mut out = Vec::new();
+fn fields(line: &str, delimiter: char) -> Vec<(Range<usize>, Cow<'_, str>)> {
+    let mut out = Vec::with_capacity(16);
     let (mut start, mut quoted) = (0, false);
-    let plain = |text: &str| {
-        let text = text.trim();
-        text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text).replace("\"\"", "\"")
-    };
     for (at, c) in line.char_indices() {
         if c == '"' {
             quoted = !quoted;
         } else if c == delimiter && !quoted {
-            out.push((start..at, plain(&line[start..at])));
+            out.push((start..at, unquoted(&line[start..at])));
             start = at + c.len_utf8();
         }
     }
-    out.push((start..line.len(), plain(&line[start..])));
+    out.push((start..line.len(), unquoted(&line[start..])));
     out
+}
+
+fn unquoted(text: &str) -> Cow<'_, str> {
+    let text = text.trim();
+    let inner = text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text);
+    if inner.contains('"') { Cow::Owned(inner.replace("\"\"", "\"")) } else { Cow::Borrowed(inner) }
+}
+
+/// Where a line's joints stand, in the order of the line, and whether its numbers have a comma.
+struct Spans {
+    joints: Vec<Range<usize>>,
+    comma: bool,
 }
 
 struct Sheet<'a> {
     layout: &'a Layout<'a>,
     columns: &'a Columns,
+    /// Column, joint, unit; in the order of the columns.
+    joints: Vec<(usize, usize, Unit)>,
     delimiter: char,
 }
 
@@ -169,7 +223,7 @@ impl Sheet<'_> {
         names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
     }
 
-    fn target(&self, line: &str) -> Result<Target, String> {
+    fn target(&self, line: &str) -> Result<(Target, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter);
         if cells.len() != self.columns.count {
@@ -188,57 +242,55 @@ impl Sheet<'_> {
                 return Err(format!("column {} is empty", cells[*index].0.start + 1));
             }
         }
-        row.target(self.columns, self.layout.cartesian)
+        let comma = self.delimiter != ',' && body.contains(',') && cells.iter().any(|(_, text)| is_comma_number(text));
+        let joints = self.joints.iter().map(|(index, ..)| cells[*index].0.clone()).collect();
+        Ok((row.target(self.columns, self.layout.cartesian)?, Spans { joints, comma }))
     }
 
-    fn line(&self, line: &str, answer: &Answer) -> String {
+    /// Lines with what became of their targets; lines without one as they are.
+    fn lines(&self, rows: &[(&str, Option<(Spans, Answer)>)]) -> String {
+        let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
+        for (line, answered) in rows {
+            match answered {
+                Some((spans, answer)) => self.line(&mut out, line, spans, answer),
+                None => out.push_str(line),
+            }
+        }
+        out
+    }
+
+    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &Answer) {
         let (body, ending) = split_ending(line);
-        let cells = fields(body, self.delimiter);
-        let comma = cells.iter().any(|(_, text)| self.delimiter != ',' && is_comma_number(text));
-        let write = |value: f64, unit: Unit| {
-            let text = format!("{:.*}", decimals(unit), unit.from_si(value));
-            if comma { text.replace('.', ",") } else { text }
-        };
-        let mut out = String::with_capacity(line.len() + 64);
+        let point = if spans.comma { ',' } else { '.' };
         let mut at = 0;
-        let mut joints: Vec<(usize, usize, Unit)> =
-            self.columns.joints.iter().enumerate().map(|(j, (index, unit))| (*index, j, *unit)).collect();
-        joints.sort_unstable_by_key(|(index, ..)| *index);
-        for (index, joint, unit) in joints {
-            let range = &cells[index].0;
+        for (range, (_, joint, unit)) in spans.joints.iter().zip(&self.joints) {
             out.push_str(&body[at..range.start]);
-            out.push_str(&write(answer.q[joint], unit));
+            decimal::push(out, unit.from_si(answer.q[*joint]), decimals(*unit), point);
             at = range.end;
         }
         out.push_str(&body[at..]);
-        let mut append = |text: &str| {
+        let mut append = |value: f64, decimals: usize| {
             out.push(self.delimiter);
-            out.push_str(text);
+            decimal::push(out, value, decimals, point);
         };
         if self.columns.joints.is_empty() {
             for (joint, q) in self.layout.robot.joints.iter().zip(&answer.q) {
-                append(&write(*q, own_unit(joint.kind)));
+                let unit = own_unit(joint.kind);
+                append(unit.from_si(*q), decimals(unit));
             }
         }
         if !self.layout.plain {
-            let mm = |value: f64, decimals: usize| {
-                let text = format!("{:.decimals$}", value * 1e3);
-                if comma { text.replace('.', ",") } else { text }
-            };
-            append(&mm(answer.uncorrected, 4));
-            append(&mm(answer.residual, 6));
-            append(&answer.iterations.to_string());
+            append(answer.uncorrected * 1e3, 4);
+            append(answer.residual * 1e3, 6);
+            append(answer.iterations as f64, 0);
             if let Some(sigma) = answer.sigma {
-                append(&mm(sigma, 4));
+                append(sigma * 1e3, 4);
             }
-            append(&if answer.remark.contains(self.delimiter) {
-                format!("\"{}\"", answer.remark)
-            } else {
-                answer.remark.clone()
-            });
+            let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
+            out.push(self.delimiter);
+            out.extend([quote, &answer.remark, quote]);
         }
         out.push_str(ending);
-        out
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a recording's columns seem to hold, by their names and first values: a proposal that a person checks.
 
+use super::names::{Name, joints, point};
 use super::quoted;
 use crate::error::{Error, Result};
 use std::fs::File;
@@ -9,6 +10,10 @@ use std::path::Path;
 /// Bytes and lines that are looked at.
 const LOOKED: u64 = 1 << 20;
 const LINES: usize = 400;
+
+/// What columns of points' names are called.
+const IDS: [&str; 13] =
+    ["point", "point_id", "id", "name", "pose", "nr", "no", "punkt", "messpunkt", "index", "label", "target", "measurement"];
 
 /// A delimited text, as far as it was understood.
 pub(super) struct Found {
@@ -27,7 +32,8 @@ pub(super) struct Found {
     /// Quantities of each joint, by pattern: motor currents, directions of approach.
     patterns: Vec<(&'static str, &'static str, Option<&'static str>)>,
     /// x, y, z.
-    point: Vec<String>,
+    pub point: Vec<String>,
+    point_unit: Option<&'static str>,
     /// Quantity, column, unit, whether the unit was in the name.
     others: Vec<(&'static str, String, &'static str, bool)>,
     unused: Vec<String>,
@@ -86,28 +92,28 @@ impl Found {
             usage: None,
             patterns: Vec::new(),
             point: Vec::new(),
+            point_unit: None,
             others: Vec::new(),
             unused: Vec::new(),
             farthest: 0.0,
         };
+        let said: Vec<Name> = names.iter().map(|name| Name::of(name)).collect();
         let mut taken = vec![false; names.len()];
-        for n in 1.. {
-            let Some(column) = names.iter().position(|name| joint_number(name) == Some(n)) else { break };
+        let filled = |column: usize| !body.is_empty() && values(column).count() == body.len();
+        let angle = |column: usize| {
+            filled(column) && largest(column) <= 360.0 && said[column].unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
+        };
+        for column in joints(&said, angle) {
             taken[column] = true;
             found.degrees |= largest(column) > 6.5;
-            found.joint_unit = unit_in(&names[column], &["deg", "rad"]);
+            found.joint_unit = said[column].unit_of(&["deg", "rad"]);
             found.joints.push(names[column].clone());
         }
-        for axis in ["x", "y", "z"] {
-            let column = names
-                .iter()
-                .position(|name| stem(name) == axis)
-                .or_else(|| names.iter().position(|name| stem(name).ends_with(&format!("_{axis}"))));
-            if let Some(column) = column.filter(|column| !taken[*column]) {
-                taken[column] = true;
-                found.farthest = found.farthest.max(largest(column));
-                found.point.push(names[column].clone());
-            }
+        for column in point(&said).into_iter().flatten() {
+            taken[column] = true;
+            found.farthest = found.farthest.max(largest(column));
+            found.point_unit = said[column].unit_of(&["mm", "m", "um", "in"]);
+            found.point.push(names[column].clone());
         }
         for (quantity, pattern, unit) in [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None)] {
             let column = |n: usize| names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
@@ -118,18 +124,18 @@ impl Found {
             }
         }
         for (column, name) in names.iter().enumerate().filter(|(column, _)| !taken[*column]) {
-            let lower = stem(name);
+            let (lower, unit) = (said[column].stem(), said[column].unit);
             let is = |words: &[&str]| words.iter().any(|word| lower == *word || lower.starts_with(&format!("{word}_")));
-            if found.id.is_none() && is(&["point", "point_id", "id", "name", "pose", "nr", "no", "punkt", "index"]) {
+            if found.id.is_none() && is(&IDS) {
                 found.id = Some(name.clone());
             } else if found.usage.is_none() && is(&["use", "usage", "set"]) {
                 found.usage = Some(name.clone());
-            } else if is(&["payload", "load", "mass"]) {
-                found.others.push(("payload", name.clone(), "kg", unit_in(name, &["kg"]).is_some()));
-            } else if is(&["temp", "temperature"]) {
-                found.others.push(("temperature", name.clone(), "C", unit_in(name, &["c"]).is_some()));
-            } else if is(&["time", "t", "timestamp"]) && values(column).count() == body.len() {
-                found.others.push(("time", name.clone(), "s", unit_in(name, &["s"]).is_some()));
+            } else if is(&["payload", "load", "mass", "last", "traglast"]) && filled(column) {
+                found.others.push(("payload", name.clone(), "kg", unit == Some("kg")));
+            } else if is(&["temp", "temperature", "temperatur"]) && filled(column) {
+                found.others.push(("temperature", name.clone(), "C", unit == Some("C")));
+            } else if is(&["time", "t", "timestamp", "zeit"]) && filled(column) {
+                found.others.push(("time", name.clone(), "s", unit == Some("s")));
             } else {
                 found.unused.push(name.clone());
             }
@@ -156,8 +162,8 @@ impl Found {
         parts.join("; ")
     }
 
-    /// The settings of this file under `files`.
-    pub fn yaml(&self) -> String {
+    /// The settings of this file under `files`, with lines to replace where no file has the joints, or the point.
+    pub fn yaml(&self, missing: [bool; 2]) -> String {
         let mut out = String::new();
         if self.delimiter != ',' {
             out.push_str(&format!("          delimiter: {}\n", quoted(&self.delimiter.to_string())));
@@ -178,7 +184,7 @@ impl Found {
             put("point_id", id, None, "");
         }
         if let Some(first) = self.joints.first() {
-            let pattern = first.replacen('1', "{j}", 1);
+            let pattern = pattern(first, self.joints.get(1));
             let (unit, why) = match self.joint_unit {
                 Some(unit) => (unit, String::new()),
                 None if self.degrees => ("deg", "values beyond 6.5 cannot be radians".to_string()),
@@ -193,8 +199,7 @@ impl Found {
             put(quantity, pattern, *unit, "");
         }
         for (axis, column) in ["x", "y", "z"].iter().zip(&self.point) {
-            let named = unit_in(column, &["mm", "m", "um", "in"]);
-            let (unit, why) = match named {
+            let (unit, why) = match self.point_unit {
                 Some(unit) => (unit, ""),
                 None if self.farthest > 50.0 => ("mm", "by the size of the numbers"),
                 None => ("m", "by the size of the numbers"),
@@ -204,6 +209,16 @@ impl Found {
         for (quantity, column, unit, named) in &self.others {
             put(quantity, column, Some(unit), if *named { "" } else { "the unit" });
         }
+        if self.joints.is_empty() && missing[0] {
+            out.push_str("            q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number\n");
+        }
+        if self.point.len() < 3 && missing[1] {
+            for axis in ["x", "y", "z"] {
+                out.push_str(&format!(
+                    "            {axis}: {{column: {axis}, unit: mm}}   # REPLACE: the measured point was not recognised\n"
+                ));
+            }
+        }
         for column in &self.unused {
             out.push_str(&format!("            # not used: {}\n", quoted(column)));
         }
@@ -211,31 +226,9 @@ impl Found {
     }
 }
 
-/// A name in small letters without its unit.
-fn stem(name: &str) -> String {
-    let lower = name.trim().to_lowercase();
-    for ending in [
-        "_mm", "_m", "_um", "_in", "_deg", "_rad", "_kg", "_c", "_s", " [mm]", " [m]", " [deg]", " [kg]", " [s]", " (mm)",
-        " (m)", " (deg)",
-    ] {
-        if let Some(stem) = lower.strip_suffix(ending).filter(|stem| !stem.is_empty()) {
-            return stem.trim().to_string();
-        }
-    }
-    lower
-}
-
-fn unit_in(name: &str, units: &[&'static str]) -> Option<&'static str> {
-    let lower = name.trim().to_lowercase();
-    units.iter().copied().find(|unit| {
-        lower.ends_with(&format!("_{unit}")) || lower.ends_with(&format!("[{unit}]")) || lower.ends_with(&format!("({unit})"))
-    })
-}
-
-/// The joint (from 1) that a column is named after: `q1`, `A1_deg`, `joint_3`, `J4 [deg]`.
-fn joint_number(name: &str) -> Option<usize> {
-    let stem = stem(name);
-    ["q", "a", "j", "joint", "axis", "theta", "joint_", "axis_", "q_", "j_"]
-        .iter()
-        .find_map(|prefix| stem.strip_prefix(prefix)?.parse().ok())
+/// The names of all joints in one: the 1 that becomes a 2 in the next name is the joint's number.
+fn pattern(first: &str, second: Option<&String>) -> String {
+    let ones = first.match_indices('1').map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
+    let fits = |pattern: &String| second.is_none_or(|second| pattern.replace("{j}", "2") == *second);
+    ones.into_iter().find(fits).unwrap_or_else(|| first.replacen('1', "{j}", 1))
 }

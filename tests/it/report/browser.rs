@@ -3,20 +3,16 @@
 use super::{html, tables::tables};
 use calib::stage::Report;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|folder| folder.join("chromium")).find(|file| file.is_file())
 }
 
-/// The page as the browser understood it, and its console, one message a line.
-fn open(chromium: &Path, name: &str, page: &str) -> (String, Vec<String>) {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("browser-{name}"));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let file = folder.join("report.html");
-    std::fs::write(&file, page).expect("a page");
-    let output = Command::new(chromium)
+/// A browser that asks nobody: nothing listens at its proxy, so its own requests for updates end there too.
+fn browser(chromium: &Path, folder: &Path, arguments: &[&str], page: &Path) -> Output {
+    Command::new(chromium)
         .args([
             "--headless",
             "--no-sandbox",
@@ -25,12 +21,26 @@ fn open(chromium: &Path, name: &str, page: &str) -> (String, Vec<String>) {
             "--no-first-run",
             "--disable-background-networking",
         ])
-        // Nothing listens there: the browser's own requests for updates end here too.
-        .args(["--proxy-server=127.0.0.1:9", "--enable-logging=stderr", "--dump-dom"])
+        .args(["--proxy-server=127.0.0.1:9", "--enable-logging=stderr"])
         .arg(format!("--user-data-dir={}", folder.join("profile").display()))
-        .arg(format!("file://{}", file.display()))
+        .args(arguments)
+        .arg(format!("file://{}", page.display()))
         .output()
-        .expect("chromium runs");
+        .expect("chromium runs")
+}
+
+/// A folder of a test with the page in it.
+fn folder(name: &str, page: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("browser-{name}"));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    std::fs::write(folder.join("report.html"), page).expect("a page");
+    folder
+}
+
+/// The page as the browser understood it, and its console, one message a line.
+fn open(chromium: &Path, name: &str, page: &str) -> (String, Vec<String>) {
+    let folder = folder(name, page);
+    let output = browser(chromium, &folder, &["--dump-dom"], &folder.join("report.html"));
     let log = String::from_utf8_lossy(&output.stderr);
     let console = log.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect();
     (String::from_utf8_lossy(&output.stdout).into_owned(), console)
@@ -51,4 +61,50 @@ fn a_browser_shows_the_report_without_complaint_and_without_a_request() {
     let asking = page.replace("</main>", "<img src=\"http://127.0.0.1:9/a.png\"></main>");
     let (_, console) = open(&chromium, "asking", &asking);
     assert!(console.iter().any(|line| line.contains("Content Security Policy")), "{console:?}");
+}
+
+/// What `frame.html` saw of the report at two widths.
+fn seen(chromium: &Path, folder: &Path, scheme: &[&str]) -> Vec<serde_json::Value> {
+    std::fs::write(folder.join("frame.html"), include_str!("frame.html")).expect("a page");
+    let arguments = [&["--allow-file-access-from-files", "--virtual-time-budget=4000", "--dump-dom"], scheme].concat();
+    let output = browser(chromium, folder, &arguments, &folder.join("frame.html"));
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let texts = dom.split("<pre class=\"seen\">").skip(1).filter_map(|rest| rest.split("</pre>").next());
+    texts.map(|text| serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))).collect()
+}
+
+#[test]
+fn the_report_fits_a_desk_and_a_telephone_and_is_legible_by_day_and_night() {
+    let Some(chromium) = chromium() else {
+        println!("skipped: no chromium on PATH");
+        return;
+    };
+    let page = html(Report::default(), tables("Heavy 6R, cell 4 with a name that is longer than a telephone is wide"));
+    let folder = folder("fits", &page);
+    for (dark, scheme) in [(false, &[][..]), (true, &["--blink-settings=preferredColorScheme=0"][..])] {
+        let seen = seen(&chromium, &folder, scheme);
+        assert_eq!(seen.len(), 2, "{seen:?}");
+        for view in seen {
+            assert_eq!(view["dark"], dark, "{view}");
+            assert_eq!(view["pictures"], page.matches("<svg ").count(), "{view}");
+            assert_eq!((&view["hidden"], &view["requests"]), (&0.into(), &0.into()), "{view}");
+            assert!(view["overflow"].as_i64().is_some_and(|beyond| beyond <= 0), "scrolls sideways: {view}");
+            // WCAG 2 AA.
+            assert!(view["contrast"].as_f64().is_some_and(|contrast| contrast >= 4.5), "too faint: {view}");
+        }
+    }
+}
+
+#[test]
+fn the_report_prints() {
+    let Some(chromium) = chromium() else {
+        println!("skipped: no chromium on PATH");
+        return;
+    };
+    let folder = folder("prints", &html(Report::default(), tables("Heavy 6R, cell 4")));
+    let file = folder.join("report.pdf");
+    browser(&chromium, &folder, &[&format!("--print-to-pdf={}", file.display())], &folder.join("report.html"));
+    let printed = std::fs::read(&file).expect("a PDF");
+    let pages = printed.windows(12).filter(|bytes| bytes == b"/Type /Page\n").count();
+    assert!(printed.starts_with(b"%PDF") && (4..20).contains(&pages), "{pages} pages");
 }

@@ -283,6 +283,32 @@ fn training() -> Vec<Labelled<Training>> {
     vec![Labelled { stage: "network".into(), table: Training(rows) }]
 }
 
+fn corrections() -> Vec<Labelled<Corrections>> {
+    let row = |rival: &str, mean: Option<f64>, chosen: bool, reason: &str| CorrectionsRow {
+        step: "network".into(),
+        rival: rival.into(),
+        chosen,
+        reason: reason.into(),
+        before_mm: 0.81,
+        mean_mm: mean,
+        rms_mm: mean.map(|mean| 1.1 * mean),
+        max_mm: mean.map(|mean| 3.0 * mean),
+        gain_mm: mean.map(|mean| 0.81 - mean),
+        gain_sigma_mm: mean.map(|_| 0.021),
+        numbers: if rival == "none" { 0 } else { 123 },
+        evaluations: 7,
+        hidden: rival.starts_with("mlp").then_some(12),
+        decay: rival.starts_with("mlp").then_some(3.0),
+    };
+    let rows = vec![
+        row("none", Some(0.81), false, "a correction gains 0.260 mm"),
+        row("ridge", Some(0.62), false, "0.070 mm behind mlp_bso <b>"),
+        row("mlp_bso", Some(0.55), true, "smallest error of those that help: gains 0.260 +- 0.021 mm"),
+        row("curves", None, false, "it could not be fitted to these rows"),
+    ];
+    vec![Labelled { stage: "network".into(), table: Corrections(rows) }]
+}
+
 fn rejected(rows: i64) -> Vec<Labelled<Rejected>> {
     let row = |k: i64| RejectedRow {
         file: "tracker.csv".into(),
@@ -305,6 +331,10 @@ pub fn tables(name: &str) -> ReportReads {
         joints: 3,
         prismatic: vec![false; 3],
         sequence: last.iter().map(|r| r.sequence).collect(),
+        point_id: last.iter().map(|r| r.point_id.clone()).collect(),
+        usage: last.iter().map(|r| Some(r.set.clone())).collect(),
+        q: (0..3 * last.len()).map(|k| (0.37 * k as f64).sin()).collect(),
+        position: last.iter().map(|r| [r.x_mm, r.y_mm, r.z_mm].map(|mm| mm / 1e3)).collect(),
         payload: Some(vec![210.0; last.len()]),
         current: Some(vec![1.0; 3 * last.len()]),
         ..Recording::default()
@@ -322,6 +352,7 @@ pub fn tables(name: &str) -> ReportReads {
         fit: fits(),
         observability: observability(),
         training: training(),
+        corrections: corrections(),
         models: Vec::new(),
         verdict: diagnosed(verdict()),
         findings: diagnosed(findings()),

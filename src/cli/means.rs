@@ -1,0 +1,55 @@
+//! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
+
+use super::surroundings::{cores, default_store, surroundings};
+use crate::error::Result;
+use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::progress::{Progress, Verbosity};
+use crate::stage::STAGES;
+use crate::store::Store;
+use clap::Args;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+#[derive(Args)]
+pub(super) struct Means {
+    /// Overrides a variable, the seed, or a setting of a stage; may be given several times
+    #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
+    set: Vec<Override>,
+    /// Where tables and records are kept [default: .calib in the working directory]
+    #[arg(long, value_name = "DIR")]
+    store: Option<PathBuf>,
+    /// Worker threads; no result depends on it [default: all cores]
+    #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+}
+
+impl Means {
+    pub fn plan(&self, pipeline: &Path) -> Result<Plan> {
+        Plan::load(pipeline, &self.set, STAGES)
+    }
+
+    pub fn store(&self) -> Result<Store> {
+        Store::open(self.store.clone().unwrap_or_else(default_store))
+    }
+
+    pub fn jobs(&self) -> usize {
+        self.jobs.map_or_else(cores, usize::from)
+    }
+
+    /// Runs the selected stages; with progress unless `quiet`.
+    pub fn run(
+        &self,
+        plan: &Plan,
+        store: &Store,
+        selection: Selection,
+        quiet: bool,
+        command_line: &[OsString],
+    ) -> Result<Outcome> {
+        let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
+        let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
+        let options = RunOptions { selection, jobs: self.jobs() };
+        let result = run(plan, store, &options, &surroundings(command_line), &progress);
+        progress.finish();
+        result
+    }
+}
