@@ -74,6 +74,14 @@ impl Finding {
 
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
+    if let Some(offset) = last.screening.apart {
+        let rows = offset.abs();
+        let how = if offset < 0 { "before" } else { "behind" };
+        let text = format!(
+            "the joints of a point stand {rows} rows {how} it: join the two logs anew, nothing else can be said until then"
+        );
+        return vec![of_the_recording("joint_log_lag", text)];
+    }
     let pool = looked.pool;
     // The pool's sets are ascending; the chosen causes stand in their own order.
     let set = &looked.set;
@@ -257,31 +265,27 @@ fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
         let more = rows.len().saturating_sub(20);
         format!("{}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
     };
-    let finding = |effect, statement| Finding {
-        effect,
-        place: Place::Recording.to_string(),
-        statement,
-        numbers: Vec::new(),
-        evidence: None,
-        rivals: Vec::new(),
-        valid: None,
-        forms: Vec::new(),
-    };
     let mut out = Vec::new();
     let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
     if !swapped.is_empty() {
-        out.push(finding("mislabelled_point", format!("points carry another point's name: rows {}", list(&swapped))));
+        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: rows {}", list(&swapped))));
     }
     let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
     if !shifted.is_empty() {
         let text = format!("joints and points are rows apart in the recording: rows {}", list(&shifted));
-        out.push(finding("joint_log_lag", text));
+        out.push(of_the_recording("joint_log_lag", text));
     }
     let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
     if !wrong.is_empty() {
-        out.push(finding("outlier", format!("single wrong points: rows {}", list(&wrong))));
+        out.push(of_the_recording("outlier", format!("single wrong points: rows {}", list(&wrong))));
     }
     out
+}
+
+/// A fault of the recording.
+fn of_the_recording(effect: &'static str, statement: String) -> Finding {
+    let place = Place::Recording.to_string();
+    Finding { effect, place, statement, numbers: Vec::new(), evidence: None, rivals: Vec::new(), valid: None, forms: Vec::new() }
 }
 
 /// The unit in which people read a number of this unit.

@@ -132,7 +132,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let start = chosen(&lens, forms, coefficients);
         let next = fitted((&now.model, rigid), Some(&free), &start, &data, question);
         let kept_same = next.screening.kept == now.screening.kept;
-        let last_round = round >= ROUNDS || circles;
+        let last_round = round >= ROUNDS || circles || now.screening.apart.is_some();
         if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > SIGNIFICANT {
             asked_residual = true;
             let rows = &next.screening.kept;

@@ -66,7 +66,7 @@ fn best_start(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     best.1
 }
 
-fn kabsch(from: &[Vector3<f64>], to: &[Vector3<f64>], used: &[usize]) -> Pose {
+pub(super) fn kabsch(from: &[Vector3<f64>], to: &[Vector3<f64>], used: &[usize]) -> Pose {
     let count = used.len() as f64;
     let centre = |points: &[Vector3<f64>]| used.iter().map(|i| points[*i]).sum::<Vector3<f64>>() / count;
     let (a, b) = (centre(from), centre(to));

@@ -39,6 +39,11 @@ const NAMED: usize = 4;
 
 /// Notes for the person: who was set aside and why, and what looks like mistakes and was kept.
 pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
+    if let Some(offset) = screening.apart {
+        context.services.warn(format!(
+            "most points belong to the joints {offset:+} rows away: the two logs have slipped, join them anew before anything else"
+        ));
+    }
     let id = |row: usize| recording.point_id[row].as_str();
     let (events, aside): (Vec<&Suspect>, Vec<&Suspect>) = screening.suspects.iter().partition(|suspect| suspect.used());
     if !aside.is_empty() {

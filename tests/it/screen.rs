@@ -287,3 +287,41 @@ fn clean_recordings_keep_their_rows_also_with_heavy_tails() {
         assert!(1000 * flagged <= rows, "{what}: {flagged} of {rows} clean rows flagged");
     }
 }
+
+/// From row `from` on, the joints of a row are those of the row `slip` before it.
+fn slip_log(trial: &mut Trial, from: usize, slip: usize) {
+    let joints = trial.data.joints;
+    let whole = trial.data.q.clone();
+    for row in from.max(slip)..trial.rows() {
+        trial.data.q[row * joints..(row + 1) * joints].copy_from_slice(&whole[(row - slip) * joints..(row - slip + 1) * joints]);
+    }
+}
+
+#[test]
+fn a_joint_log_that_slips_in_the_middle_is_told_by_its_rows_and_the_rest_is_fitted() {
+    for (seed, description) in fixture::all().into_iter().enumerate() {
+        let mut trial = Trial::new(description, 300, 40 + seed as u64, normal);
+        let whole = trial.data.clone();
+        slip_log(&mut trial, 180, 30);
+        let (model, screening) = trial.screen();
+        assert_eq!(screening.apart, None, "arm {seed}");
+        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == Kind::ShiftedBlock(30));
+        // The last 30 points have lost their joints.
+        let shifted = shifted.filter(|suspect| suspect.row >= 180).count();
+        assert!(shifted >= 118, "arm {seed}: {shifted} of 120");
+        let kept: Vec<usize> = screening.kept.iter().copied().filter(|row| *row >= 180).collect();
+        assert!(kept.is_empty(), "arm {seed}: {kept:?}");
+        trial.data = whole;
+        assert!(trial.off(&model) < 2.0 * SIGMA, "arm {seed}: {}", trial.off(&model));
+    }
+}
+
+#[test]
+fn a_joint_log_that_slipped_throughout_is_told_by_how_many_rows() {
+    for (seed, description) in fixture::all().into_iter().enumerate() {
+        let mut trial = Trial::new(description, 200, 50 + seed as u64, normal);
+        assert_eq!(trial.screen().1.apart, None, "arm {seed}");
+        slip_log(&mut trial, 0, 7);
+        assert_eq!(trial.screen().1.apart, Some(7), "arm {seed}");
+    }
+}

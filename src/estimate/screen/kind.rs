@@ -68,7 +68,11 @@ pub(super) fn name(
     }
     let unexplained: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
     for run in runs(&unexplained) {
-        let kind = if is_event(run, standings) { Kind::Event } else { Kind::Outlier };
+        let kind = match beyond_the_log(run, &kinds, standings.len()) {
+            Some(offset) => Kind::ShiftedBlock(offset),
+            None if is_event(run, standings) => Kind::Event,
+            None => Kind::Outlier,
+        };
         kinds.extend(run.iter().map(|row| (*row, (kind, None))));
     }
     kinds.into_iter().map(|(row, (kind, partner))| (row, kind, partner)).collect()
@@ -185,6 +189,18 @@ fn shift(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
 /// Consecutive rows, together.
 fn runs(rows: &[usize]) -> impl Iterator<Item = &[usize]> {
     rows.chunk_by(|a, b| a + 1 == *b)
+}
+
+/// The offset of the shifted block that a run continues where the joints it asks for were never logged.
+fn beyond_the_log(run: &[usize], kinds: &Kinds, rows: usize) -> Option<i64> {
+    let (first, last) = (*run.first()?, *run.last()?);
+    let neighbours = [first.wrapping_sub(1), last + 1];
+    let offset = neighbours.iter().find_map(|row| match kinds.get(row) {
+        Some((Kind::ShiftedBlock(offset), _)) => Some(*offset),
+        _ => None,
+    })?;
+    let logged = |row: usize| usize::try_from(row as i64 + offset).is_ok_and(|there| there < rows);
+    (!run.iter().any(|row| logged(*row))).then_some(offset)
 }
 
 fn is_event(run: &[usize], standings: &[Standing]) -> bool {

@@ -3,6 +3,7 @@
 //! Only rows far outside the bulk count, whatever the bulk is made of: noise with heavy tails or physics that the model lacks.
 //! Where too many rows stand out, or several in a row do, it is the model that is wrong, and the rows are kept.
 
+mod apart;
 mod distance;
 mod kind;
 mod tail;
@@ -48,6 +49,8 @@ pub struct Screening {
     pub crowd: usize,
     /// The statistic that noise with the tails of the bulk hardly ever reaches in a recording of this size.
     pub reach: f64,
+    /// How many rows further on the joints of most points are, where the nominal robot shows it: such a recording cannot be fitted.
+    pub apart: Option<i64>,
 }
 
 /// Median of the squared length of three unit normals.
@@ -74,14 +77,18 @@ const READMITTING: usize = 3;
 /// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes.
 pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions, set: &[usize]) -> (Fitted, Screening) {
     let start = model.x.clone();
-    // Whole blocks may be in metres or zero: more than a robust loss can bear, and plain to see even from the nominal robot.
+    // Whole blocks may be in metres, zero, or beside other joints: more than a robust loss can bear, and plain to see even from the nominal robot.
     let predicted = model.predict(data);
-    let plain =
-        |row: &usize| !data.whole(*row) || kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_none();
+    let apart = apart::apart(data, &predicted);
+    let plain = |row: &usize| {
+        let misread = || kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_some();
+        apart[*row] == 0 && !(data.whole(*row) && misread())
+    };
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
     if 2 * kept.len() < options.rows.len() {
         kept = options.rows.to_vec();
     }
+    let throughout = throughout(&apart);
     let mut fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
     let mut aside = BTreeSet::new();
     for round in 0.. {
@@ -90,7 +97,7 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
         let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
         if next == kept {
-            return (fitted, Screening { kept, suspects, crowd, reach });
+            return (fitted, Screening { kept, suspects, crowd, reach, apart: throughout });
         }
         if 2 * next.len() < options.rows.len() {
             break;
@@ -104,7 +111,17 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
         model.x.clone_from(&start);
         fitted = fit(model, data, options);
     }
-    (fitted, Screening { kept: options.rows.to_vec(), suspects: Vec::new(), crowd: aside.len(), reach: GROSS })
+    let kept = options.rows.to_vec();
+    (fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: GROSS, apart: throughout })
+}
+
+/// The offset of more than half of the rows.
+fn throughout(apart: &[i64]) -> Option<i64> {
+    let mut sorted: Vec<i64> = apart.to_vec();
+    sorted.sort_unstable();
+    let middle = *sorted.get(sorted.len() / 2)?;
+    let same = apart.iter().filter(|offset| **offset == middle).count();
+    (middle != 0 && 2 * same > apart.len()).then_some(middle)
 }
 
 /// One look at all rows.
