@@ -6,7 +6,7 @@ use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
 use super::{ALIKE, Course};
-use crate::effect::{Effect, Form, Place, Placed, Signature};
+use crate::effect::{Effect, Form, ParameterSpec, Place, Placed, ReductionRatio, Signature};
 use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
 use crate::units::Unit;
 use std::collections::BTreeMap;
@@ -173,6 +173,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     // Nobody knows from where the arm came to the first row.
     let unknown = last.chosen.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
     out.extend(faults(&last.screening, unknown));
+    out.extend(reversals(last));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
@@ -248,6 +249,24 @@ fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>
         }
     }
 }
+
+/// Joints that turn the other way than the robot file says.
+fn reversals(last: &Course) -> Vec<Finding> {
+    let specs = last.model.stack.specs().iter().zip(&last.model.x);
+    let reversed =
+        specs.filter(|(spec, x)| spec.name.starts_with(ReductionRatio::NAME) && (*x - super::REVERSED).abs() < REVERSED_WITHIN);
+    let one = |(spec, x): (&ParameterSpec, &f64)| {
+        let place = spec.place.clone();
+        let statement =
+            format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
+        let numbers = vec![Number { name: "k".into(), value: 1.0 + x, unit: "1", sigma: None }];
+        Finding { place, numbers, ..of_the_recording(ReductionRatio::NAME, statement) }
+    };
+    reversed.map(one).collect()
+}
+
+/// A reversed joint's ratio is -1 to this.
+const REVERSED_WITHIN: f64 = 0.1;
 
 /// Less than this share of a finding's gain at its own joint is its finer shape.
 const REFINEMENT: f64 = 0.1;

@@ -13,6 +13,7 @@ mod locate;
 mod noise;
 mod pool;
 mod search;
+mod sense;
 mod state;
 mod statement;
 mod verdict;
@@ -22,7 +23,9 @@ pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
-use crate::effect::{BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, Setting, Survey};
+use crate::effect::{
+    BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey,
+};
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -56,6 +59,8 @@ const SIGNIFICANT: f64 = 0.004;
 const ALIKE: f64 = 6.0;
 /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
 const SEARCHED: usize = 800;
+/// The error of a reduction ratio whose joint turns the other way.
+const REVERSED: f64 = -2.0;
 /// The scale of a curve's numbers in medians of their size: twice that of normal ones.
 const TYPICAL: f64 = 2.0 * 1.4826;
 /// A repeatability that changes by less than this share is settled.
@@ -209,14 +214,24 @@ fn start_of(now: &Course) -> Vec<Chosen> {
 
 /// The base model at its start: the nominal robot, aligned.
 fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Model {
-    let setting = Setting { base: align(robot, data, rows), load: Load::GravityTorque };
+    let reversed = sense::reversed(robot, data, rows);
+    let mut turned = data.clone();
+    reversed.iter().for_each(|joint| sense::reverse(&mut turned, *joint));
+    let setting = Setting { base: align(robot, &turned, rows), load: Load::GravityTorque };
     let effects: Vec<Box<dyn Effect>> = EFFECTS
         .iter()
         .filter(|entry| BASE.contains(&entry.name))
         .map(|entry| (entry.make)(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();
-    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects))
+    let mut model = Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects));
+    for joint in reversed {
+        let name = format!("{}.j{}", ReductionRatio::NAME, joint + 1);
+        if let Some(k) = model.stack.specs().iter().position(|spec| spec.name == name) {
+            model.x[k] = REVERSED;
+        }
+    }
+    model
 }
 
 /// The first `base` effects of `from` with causes at their coefficients, fitted to the rows that belong.

@@ -49,6 +49,7 @@ pub use joint_table::JointTable;
 pub use link_mass::LinkMass;
 pub use payload_error::PayloadError;
 pub use place::Place;
+pub use reduction_ratio::ReductionRatio;
 pub use stack::{EffectStack, Scratch, Sight};
 pub use survey::{Hypothesis, Survey};
 pub use thermal_growth::{ThermalGrowth, Warmth};

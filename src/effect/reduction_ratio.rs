@@ -10,9 +10,13 @@ use crate::units::Unit;
 #[derive(Debug, Clone, Copy)]
 pub struct ReductionRatio;
 
+impl ReductionRatio {
+    pub const NAME: &'static str = "reduction_ratio";
+}
+
 impl Effect for ReductionRatio {
     fn name(&self) -> &'static str {
-        "reduction_ratio"
+        Self::NAME
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -102,3 +102,31 @@ fn effects_of_the_twin_are_named_and_placed() {
         assert!(rms("after") < 1.4 * floor, "{family}: {} above {floor}", rms("after"));
     }
 }
+
+#[test]
+fn a_joint_of_the_wrong_sign_is_named_and_the_rest_is_fitted_all_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments =
+        ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points", "120", "--nulls", "1"];
+    calib(&[&arguments[..], &["--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    let file = folder.path().join("sealed/recordings/c0001/controller.csv");
+    let text = std::fs::read_to_string(&file).expect("the log");
+    let column = text.lines().next().and_then(|head| head.split(',').position(|name| name == "q4_deg")).expect("q4_deg");
+    let reverse = |(row, line): (usize, &str)| -> String {
+        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
+        if row > 0 {
+            cells[column] = (-cells[column].parse::<f64>().expect("a number")).to_string();
+        }
+        cells.join(",")
+    };
+    let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
+    std::fs::write(&file, turned.join("\n")).expect("written");
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml").display().to_string();
+    let said = calib(&["diagnose", &pipeline, "--set", "case=sealed/recordings/c0001", "--json", "--quiet"], folder.path());
+    let said: Value = serde_json::from_str(&said).expect("JSON");
+    let findings = said["findings"].as_array().expect("a list");
+    assert_eq!(findings.len(), 1, "{said:#}");
+    assert_eq!((&findings[0]["effect"], &findings[0]["where"]), (&"reduction_ratio".into(), &"joint 4".into()));
+    let after = said["after"]["validate_rms_mm"].as_f64().expect("held-out rows");
+    assert!(after < 1.3 * said["noise_floor_mm"].as_f64().expect("a number"), "{after}");
+}

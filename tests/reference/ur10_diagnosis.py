@@ -34,7 +34,7 @@ def text(value):
 def shifted(rows):
     """The joint log of a stretch belongs to the row 30 before."""
     joints = [[row[name] for name in JOINTS] for row in rows]
-    for i in range(len(rows) // 2, len(rows)):
+    for i in range(len(rows) * 3 // 5, len(rows)):
         for name, value in zip(JOINTS, joints[i - 30]):
             rows[i][name] = value
 
