@@ -252,14 +252,15 @@ fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>
 
 /// Joints that turn the other way than the robot file says.
 fn reversals(last: &Course) -> Vec<Finding> {
-    let specs = last.model.stack.specs().iter().zip(&last.model.x);
-    let reversed =
-        specs.filter(|(spec, x)| spec.name.starts_with(ReductionRatio::NAME) && (*x - super::REVERSED).abs() < REVERSED_WITHIN);
-    let one = |(spec, x): (&ParameterSpec, &f64)| {
+    let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.fates);
+    let reversed = specs
+        .filter(|((spec, x), _)| spec.name.starts_with(ReductionRatio::NAME) && (*x - super::REVERSED).abs() < REVERSED_WITHIN);
+    let one = |((spec, x), fate): ((&ParameterSpec, &f64), &Fate)| {
+        let sigma = if let Fate::Free(sigma) = fate { Some(*sigma) } else { None };
         let place = spec.place.clone();
         let statement =
             format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
-        let numbers = vec![Number { name: "k".into(), value: 1.0 + x, unit: "1", sigma: None }];
+        let numbers = vec![Number { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
         Finding { place, numbers, ..of_the_recording(ReductionRatio::NAME, statement) }
     };
     reversed.map(one).collect()

@@ -35,7 +35,7 @@ mod tests {
     use super::push;
 
     #[test]
-    fn a_number_is_written_as_the_standard_library_writes_it() {
+    fn a_number_is_written_to_half_a_unit_of_its_last_decimal() {
         let mut seed = 1u64;
         for _ in 0..20_000 {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -159,8 +159,7 @@ fn screen(
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
         }
     }
-    let bulk: Vec<f64> = standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect();
-    Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()) }
+    Screened { suspects, crowd, reach: tail::reach(&bulk(&standings), standings.len()) }
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
@@ -179,8 +178,12 @@ fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
 
 /// Where far outside the bulk begins.
 fn limit(standings: &[Standing]) -> f64 {
-    let mut bulk: Vec<f64> = standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect();
-    (FAR * quantile(&mut bulk, BULK)).min(GROSS)
+    (FAR * quantile(&mut bulk(standings), BULK)).min(GROSS)
+}
+
+/// Distances of the rows that are not gross.
+fn bulk(standings: &[Standing]) -> Vec<f64> {
+    standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
 }
 
 fn quantile(values: &mut [f64], share: f64) -> f64 {
