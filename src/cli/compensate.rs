@@ -206,7 +206,7 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
     }
 }
 
-/// Reads, corrects and writes; a file appears only when it is whole.
+/// Reads, corrects and writes; a file appears only when it is whole, a pipe or a device is written as it stands.
 fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
     if let Some(language) = language(&arguments.targets) {
         return rewritten(arguments, language, layout, corrector);
@@ -220,6 +220,10 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
         return Err(Error::spec("--out", message));
     }
     let refused = |error: &std::io::Error| Error::store(out.display().to_string(), format!("cannot be written: {error}"));
+    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        let open = File::options().write(true).open(out).map_err(|error| refused(&error))?;
+        return convert(&arguments.targets, open, columnar, layout, corrector);
+    }
     let mut name = out.clone().into_os_string();
     name.push(".part");
     let aside = PathBuf::from(name);
