@@ -86,8 +86,9 @@ impl Arm {
             direction: Some(vec![0.0; joints]),
             ..Measurements::default()
         };
-        let mut scratch = self.model.stack.scratch(&self.model.robot);
-        scratch.only_points(true);
+        let Model { robot, stack, x, .. } = &self.model;
+        let mut scratch = stack.scratch(robot);
+        stack.only_points(robot, &data, x, &mut scratch);
         Reach { arm: self, scratch, data, velocities: vec![Twist::zeros(); joints], sources: Vec::new() }
     }
 }
@@ -127,9 +128,9 @@ impl Reach<'_> {
     pub(super) fn derivatives(&mut self, q: &[f64], emit: impl FnMut(usize, Vector3<f64>)) {
         self.data.q.copy_from_slice(q);
         let Model { robot, stack, x, .. } = &self.arm.model;
-        self.scratch.only_points(false);
+        self.scratch.points_and_partials();
         stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
-        self.scratch.only_points(true);
+        stack.only_points(robot, &self.data, x, &mut self.scratch);
     }
 
     fn fill_sources(&mut self) {

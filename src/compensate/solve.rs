@@ -4,8 +4,8 @@ use crate::robot::{RobotModel, Travel};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-/// m (rad at an arm's length of 1 m): nearer than this the wanted point is reached; controllers round to a micrometre.
-pub const SETTLED: f64 = 1e-10;
+/// m (rad at an arm's length of 1 m): nearer than this the wanted point is reached; controllers round to a micrometre or coarser.
+pub const SETTLED: f64 = 1e-8;
 
 /// Placements before it is given up.
 const MOST: usize = 60;

@@ -55,6 +55,10 @@ impl Effect for BaseFrame {
             .collect()
     }
 
+    fn is_rigid(&self) -> bool {
+        true
+    }
+
     fn deflect(&self, _robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
         for parameter in 0..6 {
             out.shift(parameter, p, 0, self.direction(parameter));

@@ -23,6 +23,10 @@ impl Effect for JointOffset {
             .collect()
     }
 
+    fn is_rigid(&self) -> bool {
+        true
+    }
+
     fn deflect(&self, robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
         for joint in 0..robot.joints() {
             out.turn(joint, p, joint, 1.0);

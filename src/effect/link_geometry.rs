@@ -39,6 +39,10 @@ impl Effect for LinkGeometry {
         out
     }
 
+    fn is_rigid(&self) -> bool {
+        true
+    }
+
     fn deflect(&self, robot: &RobotModel, _state: &ArmState, p: &[f64], out: &mut Deflection) {
         let mut parameter = 0;
         for link in 1..robot.joints() {

@@ -149,6 +149,10 @@ pub trait Effect: Send + Sync {
     fn needs_torque(&self) -> bool {
         false
     }
+    /// True if its motions are the same at every row, whatever the joints, the load and the time.
+    fn is_rigid(&self) -> bool {
+        false
+    }
     /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared
     /// `payload` (kg); its partials belong into `deflect`.
     fn burden(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut Burden) {}

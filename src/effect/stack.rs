@@ -34,12 +34,15 @@ pub struct Scratch {
     target: Option<usize>,
     /// Whether `commanded` is near the next row's joints.
     near: bool,
+    /// Travel of each joint and twist at each station by the rigid effects, where only points are wanted, all of the same parameters.
+    rigid: Option<(Vec<f64>, Vec<Twist>)>,
 }
 
 impl Scratch {
-    /// Whether only points are wanted from now on: then there are no partials.
-    pub(crate) fn only_points(&mut self, only: bool) {
-        self.deflection.bare = only;
+    /// Partials are wanted again.
+    pub(crate) fn points_and_partials(&mut self) {
+        self.deflection.bare = false;
+        self.rigid = None;
     }
 
     /// Whether the next row's joints are near those placed last; their sines then follow by addition theorems.
@@ -52,13 +55,15 @@ impl Scratch {
 #[derive(Clone)]
 struct Station {
     twist: Twist,
+    /// Whether nothing moves here: most stations of most models.
+    still: bool,
     motion: Pose,
     jacobian: Matrix6<f64>,
 }
 
 impl Station {
     fn of(twist: &Twist) -> Self {
-        Self { twist: *twist, motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
+        Self { twist: *twist, still: *twist == Twist::zeros(), motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
     }
 }
 
@@ -103,7 +108,21 @@ impl EffectStack {
             by_joint: vec![Vector3::zeros(); n],
             target: None,
             near: false,
+            rigid: None,
         }
+    }
+
+    /// Prepares for rows of which only the points are wanted, all under the same `x`: there are no partials, and what is the same at
+    /// every row is summed once.
+    pub(crate) fn only_points(&self, robot: &RobotModel, data: &Measurements, x: &[f64], scratch: &mut Scratch) {
+        scratch.deflection.clear();
+        scratch.deflection.bare = true;
+        scratch.rigid = None;
+        let state = ArmState::new(data, 0, &scratch.posture);
+        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.is_rigid()) {
+            effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
+        }
+        scratch.rigid = Some((scratch.deflection.joint.clone(), scratch.deflection.station.clone()));
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
@@ -115,6 +134,10 @@ impl EffectStack {
             *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
         }
         scratch.deflection.clear();
+        if let Some((joint, station)) = &scratch.rigid {
+            scratch.deflection.joint.copy_from_slice(joint);
+            scratch.deflection.station.copy_from_slice(station);
+        }
         scratch.target = robot.gauging().target(data.target(row));
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
         let mut point = self.chain(robot, scratch);
@@ -268,7 +291,9 @@ impl EffectStack {
     /// Adds the motions of the effects with the given need.
     fn deflect(&self, needs: Needs, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
         let state = ArmState::new(data, row, &scratch.posture);
-        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.needs_torque() == (needs == Needs::Torque)) {
+        let summed = scratch.rigid.is_some();
+        let due = |effect: &dyn Effect| effect.needs_torque() == (needs == Needs::Torque) && !(summed && effect.is_rigid());
+        for (effect, range) in self.effects.iter().filter(|(effect, _)| due(effect.as_ref())) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
@@ -282,7 +307,9 @@ impl EffectStack {
                 *station = Station::of(twist);
             }
             scratch.before[k] = frame;
-            frame = frame * station.motion;
+            if !station.still {
+                frame = frame * station.motion;
+            }
             scratch.posture.behind[k] = frame;
             if k < n {
                 frame = frame * robot.motion(k, &scratch.commanded[k].moved(scratch.deflection.joint[k]));

@@ -3,7 +3,7 @@
 /// Above this (2^53) whole numbers are no longer exact in f64.
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// Appends `value` with so many decimals (at most 15), after `point`; rounded to the nearest.
+/// Appends `value` with so many decimals (at most 15), after `point` (ASCII); rounded to the nearest.
 pub(super) fn push(out: &mut String, value: f64, decimals: usize, point: char) {
     let scaled = (value.abs() * 10f64.powi(decimals as i32)).round_ties_even();
     if scaled.is_nan() || scaled >= EXACT || decimals > 15 {
@@ -11,23 +11,26 @@ pub(super) fn push(out: &mut String, value: f64, decimals: usize, point: char) {
         out.extend(text.chars().map(|c| if c == '.' { point } else { c }));
         return;
     }
-    let mut rest = scaled as u64;
-    if value < 0.0 && rest > 0 {
-        out.push('-');
-    }
-    // The digits from the last to the first, at least one before the point.
-    let mut digits = ['0'; 20];
+    let (mut rest, negative) = (scaled as u64, value < 0.0 && scaled > 0.0);
+    // From the last digit to the first, at least one before the point.
+    let mut text = [b'0'; 24];
+    let mut at = text.len();
+    let mut put = |byte: u8| {
+        at -= 1;
+        text[at] = byte;
+    };
     let mut count = 0;
     while rest > 0 || count <= decimals {
-        digits[count] = char::from(b'0' + (rest % 10) as u8);
+        if count == decimals && decimals > 0 {
+            put(point as u8);
+        }
+        put(b'0' + (rest % 10) as u8);
         (rest, count) = (rest / 10, count + 1);
     }
-    for at in (0..count).rev() {
-        out.push(digits[at]);
-        if at == decimals && decimals > 0 {
-            out.push(point);
-        }
+    if negative {
+        put(b'-');
     }
+    out.extend(std::str::from_utf8(&text[at..]));
 }
 
 #[cfg(test)]
