@@ -381,8 +381,11 @@ fn exact(effect: &str, forms: &[Form], place: &str, rivals: &mut Vec<Rival>) {
                 _ => (),
             },
             Form::JointHardening(_) if effect == "backlash" => add("joint_hardening", place),
-            // The torque of a link about its own joint is of first order in that joint's angle, as a balancer's.
+            // The torque of a link about its own joint is of first order in that joint's angle, as a balancer's; a hose pulls by it too.
             Form::Counterbalance(_) => {
+                if effect == "counterbalance" {
+                    add("cable_drag", place);
+                }
                 add("gear_cyclic", place);
                 add("link_mass", &place.replace("joint", "link"));
             }

@@ -81,7 +81,10 @@ pub(crate) fn judge(
         let without = refit(&now, &others);
         let Some(bare) = HeldOut::of(&without, data, question) else { return (now, worths) };
         let mut best: Option<(HeldOut, usize, Course)> = None;
-        let bic = pool.bic(set);
+        // What does harm has lost its right to be believed before others: then the fit alone says which of them to try.
+        let harmful = bare.is_better_than(&seen);
+        let charged = |k: usize| if harmful { pool.charge[k] } else { 0.0 };
+        let bic = pool.bic(set) - set.iter().filter(|k| is_own(k)).map(|k| charged(*k)).sum::<f64>();
         let mut sorted = rest.clone();
         sorted.sort_unstable();
         let state = pool.state(&sorted);
@@ -92,7 +95,7 @@ pub(crate) fn judge(
             let mut other = sorted.clone();
             other.push(*h);
             other.sort_unstable();
-            if tried.len() > RIVALS || tried.contains(&name) || pool.bic(&other) - bic > ALIKE {
+            if tried.len() > RIVALS || tried.contains(&name) || pool.bic(&other) - charged(*h) - bic > ALIKE {
                 continue;
             }
             tried.push(name);
@@ -113,7 +116,7 @@ pub(crate) fn judge(
                 at = 0;
             }
             // What has no name must prove itself: it has no physics to carry it to other points.
-            None if bare.is_better_than(&seen) || group.0 == "unknown" && bare.rms() < seen.rms() => {
+            None if harmful || group.0 == "unknown" && bare.rms() < seen.rms() => {
                 *set = rest;
                 (now, seen) = (without, bare);
                 at = 0;

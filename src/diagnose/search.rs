@@ -68,8 +68,32 @@ impl<'a, 'b> Search<'a, 'b> {
         gate(self.pool, &self.pool.state(set), self.pose, self.options.draws, self.options.seed)
     }
 
-    /// From a set of causes to the best one.
+    /// From a set of causes to the best one. From none it also starts where most arms end, with every joint that yields to its load:
+    /// one link that bends may look better than any one joint, and worse than all of them.
     pub fn run(&mut self, start: Vec<usize>) -> Found {
+        let fresh = start.is_empty();
+        let mut found = self.climb(start);
+        if fresh && !found.set.is_empty() {
+            let yielding = self.all_yielding();
+            let other = self.climb(yielding);
+            if self.pool.bic(&other.set) < self.pool.bic(&found.set) {
+                found = Found { first: found.first, ..other };
+            }
+        }
+        found.set = self.simplest(found.set);
+        found
+    }
+
+    /// The wind-up of every joint where it is seen.
+    fn all_yielding(&self) -> Vec<usize> {
+        let state = self.pool.state(&[]);
+        let seen = state.falls(self.pool).iter().map(|(_, h)| *h);
+        let mut set: Vec<usize> = seen.filter(|h| matches!(self.pool.hypotheses[*h].form, Form::JointCompliance(_))).collect();
+        set.sort_unstable();
+        set
+    }
+
+    fn climb(&mut self, start: Vec<usize>) -> Found {
         let mut best = start;
         if !best.is_empty() {
             best = self.exchange(best);
@@ -100,8 +124,7 @@ impl<'a, 'b> Search<'a, 'b> {
         if best.len() >= self.options.most {
             last = self.gate(&best);
         }
-        let set = self.simplest(best);
-        Found { set, first: first.unwrap_or(last), last }
+        Found { set: best, first: first.unwrap_or(last), last }
     }
 
     /// Of two laws of one wind-up that explain alike the simpler stands: proportional to the load.
