@@ -76,7 +76,9 @@ impl<'a, 'b> Search<'a, 'b> {
         if fresh && !found.set.is_empty() {
             let yielding = self.all_yielding();
             let other = self.climb(yielding);
-            if self.pool.bic(&other.set) < self.pool.bic(&found.set) {
+            // With the prior against every further cause, as they were when it climbed.
+            let score = |set: &[usize]| self.pool.bic(set) + FURTHER * set.len() as f64;
+            if score(&other.set) < score(&found.set) {
                 found = Found { first: found.first, ..other };
             }
         }
