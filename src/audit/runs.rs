@@ -125,7 +125,7 @@ fn table(store: &Store, name: &str, a: Option<OutputRecord>, b: Option<OutputRec
     if a.table.table_hash == b.table.table_hash && !options.reread {
         return Ok(change("same", None));
     }
-    let paths = [&a.table, &b.table].map(|table| store.object_path(table));
+    let paths = [store.object(&a.table)?, store.object(&b.table)?];
     if paths.iter().any(|path| !path.exists()) {
         return Ok(change("changed, but no longer in the store", None));
     }

@@ -1,6 +1,6 @@
 //! `calib diff`: two tables or two runs compared; exit code 0 same, 1 different beyond tolerance, 2 could not compare.
 
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use super::{complain, emit, emit_json, run_diff};
 use crate::audit::{Place, compare_runs};
 use crate::diff::{self, Detail, Options, TableDiff};
@@ -91,10 +91,10 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     if a.is_file() || b.is_file() || arguments.a.ends_with(".parquet") || arguments.b.ends_with(".parquet") {
         return tables(arguments, a, b, &options);
     }
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let (a, b) = (place(&store, &arguments.a)?, place(&store, &arguments.b)?);
     if let (Some(left), Some(right)) = (output(&store, &a)?, output(&store, &b)?) {
-        return tables(arguments, &store.object_path(&left), &store.object_path(&right), &options);
+        return tables(arguments, &store.object(&left)?, &store.object(&right)?, &options);
     }
     if options.out.is_some() {
         return Err(Error::spec("--out", "is for two tables: name them as RUN/STAGE/PORT"));

@@ -1,11 +1,10 @@
 //! `calib explain`: why a stage ran, or did not.
 
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use super::{emit, emit_json, show};
 use crate::audit::{Explanation, explain};
 use crate::error::{Error, Result};
 use crate::pipeline::StageStatus;
-use crate::store::Store;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,7 +30,7 @@ pub(super) struct ExplainArguments {
 }
 
 pub(super) fn main(arguments: &ExplainArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let explanation = explain(&store, &store.find_run(&arguments.run)?, &arguments.stage)?;
     if arguments.json {
         return emit_json(&serde_json::to_value(&explanation).map_err(|error| Error::Bug(error.to_string()))?);

@@ -1,10 +1,9 @@
 //! `calib gc`: takes away tables that no kept run needs; only when asked.
 
-use super::surroundings::{default_store, now};
+use super::surroundings::{now, open_store};
 use super::{emit, emit_json};
 use crate::audit::kept_actions;
 use crate::error::{Error, Result};
-use crate::store::Store;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -35,7 +34,7 @@ pub(super) struct GcArguments {
 }
 
 pub(super) fn main(arguments: &GcArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let keep = kept_actions(&store, usize::try_from(arguments.keep_runs).unwrap_or(usize::MAX))?;
     let grace = Duration::from_secs(u64::from(arguments.grace_hours) * 3600);
     let before = now().checked_sub(grace).unwrap_or(std::time::UNIX_EPOCH);

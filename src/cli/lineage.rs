@@ -1,6 +1,6 @@
 //! `calib lineage`: where a table comes from, down to the raw files.
 
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::{Node, lineage};
 use crate::diff::table_hash;
@@ -29,7 +29,7 @@ pub(super) struct LineageArguments {
 }
 
 pub(super) fn main(arguments: &LineageArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let node = lineage(&store, &hash(&store, &arguments.table)?)?;
     if arguments.json {
         return emit_json(&serde_json::to_value(&node).map_err(|error| Error::Bug(error.to_string()))?);

@@ -1,10 +1,9 @@
 //! `calib log`: the runs of a store, the last first.
 
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::error::Result;
 use crate::pipeline::{Manifest, RunStatus, StageStatus};
-use crate::store::Store;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -32,7 +31,7 @@ pub(super) struct LogArguments {
 }
 
 pub(super) fn main(arguments: &LogArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let tags = store.tags()?;
     let (mut text, mut rows, mut shown) = (String::new(), Vec::new(), 0);
     for run in store.runs()?.into_iter().rev() {

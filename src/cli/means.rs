@@ -1,6 +1,6 @@
 //! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
 
-use super::surroundings::{cores, default_store, surroundings};
+use super::surroundings::{cores, open_store, surroundings};
 use crate::error::Result;
 use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
@@ -15,7 +15,7 @@ pub(super) struct Means {
     /// Overrides a variable, the seed, or a setting of a stage; may be given several times
     #[arg(long, value_name = "TARGET=VALUE", value_parser = Override::parse)]
     set: Vec<Override>,
-    /// Where tables and records are kept [default: .calib in the working directory]
+    /// Where tables and records are kept: a folder or s3://BUCKET/PREFIX [default: .calib in the working directory]
     #[arg(long, value_name = "DIR")]
     store: Option<PathBuf>,
     /// Worker threads; no result depends on it [default: all cores]
@@ -29,7 +29,7 @@ impl Means {
     }
 
     pub fn store(&self) -> Result<Store> {
-        Store::open(self.store.clone().unwrap_or_else(default_store))
+        open_store(self.store.as_deref())
     }
 
     pub fn jobs(&self) -> usize {

@@ -1,10 +1,10 @@
 //! `calib show`: one run, or one stage of it, in full.
 
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use super::{emit, emit_json, log};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, StageReport};
-use crate::store::{Store, TableRef};
+use crate::store::TableRef;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub(super) struct ShowArguments {
 }
 
 pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let (run, stage) = match arguments.run.split_once('/') {
         Some((run, stage)) => (run, Some(stage)),
         None => (arguments.run.as_str(), None),

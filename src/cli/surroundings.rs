@@ -1,9 +1,11 @@
 //! Who runs calib, where and when: the only file that reads the environment and the clock.
 
+use crate::error::Result;
 use crate::pipeline::{Host, Surroundings, Tool};
+use crate::store::Store;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 pub(super) fn surroundings(command_line: &[OsString]) -> Surroundings {
@@ -66,4 +68,24 @@ fn host_name() -> String {
 /// Where tables go when `--store` does not say.
 pub(super) fn default_store() -> PathBuf {
     PathBuf::from(".calib")
+}
+
+/// The URL of a store that is no folder.
+pub(super) fn bucket(store: &Path) -> Option<&str> {
+    store.to_str().filter(|text| text.starts_with("s3://"))
+}
+
+/// Opens what `--store` names: a folder, or a bucket with what was fetched from it below the user's cache.
+pub(super) fn open_store(given: Option<&Path>) -> Result<Store> {
+    let Some(url) = given.and_then(bucket) else { return Store::open(given.map_or_else(default_store, Path::to_path_buf)) };
+    let settings = std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
+    let settings = settings.filter(|(name, _)| name.starts_with("AWS_")).collect();
+    Store::open_s3(url, &settings, &cache())
+}
+
+/// `CALIB_CACHE`, or where the user's caches are.
+fn cache() -> PathBuf {
+    let told = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let usual = || told("XDG_CACHE_HOME").or_else(|| told("HOME").map(|home| home.join(".cache")));
+    told("CALIB_CACHE").or_else(|| usual().map(|folder| folder.join("calib"))).unwrap_or_else(|| PathBuf::from(".calib-cache"))
 }

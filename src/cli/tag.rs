@@ -1,9 +1,8 @@
 //! `calib tag`: names for runs.
 
 use super::emit;
-use super::surroundings::default_store;
+use super::surroundings::open_store;
 use crate::error::{Error, Result};
-use crate::store::Store;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -28,7 +27,7 @@ pub(super) struct TagArguments {
 }
 
 pub(super) fn main(arguments: &TagArguments) -> Result<()> {
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     if let Some(name) = &arguments.delete {
         return match store.tags()?.contains_key(name) {
             true => store.untag(name),

@@ -1,9 +1,9 @@
 //! `calib verify`: everything in a store rehashed; exit code 1 where something is not what was written.
 
-use super::surroundings::default_store;
+use super::surroundings::{bucket, default_store, open_store};
 use super::{complain, emit, emit_json};
 use crate::error::{Error, Result};
-use crate::store::{Store, Verification};
+use crate::store::Verification;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,10 +25,10 @@ pub(super) fn main(arguments: &VerifyArguments) -> u8 {
 
 fn execute(arguments: &VerifyArguments) -> Result<u8> {
     let root = arguments.store.clone().unwrap_or_else(default_store);
-    if !root.is_dir() {
+    if bucket(&root).is_none() && !root.is_dir() {
         return Err(Error::spec(root.display().to_string(), "no store here; name one with --store DIR"));
     }
-    let found = match Store::open(&root) {
+    let found = match open_store(Some(&root)) {
         Ok(store) => store.verify()?,
         // The format file itself may be what was damaged.
         Err(Error::Store(fault)) => Verification { faults: vec![fault], ..Verification::default() },

@@ -31,7 +31,7 @@ impl Fleet {
                 let Some(record) = record else { continue };
                 if let (Some(parameters), Some(recording)) = (record.last("parameters"), record.last("recording")) {
                     for (port, table) in [("previous_parameters", parameters), ("previous_recording", recording)] {
-                        let path = ledger.store.object_path(table);
+                        let path = ledger.store.object(table)?;
                         robot.set_text(&format!("{}.{port}", previous.stage), &path.to_string_lossy());
                     }
                 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::Store;
 use super::content::TableHash;
-use super::disk::{make_read_only, place, put_if_absent, refused, write};
+use super::disk::{make_read_only, place, refused, write};
 use super::frame::Frame;
 use super::key::{ActionId, FileHash, StageKey};
 use super::reader;
@@ -91,9 +91,21 @@ impl Store {
         self.root().join("objects").join(name.get(..2).unwrap_or("00")).join(format!("{name}.parquet"))
     }
 
+    /// The file of a published table, which of a store in a bucket is fetched first; fails where the bucket does not hold it whole.
+    pub fn object(&self, table: &TableRef) -> Result<PathBuf> {
+        let path = self.object_path(table);
+        match path.exists() || !self.in_bucket() || self.obtain(table, &path)? {
+            true => Ok(path),
+            false => Err(self.lost(&path)),
+        }
+    }
+
     /// Looks a stage up: done only if the record is whole and all its tables are there, byte for byte.
     pub fn action(&self, key: &StageKey) -> Result<Lookup> {
         let path = self.record_path(&key.id());
+        if !self.refresh(&path)? {
+            return Ok(Lookup::Absent);
+        }
         let bytes = match fs::read(&path) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Lookup::Absent),
@@ -111,10 +123,12 @@ impl Store {
             return damaged("the record is not of this key".into());
         }
         for (port, table) in &record.tables {
-            let length = fs::metadata(self.object_path(table)).map(|metadata| metadata.len());
+            let path = self.object_path(table);
+            let length = fs::metadata(&path).map(|metadata| metadata.len());
             match length {
                 // Read to its end: a stage that is cached must not stand on a table that rotted.
-                Ok(length) if length == table.bytes && same_bytes(&self.object_path(table), table) => (),
+                Ok(length) if length == table.bytes && same_bytes(&path, table) => (),
+                _ if self.obtain(table, &path)? => (),
                 Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
                 Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
                 Err(e) => return damaged(format!("table {port}: {e}")),
@@ -141,7 +155,7 @@ impl Store {
         let path = self.record_path(&record.id);
         let aside = self.workspace()?.fresh();
         let file = write(&aside, &seal(&record)?)?;
-        if put_if_absent(&aside, &path)? {
+        if self.commit(&aside, &path)? {
             let _ = fs::remove_file(&aside);
             self.owe(&path, file)?;
             return Ok(Published { record, conflict: None });
@@ -152,6 +166,7 @@ impl Store {
                 Ok(Published { conflict: conflict(&standing, &record), record: *standing })
             }
             Lookup::Absent | Lookup::Damaged(_) => {
+                self.give(&aside, &path)?;
                 place(&aside, &path)?;
                 self.owe(&path, file)?;
                 Ok(Published { record, conflict: None })
@@ -161,7 +176,7 @@ impl Store {
 
     /// Reads a published table.
     pub fn load(&self, table: &TableRef) -> Result<Frame> {
-        reader::load(&self.object_path(table), table)
+        reader::load(&self.object(table)?, table)
     }
 
     fn write_frame(&self, frame: &Frame) -> Result<FinishedFile> {
@@ -174,6 +189,7 @@ impl Store {
     fn put_object(&self, mut file: FinishedFile) -> Result<TableRef> {
         let table = file.table().clone();
         let path = self.object_path(&table);
+        self.give(file.path(), &path)?;
         if !same_bytes(&path, &table) {
             make_read_only(file.path())?;
             place(file.path(), &path)?;
@@ -186,7 +202,7 @@ impl Store {
     }
 }
 
-fn same_bytes(path: &Path, table: &TableRef) -> bool {
+pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
     fs::File::open(path).and_then(FileHash::of_reader).is_ok_and(|found| found == table.file_hash)
 }
 

@@ -81,7 +81,7 @@ impl Store {
 }
 
 /// Does the same to all, several at a time; hands back the first failure by position.
-fn together<T: Sync>(items: &[T], one: impl Fn(&T) -> Result<()> + Sync) -> Result<()> {
+pub(super) fn together<T: Sync>(items: &[T], one: impl Fn(&T) -> Result<()> + Sync) -> Result<()> {
     let next = AtomicUsize::new(0);
     let failure: Mutex<Option<(usize, Error)>> = Mutex::new(None);
     let work = || {

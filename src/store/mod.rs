@@ -16,7 +16,10 @@ pub mod key;
 mod migrate;
 mod notes;
 mod reader;
+mod remote;
 pub mod runs;
+#[cfg(feature = "s3")]
+mod s3;
 pub mod schema;
 mod seal;
 mod sweep;
@@ -30,6 +33,7 @@ pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
 pub use reader::read_table;
+pub use remote::Bucket;
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
 pub use verify::Verification;
@@ -44,6 +48,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::{Error, Result};
 use disk::{make_dir, put_if_absent, refused, sync_dir, write_synced};
 use durable::Durability;
+use remote::Remote;
 use workspace::Workspace;
 
 /// The layout described above.
@@ -54,10 +59,11 @@ struct Format {
     calib_store: u32,
 }
 
-/// A folder of tables and the record of how they came about.
+/// A folder of tables and the record of how they came about; alone, or before a bucket that many machines share.
 #[derive(Debug)]
 pub struct Store {
     root: PathBuf,
+    remote: Option<Remote>,
     /// Opened with the first write, so that looking leaves no trace.
     workspace: Mutex<Option<Arc<Workspace>>>,
     durability: Durability,
@@ -73,7 +79,7 @@ impl Store {
             Err(e) if e.kind() == ErrorKind::NotFound => check_vacant(&root)?,
             Err(e) => return Err(refused(&path, "read", &e)),
         }
-        Ok(Self { root, workspace: Mutex::new(None), durability: Durability::default() })
+        Ok(Self { root, remote: None, workspace: Mutex::new(None), durability: Durability::default() })
     }
 
     pub fn root(&self) -> &Path {

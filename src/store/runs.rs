@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Store;
 use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
@@ -122,6 +122,7 @@ impl Store {
             let path = dir.join("events.jsonl");
             let aside = self.workspace()?.fresh();
             let file = write(&aside, &seal(manifest)?)?;
+            self.give_run(&aside, &dir.join("manifest.json"))?;
             place(&aside, &dir.join("manifest.json"))?;
             self.owe(&dir.join("manifest.json"), file)?;
             let events = File::options().append(true).create(true).open(&path).map_err(|e| refused(&path, "write", &e))?;
@@ -135,6 +136,7 @@ impl Store {
     pub fn write_manifest(&self, run: &Run, manifest: &impl Serialize) -> Result<()> {
         let aside = self.workspace()?.fresh();
         write_synced(&aside, &seal(manifest)?)?;
+        self.give_state(run, &aside)?;
         replace(&aside, &run.dir.join("manifest.json"))
     }
 
@@ -143,12 +145,20 @@ impl Store {
         let path = run.dir.join("manifest.json");
         let aside = self.workspace()?.fresh();
         self.owe(&aside, write(&aside, &seal(manifest)?)?)?;
+        self.give_state(&run, &aside)?;
         self.owe(&run.dir.join("events.jsonl"), run.events)?;
         self.sync_then(|| place(&aside, &path).map(|()| Some(path)))
     }
 
+    /// Sends the events of a run so far, then its manifest, which is still aside.
+    fn give_state(&self, run: &Run, manifest: &Path) -> Result<()> {
+        let events = run.dir.join("events.jsonl");
+        self.give(&events, &events)?;
+        self.give(manifest, &run.dir.join("manifest.json"))
+    }
+
     /// Folders of runs by name, also of those that did not begin.
-    fn run_folders(&self) -> Result<Vec<String>> {
+    pub(super) fn run_folders(&self) -> Result<Vec<String>> {
         let dir = self.root().join("runs");
         let entries = match fs::read_dir(&dir) {
             Ok(entries) => entries,
@@ -204,7 +214,7 @@ impl Store {
         let runs = self.runs()?;
         let nothing = |message: String| Err(Error::spec(format!("run {text}"), message));
         if runs.is_empty() {
-            return nothing(format!("the store {} has no runs", self.root().display()));
+            return nothing(format!("the store {} has no runs", self.name()));
         }
         if let Some(back) = text.strip_prefix("HEAD") {
             let back = match back.strip_prefix('~') {

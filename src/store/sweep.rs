@@ -31,6 +31,12 @@ impl Store {
     /// Takes away the records of actions that are neither in `keep` nor named by a fleet, the objects that neither a record nor a fleet names then,
     /// and what was set aside as damaged; of all these only what was last changed before `before`. Refuses while a run is in flight.
     pub fn sweep(&self, keep: &BTreeSet<String>, before: SystemTime, dry_run: bool) -> Result<Sweep> {
+        if self.in_bucket() {
+            return Err(Error::spec(
+                self.name(),
+                "what lies in a bucket is not swept: copy the store to a folder, sweep that and copy it back",
+            ));
+        }
         if !dry_run && workspace::in_use(&self.root().join("tmp")) {
             let message = "a run is in flight in this store: sweep when it has ended";
             return Err(Error::store(self.root().display().to_string(), message));

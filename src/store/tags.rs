@@ -51,12 +51,14 @@ impl Store {
         let path = self.tag_path(name)?;
         let aside = self.workspace()?.fresh();
         write_synced(&aside, &seal(&Tag { run: run.into() })?)?;
+        self.give(&aside, &path)?;
         replace(&aside, &path)
     }
 
     /// Takes a name away; the run stays.
     pub fn untag(&self, name: &str) -> Result<()> {
         let path = self.tag_path(name)?;
+        self.withdraw(&path)?;
         fs::remove_file(&path).map_err(|e| refused(&path, "remove", &e))
     }
 }

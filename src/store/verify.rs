@@ -35,8 +35,11 @@ fn texts<S: serde::Serializer>(faults: &[Fault], serializer: S) -> std::result::
 }
 
 impl Store {
-    /// Reads and rehashes every file.
+    /// Reads and rehashes every file; of a bucket everything is fetched anew.
     pub fn verify(&self) -> Result<Verification> {
+        if let Some(copy) = self.copy()? {
+            return self.verify_copy(&copy);
+        }
         let mut found = Verification::default();
         let format = self.root().join("format.json");
         if fs::read(&format).map_err(|e| refused(&format, "read", &e))? != super::format_text()? {
@@ -198,8 +201,29 @@ impl Store {
         Ok(())
     }
 
+    /// Verifies a copy of the bucket. Tables that the bucket does not hold whole are forgotten here, so that the next run makes them anew.
+    fn verify_copy(&self, copy: &Path) -> Result<Verification> {
+        let mut found = match Store::open(copy) {
+            Ok(store) => store.verify()?,
+            Err(Error::Store(fault)) => Verification { faults: vec![fault], ..Verification::default() },
+            Err(other) => return Err(other),
+        };
+        let (prefix, name) = (copy.display().to_string(), self.name());
+        for fault in &mut found.faults {
+            if let Ok(key) = Path::new(&fault.place).strip_prefix(copy)
+                && key.starts_with("objects")
+            {
+                let _ = fs::remove_file(self.root().join(key));
+            }
+            (fault.place, fault.message) = (fault.place.replace(&prefix, &name), fault.message.replace(&prefix, &name));
+        }
+        fs::remove_dir_all(copy).map_err(|e| refused(copy, "remove", &e))?;
+        Ok(found)
+    }
+
     /// Every action record that can be read.
     pub fn records(&self) -> Result<Vec<ActionRecord>> {
+        self.refresh_all("actions/")?;
         let mut records = Vec::new();
         for path in files(&self.root().join("actions"))? {
             records.extend(read_record(&path)?.ok());

@@ -1,6 +1,7 @@
 //! Integration tests, one module a capability.
 
 mod arms;
+mod bucket;
 mod cmd;
 mod compensate;
 mod conceal;

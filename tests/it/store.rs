@@ -34,11 +34,11 @@ fn columns(keys: &[i64]) -> FrameBuilder {
     frame
 }
 
-fn split(keys: std::ops::Range<i64>) -> Frame {
+pub(super) fn split(keys: std::ops::Range<i64>) -> Frame {
     columns(&keys.collect::<Vec<_>>()).finish().unwrap()
 }
 
-fn publish(store: &Store, key: &StageKey, frame: &Frame) -> Result<Published> {
+pub(super) fn publish(store: &Store, key: &StageKey, frame: &Frame) -> Result<Published> {
     store.publish(key, vec![("out".into(), Product::Frame(frame.clone()))], Account::default())
 }
 

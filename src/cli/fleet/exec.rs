@@ -6,7 +6,6 @@ use super::{run, workshop};
 use crate::error::{Error, Result};
 use crate::fleet::{Fleet, local};
 use crate::progress::{FleetProgress, Verbosity};
-use crate::store::Store;
 use clap::Args;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -25,7 +24,7 @@ pub(super) struct ExecArguments {
 }
 
 pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Result<()> {
-    let store = Store::open(&arguments.store)?;
+    let store = super::folder(&arguments.store)?;
     let ledger = run::ledger(&store, &arguments.fleet);
     let note = ledger.run(Some(&arguments.run))?;
     let note = note.ok_or_else(|| Error::store(&arguments.run, "no such run in the store, or not yet visible here"))?;

@@ -6,7 +6,7 @@ mod render;
 mod run;
 mod status;
 
-use super::surroundings::default_store;
+use super::surroundings::{bucket, default_store};
 use crate::error::{Error, Fault, Result};
 use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop};
 use crate::pipeline::Surroundings;
@@ -15,7 +15,7 @@ use crate::store::Store;
 use clap::{Args, Subcommand};
 use rayon::prelude::*;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Run one pipeline over many robots: fleet files, workers, what became of each, tables and a page.
 #[derive(Args)]
@@ -48,8 +48,18 @@ struct Place {
 
 impl Place {
     fn store(&self) -> Result<Store> {
-        Store::open(self.store.clone().unwrap_or_else(default_store))
+        folder(&self.store.clone().unwrap_or_else(default_store))
     }
+}
+
+/// Opens the folder that all workers of a fleet share.
+fn folder(store: &Path) -> Result<Store> {
+    if bucket(store).is_some() {
+        let message =
+            "a fleet needs a folder that all its workers see; a robot alone runs with calib run --store s3://BUCKET/PREFIX";
+        return Err(Error::spec("--store", message));
+    }
+    Store::open(store)
 }
 
 pub(super) fn main(arguments: &FleetArguments, command_line: &[OsString]) -> Result<()> {

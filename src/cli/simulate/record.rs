@@ -1,6 +1,6 @@
 //! `calib simulate record`: a pipeline's twin as the files that a user has.
 
-use super::super::surroundings::{cores, default_store, surroundings};
+use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
 use super::conceal::vacant;
 use crate::error::{Error, Result};
@@ -54,7 +54,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let Some(stage) = stage else { return Err(Error::spec(place, "has no stage `simulate`")) };
     vacant(&arguments.out)?;
     let plan = plan.needed_for(stage);
-    let store = Store::open(arguments.store.clone().unwrap_or_else(default_store))?;
+    let store = open_store(arguments.store.as_deref())?;
     let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
     let options = RunOptions { selection: Selection::default(), jobs: cores() };
