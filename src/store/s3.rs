@@ -94,7 +94,12 @@ impl S3 {
     /// What went wrong, and what the reader can do about it.
     fn refused(&self, doing: &str, key: &str, error: object_store::Error) -> Error {
         let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-        let said: String = text.chars().take(SHOWN).collect();
+        let mut said: String = text.chars().take(SHOWN).collect();
+        // The first cause (no route, a certificate) is the last of a chain, and a text need not name it.
+        let causes = std::iter::successors(std::error::Error::source(&error), |error| error.source());
+        said.extend(
+            causes.last().map(ToString::to_string).filter(|cause| !text.contains(cause)).map(|cause| format!(": {cause}")),
+        );
         let place = format!("{}/{key}", self.name);
         if text.contains("NoSuchBucket") {
             let message =
