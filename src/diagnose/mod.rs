@@ -306,9 +306,10 @@ fn yielding(now: &Course, joints: usize) -> Vec<f64> {
     out
 }
 
-/// Rows that the search looks at: all, or [`SEARCHED`] of them by a sequence that keeps no step with any design of the recording; the
-/// model is fitted to all.
+/// Rows that the search looks at: all but the recording's first, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
+/// that keeps no step with any design of the recording; the model is fitted to all.
 fn thinned(rows: &[usize]) -> Vec<usize> {
+    let rows = rows.strip_prefix(&[0]).unwrap_or(rows);
     if rows.len() <= SEARCHED {
         return rows.to_vec();
     }

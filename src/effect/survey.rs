@@ -23,8 +23,8 @@ pub struct Survey<'a> {
     pub reference_c: Option<f64>,
 }
 
-/// At either end of a recording so many rows must lie beyond a change point.
-const EDGE: usize = 3;
+/// At either end of a recording so many rows must lie beyond a change point: fewer are a few wrong points.
+const EDGE: usize = 5;
 
 impl<'a> Survey<'a> {
     pub fn new(robot: &'a RobotModel, data: &'a Measurements, rows: &'a [usize], torque: &'a [f64], yielding: &'a [f64]) -> Self {
