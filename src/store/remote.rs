@@ -56,15 +56,21 @@ impl Store {
         store.workspace()?;
         let format = store.root.join("format.json");
         let aside = store.workspace()?.fresh();
-        let begun = bucket.fetch("format.json", &aside)?;
+        let mut begun = bucket.fetch("format.json", &aside)?;
+        if !begun && let Some((key, _)) = bucket.list("", 1)?.first() {
+            // Another machine may have begun it in this moment.
+            begun = bucket.fetch("format.json", &aside)?;
+            if !begun {
+                let message = format!(
+                    "not a calib store (no format.json, but `{key}`); --store takes a store, or a prefix without anything"
+                );
+                return Err(Error::spec(bucket.name(), message));
+            }
+        }
         if begun {
             let bytes = fs::read(&aside).map_err(|e| refused(&aside, "read", &e))?;
             super::check_format(Path::new(&format!("{}/format.json", bucket.name())), &bytes)?;
             place(&aside, &format)?;
-        } else if let Some((key, _)) = bucket.list("", 1)?.first() {
-            let message =
-                format!("not a calib store (no format.json, but `{key}`); --store takes a store, or a prefix without anything");
-            return Err(Error::spec(bucket.name(), message));
         }
         store.remote = Some(Remote { bucket, begun: AtomicBool::new(begun) });
         store.refresh_runs()?;
@@ -112,6 +118,11 @@ impl Store {
             let aside = self.workspace()?.fresh();
             write(&aside, &super::format_text()?)?;
             remote.bucket.create(&aside, "format.json")?;
+            // A server that does not know the condition writes again, and the second of two would undo the first.
+            if remote.bucket.create(&aside, "format.json")? {
+                let message = "this server does not know put-if-absent (If-None-Match: *): take one that does, or a folder";
+                return Err(Error::spec(remote.bucket.name(), message));
+            }
             let _ = fs::remove_file(&aside);
             remote.begun.store(true, Ordering::Release);
         }
