@@ -67,9 +67,11 @@ fn words(rival: &str) -> String {
         "gaussian_process" => "Gaussian process".into(),
         "curves" => "joint curves".into(),
         "mlp_random" => "network, started at random".into(),
-        _ => match rival.strip_prefix("mlp_") {
-            Some(start) => format!("network, started by {}", start.to_uppercase()),
-            None => rival.into(),
+        _ => match (rival.strip_prefix("mlp_joints_"), rival.strip_prefix("mlp_")) {
+            (Some("random"), _) => "joint network, started at random".into(),
+            (Some(start), _) => format!("joint network, started by {}", start.to_uppercase()),
+            (None, Some(start)) => format!("network, started by {}", start.to_uppercase()),
+            (None, None) => rival.into(),
         },
     }
 }

@@ -98,8 +98,10 @@ pub enum RivalSetting {
     GaussianProcess,
     /// A curve for each joint, small motions of links and wind-up by weight, through the Jacobian.
     Curves,
-    /// Networks with one hidden layer.
+    /// Networks with one hidden layer, a displacement of the point as their output.
     Mlp,
+    /// The same with joint motions as their outputs, through the Jacobian.
+    MlpJoints,
 }
 
 /// Where the training of networks starts.
@@ -177,7 +179,7 @@ writes! {
 impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str = "learns what the model leaves over: rivals compared, the best kept, and only where it helps";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -200,9 +202,10 @@ impl Stage for Learn {
             }
         }
         if self.rivals.is_empty() {
-            faults.push(Fault::new("rivals", "expected at least one of ridge, gaussian_process, curves, mlp"));
+            faults.push(Fault::new("rivals", "expected at least one of ridge, gaussian_process, curves, mlp, mlp_joints"));
         }
-        if self.starts.is_empty() && self.rivals.contains(&RivalSetting::Mlp) {
+        if self.starts.is_empty() && self.rivals.iter().any(|rival| matches!(rival, RivalSetting::Mlp | RivalSetting::MlpJoints))
+        {
             faults.push(Fault::new("starts", "expected at least one of random, bas, bso, pso, ga, abc"));
         }
         if !(0.0..0.5).contains(&self.keep_back) {
@@ -260,6 +263,7 @@ impl Learn {
         Recipe {
             joints: prismatic.len(),
             features: features(prismatic, self.inputs == Inputs::SinCos, self.payload),
+            through: None,
             hidden: self.hidden.unwrap_or(HIDDEN[1]),
             activation: match self.activation {
                 ActivationSetting::Sigmoid => Activation::Sigmoid,
@@ -322,6 +326,7 @@ impl Learn {
                 RivalSetting::GaussianProcess => rivals.push(Rival::Process),
                 RivalSetting::Curves => rivals.push(Rival::Curves),
                 RivalSetting::Mlp => rivals.extend(self.starts.iter().map(|start| Rival::Network((*start).into()))),
+                RivalSetting::MlpJoints => rivals.extend(self.starts.iter().map(|start| Rival::JointNetwork((*start).into()))),
             }
         }
         let mut once: Vec<Rival> = Vec::new();

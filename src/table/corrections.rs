@@ -4,7 +4,7 @@ crate::table::rows! { "corrections",
     /// One rival a row; key (`step`, `rival`).
     pub struct Corrections of CorrectionsRow {
         step: String,
-        /// `none`, `ridge`, `gaussian_process`, `curves`, or `mlp_` and where the training starts.
+        /// `none`, `ridge`, `gaussian_process`, `curves`, or `mlp_` or `mlp_joints_` and where the training starts.
         rival: String,
         /// Whether this one was kept.
         chosen: bool,

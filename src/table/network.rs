@@ -41,6 +41,12 @@ impl Network {
             Body::Networks(dress, networks) => {
                 table.dress(dress, prismatic);
                 table.put(0, activation_name(networks.shape.activation), [0, 0, 0], 1.0);
+                if let Some(motion) = &networks.joints {
+                    table.arm(&motion.arm);
+                    for (joint, scale) in motion.scales.iter().enumerate() {
+                        table.put(0, "joint_scale", [0, joint + 1, 0], scale * source_unit(joint, prismatic));
+                    }
+                }
                 for (m, parameters) in networks.members.iter().enumerate() {
                     for (index, value) in parameters.iter().enumerate() {
                         let (part, place) = place(networks.shape, index);

@@ -3,6 +3,7 @@
 //! Inside the region that the training saw it is what was learnt; outside, sources are held at its edge and it fades to nothing
 //! (see [`Region`]).
 
+use super::arm::Arm;
 use super::linear::Linear;
 use super::perceptron::{OUTPUTS, Shape};
 use super::process::Process;
@@ -94,12 +95,37 @@ impl Dress {
     }
 }
 
+/// Outputs that are motions of the joints, which move the point through the arm's Jacobian.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointMotion {
+    pub arm: Arm,
+    /// Motion of each joint per unit of output, rad or m.
+    pub scales: Vec<f64>,
+}
+
+impl JointMotion {
+    /// What each output does to the measured point at joint positions `q`, m per unit.
+    pub fn ways(&self, q: &[f64]) -> Vec<[f64; OUTPUTS]> {
+        let stance = self.arm.stance(q);
+        self.scales.iter().enumerate().map(|(joint, scale)| (stance.turn(joint) * *scale).into()).collect()
+    }
+}
+
 /// Equal networks whose mean is the correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Networks {
     pub shape: Shape,
+    /// `None`: outputs are the axes.
+    pub joints: Option<JointMotion>,
     /// Parameters of each network.
     pub members: Vec<Vec<f64>>,
+}
+
+impl Networks {
+    /// Outputs of each network at scaled inputs.
+    fn outputs<'a>(&'a self, x: &'a [f64]) -> impl Iterator<Item = Vec<f64>> + 'a {
+        self.members.iter().map(|member| self.shape.at(member, x))
+    }
 }
 
 /// What was learnt.
@@ -154,7 +180,14 @@ impl Correction {
             }
             Body::Networks(dress, networks) => {
                 let x = dress.scaled(sources);
-                let each: Vec<[f64; OUTPUTS]> = networks.members.iter().map(|member| networks.shape.at(member, &x)).collect();
+                let each: Vec<[f64; OUTPUTS]> = match &networks.joints {
+                    None => networks.outputs(&x).map(|y| std::array::from_fn(|k| y[k])).collect(),
+                    Some(motion) => {
+                        let ways = motion.ways(sources);
+                        let along = |y: &[f64], k: usize| y.iter().zip(&ways).map(|(y, way)| y * way[k]).sum::<f64>();
+                        networks.outputs(&x).map(|y| std::array::from_fn(|k| along(&y, k) / dress.outputs[k].scale)).collect()
+                    }
+                };
                 let count = each.len().max(1) as f64;
                 let mean: [f64; OUTPUTS] = std::array::from_fn(|k| each.iter().map(|y| y[k]).sum::<f64>() / count);
                 let squares: f64 = each.iter().flatten().zip(mean.iter().cycle()).map(|(y, mean)| (y - mean).powi(2)).sum();

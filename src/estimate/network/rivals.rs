@@ -10,7 +10,7 @@ use super::linear::Linear;
 use super::process::Process;
 use super::region::Region;
 use super::training::{Course, Recipe, Samples, Start, dressed, train};
-use crate::estimate::swarm::Generation;
+use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
 
@@ -28,9 +28,14 @@ pub enum Rival {
     Process,
     /// Joint curves, small motions of links and wind-up by weight, through the Jacobian.
     Curves,
-    /// Multilayer perceptrons, by where their training starts.
+    /// Multilayer perceptrons whose outputs move the point along the axes, by where their training starts.
     Network(Start),
+    /// Multilayer perceptrons whose outputs are joint motions, through the Jacobian.
+    JointNetwork(Start),
 }
+
+/// Kinds of networks: each has its decay and size of hidden layer chosen for itself, with random starts.
+const KINDS: [fn(Start) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
 
 impl Rival {
     pub fn name(self) -> &'static str {
@@ -39,13 +44,33 @@ impl Rival {
             Self::Process => "gaussian_process",
             Self::Curves => "curves",
             Self::Network(Start::Random) => "mlp_random",
-            Self::Network(Start::Swarm(algorithm)) => match algorithm.name() {
-                "bas" => "mlp_bas",
-                "pso" => "mlp_pso",
-                "ga" => "mlp_ga",
-                "abc" => "mlp_abc",
-                _ => "mlp_bso",
+            Self::Network(Start::Swarm(algorithm)) => match algorithm {
+                Algorithm::Bas => "mlp_bas",
+                Algorithm::Bso => "mlp_bso",
+                Algorithm::Pso => "mlp_pso",
+                Algorithm::Ga => "mlp_ga",
+                Algorithm::Abc => "mlp_abc",
             },
+            Self::JointNetwork(Start::Random) => "mlp_joints_random",
+            Self::JointNetwork(Start::Swarm(algorithm)) => match algorithm {
+                Algorithm::Bas => "mlp_joints_bas",
+                Algorithm::Bso => "mlp_joints_bso",
+                Algorithm::Pso => "mlp_joints_pso",
+                Algorithm::Ga => "mlp_joints_ga",
+                Algorithm::Abc => "mlp_joints_abc",
+            },
+        }
+    }
+
+    /// Whether it needs the arm.
+    pub fn goes_through_the_jacobian(self) -> bool {
+        matches!(self, Self::Curves | Self::JointNetwork(_))
+    }
+
+    fn start(self) -> Option<Start> {
+        match self {
+            Self::Network(start) | Self::JointNetwork(start) => Some(start),
+            _ => None,
         }
     }
 }
@@ -54,7 +79,7 @@ impl Rival {
 #[derive(Debug, Clone)]
 pub struct Contest<'a> {
     pub rivals: Vec<Rival>,
-    /// What joint curves go through; without it they are no rival.
+    /// What joint curves and joint networks go through; without it they are no rivals.
     pub arm: Option<&'a Arm>,
     pub prismatic: &'a [bool],
     /// How the kept correction is trained.
@@ -123,9 +148,15 @@ struct Done {
 
 /// How many fits [`compare`] makes.
 pub fn fits(contest: &Contest) -> usize {
-    let networks = contest.rivals.iter().filter(|rival| matches!(rival, Rival::Network(_))).count();
-    let grid = if networks > 0 { contest.decays.len() * contest.hidden.len() } else { 0 };
-    (contest.rivals.len() + grid) * contest.folds
+    let grids = KINDS.iter().filter(|kind| contest.has(**kind)).count();
+    (contest.rivals.len() + grids * contest.decays.len() * contest.hidden.len()) * contest.folds
+}
+
+impl Contest<'_> {
+    /// Whether networks of a kind take part, from whatever start.
+    fn has(&self, kind: fn(Start) -> Rival) -> bool {
+        self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
+    }
 }
 
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
@@ -155,27 +186,26 @@ pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &st
     let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
     let nothing = Judged { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
     let mut judged = vec![nothing];
-    let chance = Rival::Network(Start::Random);
-    let networks = contest.rivals.iter().any(|rival| matches!(rival, Rival::Network(_)));
-    let mut trial = Recipe { jobs: 1, ..contest.trial.clone() };
-    if networks {
+    let trial = Recipe { jobs: 1, ..contest.trial.clone() };
+    let mut entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
+    for kind in KINDS.into_iter().filter(|kind| contest.has(*kind)) {
         let mut grid = Vec::new();
         for hidden in &contest.hidden {
             for decay in &contest.decays {
-                grid.push((chance, Recipe { hidden: *hidden, decay: *decay, start: Start::Random, ..trial.clone() }));
+                grid.push((kind(Start::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
             }
         }
         let results = run(&tasks(&grid));
         let errors: Vec<f64> =
             results.chunks(contest.folds).map(|folds| together(folds, &before).map_or(f64::NAN, |j| j.mean())).collect();
         if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
-            trial = grid[best].1.clone();
+            let own = entered.iter_mut().filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
+            own.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
         }
     }
-    let entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
     let results = run(&tasks(&entered));
     for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
-        let settings = matches!(rival, Rival::Network(_)).then_some((recipe.hidden, recipe.decay));
+        let settings = rival.start().is_some().then_some((recipe.hidden, recipe.decay));
         if let Some(row) = together(folds, &before) {
             judged.push(Judged { rival: Some(*rival), settings, ..row });
         }
@@ -208,7 +238,11 @@ fn fit(
 ) -> Option<(Correction, Vec<Course>)> {
     let region = || Region::of(&samples.sources, recipe.joints);
     let body = match rival {
-        Rival::Network(start) => return Some(train(samples, &Recipe { start, ..recipe.clone() }, observe)),
+        Rival::Network(start) => return Some(train(samples, &Recipe { start, through: None, ..recipe.clone() }, observe)),
+        Rival::JointNetwork(start) => {
+            let through = Some(contest.arm?.clone());
+            return Some(train(samples, &Recipe { start, through, ..recipe.clone() }, observe));
+        }
         Rival::Ridge => Body::Linear(Linear::fit(samples, None, &harmonics(contest.prismatic), recipe.seed)?),
         Rival::Curves => Body::Linear(Linear::fit(samples, contest.arm, &curves(contest.arm?, samples.rows()), recipe.seed)?),
         Rival::Process => {

@@ -2,9 +2,12 @@
 //!
 //! All swarms may spend what a beetle swarm of the recipe's size does. Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
 
-use super::correction::{Body, Correction, Dress, Feature, Networks, Scaling};
+use super::activation::Activation;
+use super::arm::Arm;
+use super::correction::{Body, Correction, Dress, Feature, JointMotion, Networks, Scaling};
 use super::descent::{Iteration, descend};
-use super::perceptron::{Activation, Batch, Loss, OUTPUTS, Scratch, Shape};
+use super::loss::{Batch, Loss, Scratch};
+use super::perceptron::{OUTPUTS, Shape};
 use super::region::Region;
 use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation, Objective};
 use crate::estimate::threads::in_order;
@@ -58,6 +61,8 @@ pub struct Recipe {
     /// How many of the sources are joints; one more is the payload.
     pub joints: usize,
     pub features: Vec<Feature>,
+    /// Outputs are motions of this arm's joints (Fig. 2 of the paper); without it, of the point.
+    pub through: Option<Arm>,
     pub hidden: usize,
     pub activation: Activation,
     pub start: Start,
@@ -115,6 +120,9 @@ struct Prepared<'a> {
     shape: Shape,
     x: Vec<Vec<f64>>,
     y: Vec<[f64; OUTPUTS]>,
+    joints: Option<JointMotion>,
+    /// What each output does to the point at each row, in units of the scaled targets; empty without joints.
+    ways: Vec<Vec<[f64; OUTPUTS]>>,
     dress: Dress,
     region: Region,
 }
@@ -129,11 +137,41 @@ pub(super) fn dressed(samples: &Samples, features: &[Feature]) -> (Dress, Vec<Ve
     (dress, x, y)
 }
 
+/// Joint motions of such sizes that each alone would make the residual's root mean square, which is given too, m.
+fn motion(samples: &Samples, arm: &Arm) -> (JointMotion, f64) {
+    let count = (OUTPUTS * samples.rows()) as f64;
+    let squares = |values: &[[f64; OUTPUTS]]| values.iter().flatten().map(|value| value * value).sum::<f64>();
+    let size = (squares(&samples.residual) / count).sqrt();
+    let size = if size > 1e-12 { size } else { 1.0 };
+    let mut motion = JointMotion { arm: arm.clone(), scales: vec![1.0; arm.hinges.len()] };
+    let mut levers = vec![0.0; motion.scales.len()];
+    for q in &samples.sources {
+        for (lever, way) in levers.iter_mut().zip(motion.ways(q)) {
+            *lever += squares(&[way]);
+        }
+    }
+    // A joint whose axis goes through the point moves nothing, whatever its scale.
+    let scale = |lever: f64| if lever > 1e-18 { size / (lever / count).sqrt() } else { 0.0 };
+    motion.scales = levers.into_iter().map(scale).collect();
+    (motion, size)
+}
+
 impl<'a> Prepared<'a> {
     fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
-        let (dress, x, y) = dressed(samples, &recipe.features);
-        let shape = Shape { inputs: recipe.features.len(), hidden: recipe.hidden, activation: recipe.activation };
-        Self { recipe, shape, x, y, dress, region: Region::of(&samples.sources, recipe.joints) }
+        let (mut dress, x, mut y) = dressed(samples, &recipe.features);
+        let joints = recipe.through.as_ref().map(|arm| motion(samples, arm));
+        let mut ways = Vec::new();
+        if let Some((motion, size)) = &joints {
+            // Lengths are compared, so all axes have one scale.
+            dress.outputs = [Scaling { mean: 0.0, scale: *size }; OUTPUTS];
+            y = samples.residual.iter().map(|r| r.map(|value| value / size)).collect();
+            let scaled = |way: [f64; OUTPUTS]| way.map(|value| value / size);
+            ways = samples.sources.iter().map(|q| motion.ways(q).into_iter().map(scaled).collect()).collect();
+        }
+        let outputs = joints.as_ref().map_or(OUTPUTS, |(motion, _)| motion.scales.len());
+        let shape = Shape { inputs: recipe.features.len(), hidden: recipe.hidden, outputs, activation: recipe.activation };
+        let joints = joints.map(|(motion, _)| motion);
+        Self { recipe, shape, x, y, joints, ways, dress, region: Region::of(&samples.sources, recipe.joints) }
     }
 
     /// Where members start, best first, and the course of the swarm; chance has none.
@@ -225,7 +263,8 @@ impl<'a> Prepared<'a> {
 
     fn correction(self, members: Vec<Vec<f64>>) -> Correction {
         let left = 0.0;
-        Correction { body: Body::Networks(self.dress, Networks { shape: self.shape, members }), region: self.region, left }
+        let networks = Networks { shape: self.shape, joints: self.joints, members };
+        Correction { body: Body::Networks(self.dress, networks), region: self.region, left }
     }
 
     /// A stream of its own for each purpose, so that none depends on how much another drew.
@@ -238,7 +277,11 @@ impl<'a> Prepared<'a> {
     fn batch(&self, rows: &[usize]) -> Batch {
         let x: Vec<Vec<f64>> = rows.iter().map(|r| self.x[*r].clone()).collect();
         let y: Vec<[f64; OUTPUTS]> = rows.iter().map(|r| self.y[*r]).collect();
-        Batch::new(&x, &y)
+        let batch = Batch::new(&x, &y);
+        match self.ways.is_empty() {
+            true => batch,
+            false => batch.through(&rows.iter().map(|r| self.ways[*r].clone()).collect::<Vec<_>>()),
+        }
     }
 
     /// Root of the mean squared length, m, from mean squares of the scaled outputs.

@@ -82,13 +82,13 @@ impl Method for BeetleSwarm {
 
     fn step<O: Objective>(&self, swarm: &mut Swarm, search: &mut Search<O>) {
         let inertia = search.falling(self.inertia);
-        for (i, velocity) in swarm.velocities.iter_mut().enumerate() {
-            for (s, v) in velocity.iter_mut().enumerate() {
-                let x = swarm.positions[i][s];
-                let own = self.c1 * search.rng.random::<f64>() * (swarm.best[i].1[s] - x);
-                let group = self.c2 * search.rng.random::<f64>() * (search.best.1[s] - x);
-                let limit = self.fastest * search.bounds.width(s);
-                *v = (inertia * *v + own + group).clamp(-limit, limit);
+        let limits: Vec<f64> = (0..search.bounds.dimensions()).map(|s| self.fastest * search.bounds.width(s)).collect();
+        for ((velocity, position), own) in swarm.velocities.iter_mut().zip(&swarm.positions).zip(&swarm.best) {
+            let goals = own.1.iter().zip(&search.best.1);
+            for (((v, x), (own, group)), limit) in velocity.iter_mut().zip(position).zip(goals).zip(&limits) {
+                let own = self.c1 * search.rng.random::<f64>() * (own - x);
+                let group = self.c2 * search.rng.random::<f64>() * (group - x);
+                *v = (inertia * *v + own + group).clamp(-limit, *limit);
             }
         }
         let half = swarm.antenna / 2.0;

@@ -64,8 +64,9 @@ impl Bounds {
         self.upper[s] - self.lower[s]
     }
     fn clamp(&self, x: &mut [f64]) {
-        for (s, value) in x.iter_mut().enumerate() {
-            *value = value.clamp(self.lower[s], self.upper[s]);
+        for ((value, lower), upper) in x.iter_mut().zip(&self.lower).zip(&self.upper) {
+            // Not `clamp`: that the bounds are in order is known, and it checks for every number.
+            *value = value.max(*lower).min(*upper);
         }
     }
     /// A point anywhere in the box.
@@ -140,6 +141,8 @@ pub struct Search<'a, O: Objective> {
     bounds: &'a Bounds,
     rng: ChaCha8Rng,
     jobs: usize,
+    /// Of the one thread that evaluates where there are no others.
+    scratch: O::Scratch,
     /// Number of the generation being made, from 1, and how many there may be.
     generation: usize,
     generations: usize,
@@ -152,14 +155,19 @@ impl<O: Objective> Search<'_, O> {
     /// Values at `positions` that are only smelt at (antennae): counted, not remembered.
     fn probe(&mut self, positions: &[Vec<f64>]) -> Vec<f64> {
         self.evaluations += positions.len() as u64;
+        let number = |value: f64| if value.is_nan() { f64::INFINITY } else { value };
+        if self.jobs <= 1 {
+            let (objective, scratch) = (self.objective, &mut self.scratch);
+            return positions.iter().map(|x| number(objective.value(x, scratch))).collect();
+        }
         // A chunk is all that a thread evaluates, so that scratch memory is made once per chunk.
-        let size = positions.len().div_ceil(self.jobs.max(1)).max(1);
+        let size = positions.len().div_ceil(self.jobs).max(1);
         let chunks: Vec<&[Vec<f64>]> = positions.chunks(size).collect();
         let values = in_order(self.jobs, chunks.len(), |c| {
             let mut scratch = self.objective.scratch();
             chunks[c].iter().map(|x| self.objective.value(x, &mut scratch)).collect::<Vec<f64>>()
         });
-        values.into_iter().flatten().map(|value| if value.is_nan() { f64::INFINITY } else { value }).collect()
+        values.into_iter().flatten().map(number).collect()
     }
     /// Values at the positions of a generation; the best ever is remembered.
     fn visit(&mut self, positions: &[Vec<f64>]) -> Vec<f64> {
@@ -200,6 +208,7 @@ pub fn minimise<M: Method, O: Objective>(
         bounds,
         rng: ChaCha8Rng::seed_from_u64(budget.seed),
         jobs: budget.jobs,
+        scratch: objective.scratch(),
         generation: 0,
         generations: budget.generations,
         evaluations: 0,

@@ -53,7 +53,9 @@ pub(super) fn table(step: &str, contest: &Contest, comparison: &Comparison, lear
         rival: rival.name().into(),
         chosen: false,
         reason: match rival {
-            Rival::Curves if contest.arm.is_none() => "the stage has no robot with these joints, or no parameters".into(),
+            rival if rival.goes_through_the_jacobian() && contest.arm.is_none() => {
+                "the stage has no robot with these joints, or no parameters".into()
+            }
             _ => "it could not be fitted to these rows".into(),
         },
         before_mm: before,

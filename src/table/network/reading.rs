@@ -5,11 +5,11 @@ use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map
 use crate::error::{Error, Result};
 use crate::estimate::network::arm::{Arm, Hinge};
 use crate::estimate::network::basis::{Term, Wave, Way};
-use crate::estimate::network::correction::{Body, Correction, Dress, Feature, Map, Networks, Scaling};
+use crate::estimate::network::correction::{Body, Correction, Dress, Feature, JointMotion, Map, Networks, Scaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
 use crate::estimate::network::region::{Jointly, Region, Valid};
-use crate::estimate::network::{Activation, Shape};
+use crate::estimate::network::{Activation, OUTPUTS, Shape};
 use std::collections::BTreeMap;
 
 impl Network {
@@ -31,7 +31,7 @@ impl Network {
             Body::Process(dress, process)
         } else {
             let dress = dress(&numbers, prismatic, sources)?;
-            let networks = networks(&numbers, dress.features.len())?;
+            let networks = networks(&numbers, dress.features.len(), prismatic)?;
             Body::Networks(dress, networks)
         };
         Ok(Some(Correction { body, region, left: numbers.shared("left", 0)? / MILLI }))
@@ -83,12 +83,24 @@ fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Dress>
     Ok(Dress { features, inputs, outputs })
 }
 
-fn networks(numbers: &Numbers, inputs: usize) -> Result<Networks> {
+fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {
     let activation = [Activation::Sigmoid, Activation::Tanh].into_iter().find(|a| numbers.has(activation_name(*a)));
     let activation = activation.ok_or_else(|| Error::data("network", "neither `sigmoid` nor `tanh`"))?;
-    // Of the hidden layer's bias and the three of the outputs, the first member's.
-    let hidden = numbers.first_member("bias").saturating_sub(3);
-    let shape = Shape { inputs, hidden, activation };
+    let mut joints = None;
+    if numbers.has("joint_scale") {
+        let arm = arm(numbers)?;
+        let scale = |joint: usize| Ok(numbers.shared("joint_scale", joint + 1)? / source_unit(joint, prismatic));
+        let scales = (0..arm.hinges.len()).map(scale).collect::<Result<Vec<f64>>>()?;
+        if scales.len() != prismatic.len() {
+            let message = format!("motions of {} joints, of a robot that has {}", scales.len(), prismatic.len());
+            return Err(Error::data("network", message));
+        }
+        joints = Some(JointMotion { arm, scales });
+    }
+    let outputs = joints.as_ref().map_or(OUTPUTS, |motion: &JointMotion| motion.scales.len());
+    // Of the biases of the hidden layer and of the outputs, the first member's.
+    let hidden = numbers.first_member("bias").saturating_sub(outputs);
+    let shape = Shape { inputs, hidden, outputs, activation };
     let member = |member: usize| -> Result<Vec<f64>> {
         let value = |index: usize| {
             let (part, place) = place(shape, index);
@@ -96,7 +108,7 @@ fn networks(numbers: &Numbers, inputs: usize) -> Result<Networks> {
         };
         (0..shape.parameters()).map(value).collect()
     };
-    Ok(Networks { shape, members: (1..=numbers.members("bias")).map(member).collect::<Result<_>>()? })
+    Ok(Networks { shape, joints, members: (1..=numbers.members("bias")).map(member).collect::<Result<_>>()? })
 }
 
 fn process(numbers: &Numbers, inputs: usize) -> Result<Process> {
