@@ -66,7 +66,8 @@ impl Bounds {
     fn clamp(&self, x: &mut [f64]) {
         for ((value, lower), upper) in x.iter_mut().zip(&self.lower).zip(&self.upper) {
             // Not `clamp`: that the bounds are in order is known, and it checks for every number.
-            *value = value.max(*lower).min(*upper);
+            let above = if *value < *lower { *lower } else { *value };
+            *value = if above > *upper { *upper } else { above };
         }
     }
     /// A point anywhere in the box.
