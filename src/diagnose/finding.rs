@@ -148,7 +148,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         let mut rivals = rivals(pool, &rest, &own, bic, (effect, &place));
         exact(effect, &forms, &place, &mut rivals);
         rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
-        let effect_rms = size(pool, &own, &whole, &sorted);
+        let effect_rms = size(pool, members.iter().map(|i| (set[*i], &last.model.x[ranges[*i].clone()])));
         let evidence = Evidence {
             f_statistic,
             p_value: tail(f_statistic, rank as f64, freedom),
@@ -316,20 +316,15 @@ fn people(unit: Unit) -> (Unit, &'static str) {
     }
 }
 
-/// Rms length (m) of the whole effect over the fitted rows, the absorbed part included.
-fn size(pool: &Pool, own: &[usize], whole: &super::state::Solution, set: &[usize]) -> f64 {
+/// Rms length (m) of the whole effect over the fitted rows, the absorbed part included, of hypotheses with their fitted coefficients.
+fn size<'a>(pool: &Pool, own: impl Iterator<Item = (usize, &'a [f64])>) -> f64 {
     // In standard deviations of the rows; the mean noise turns it into a length.
-    let mut at = 0;
     let mut sum = vec![0.0; pool.lines];
-    for k in set {
-        let count = pool.first[k + 1] - pool.first[*k];
-        if own.contains(k) {
-            let columns = pool.lens.columns(&pool.hypotheses[*k].form);
-            for (column, coefficient) in columns.chunks(pool.lines).zip(&whole.coefficients[at..at + count]) {
-                sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
-            }
+    for (k, coefficients) in own {
+        let columns = pool.lens.columns(&pool.hypotheses[k].form);
+        for (column, coefficient) in columns.chunks(pool.lines).zip(coefficients) {
+            sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
         }
-        at += count;
     }
     let rows = pool.lens.rows;
     let squares = rows.iter().enumerate().map(|(i, row)| {

@@ -11,6 +11,7 @@ mod judge;
 mod lens;
 mod locate;
 mod noise;
+mod outside;
 mod pool;
 mod search;
 mod sense;
@@ -21,6 +22,7 @@ mod verdict;
 pub use finding::{Evidence, Finding, Number, Rival};
 pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
+pub use outside::beside;
 pub use verdict::{Diagnosis, Errors, Verdict};
 
 use crate::effect::{
@@ -63,6 +65,10 @@ const SEARCHED: usize = 800;
 const REVERSED: f64 = -2.0;
 /// The scale of a curve's numbers in medians of their size: twice that of normal ones.
 const TYPICAL: f64 = 2.0 * 1.4826;
+/// Cosines of a curve of less than two periods over its range are all but geometry, which alone carries on beyond the range: they are
+/// held down to this share.
+const SLOW: usize = 3;
+const GEOMETRY: f64 = 0.2;
 /// A repeatability that changes by less than this share is settled.
 const SETTLED: f64 = 0.25;
 
@@ -194,8 +200,11 @@ fn held_down(form: &Form, robot: &RobotModel, coefficients: &[f64]) -> Vec<Prior
     let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
     let middle = sizes.len() / 2;
     let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
-    let sigma = |spec: ParameterSpec| spec.prior_sigma.min(TYPICAL * typical).max(f64::MIN_POSITIVE.sqrt());
-    form.parameters(robot).into_iter().map(|spec| Prior { mean: 0.0, sigma: sigma(spec) }).collect()
+    let share = |k: usize| if k < SLOW { GEOMETRY } else { 1.0 };
+    let sigma =
+        |k: usize, spec: ParameterSpec| (share(k) * spec.prior_sigma.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
+    let specs = form.parameters(robot).into_iter().enumerate();
+    specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect()
 }
 
 /// Whether a form is a number of the torque model, seen only through what yields.

@@ -1,7 +1,7 @@
-//! `base_compliance`: the foundation tilts about the base origin under the arm's overturning moment; rad/Nm.
+//! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -12,13 +12,21 @@ use serde::{Deserialize, Serialize};
 pub struct BaseCompliance {
     /// Two stiffnesses instead of one.
     two: bool,
+    /// How far the point about which it tilts is below the base origin, m: pedestals and floors yield underneath.
+    #[serde(default)]
+    below: f64,
 }
+
+/// Depths that are tried first, m, how far the next are from them, and the deepest.
+const DEPTHS: [f64; 2] = [0.0, 0.6];
+const STEP: f64 = 0.3;
+const DEEPEST: f64 = 3.0;
 
 impl BaseCompliance {
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let loaded = (0..survey.joints()).any(|joint| survey.is_loaded(joint));
-        let forms = [false, true].into_iter().filter(|_| loaded).map(|two| Self { two });
-        forms.map(|form| Hypothesis::new(form, 2).positive()).collect()
+        let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| Self { two, below }));
+        forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
     }
 }
 
@@ -33,15 +41,15 @@ impl Effect for BaseCompliance {
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let origin = Vector3::zeros();
-        let moment = state.posture.moment(0, &origin);
         let down = Vector3::from(robot.description().gravity);
+        let pivot = down.try_normalize(0.0).unwrap_or_default() * self.below;
+        let moment = state.posture.moment(0, &pivot);
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
         // The two base axes that gravity has least of.
         let vertical = axes.iter().enumerate().max_by(|a, b| down.dot(a.1).abs().total_cmp(&down.dot(b.1).abs()));
         let vertical = vertical.map_or(2, |(axis, _)| axis);
         for (k, axis) in (0..3).filter(|axis| *axis != vertical).enumerate() {
-            let tilt = screw(&(axes[axis] * moment[axis]), &origin);
+            let tilt = screw(&(axes[axis] * moment[axis]), &pivot);
             out.shift(if self.two { k } else { 0 }, p, 0, tilt);
         }
     }
@@ -54,5 +62,11 @@ impl Effect for BaseCompliance {
 impl Placed for BaseCompliance {
     fn place(&self) -> Place {
         Place::Base
+    }
+
+    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+        let step = STEP * libm::exp2(-0.7 * f64::from(level));
+        let depths = [self.below - step, self.below + step].map(|below| below.clamp(0.0, DEEPEST));
+        depths.into_iter().filter(|below| *below != self.below).map(|below| Self { two: self.two, below }.into()).collect()
     }
 }

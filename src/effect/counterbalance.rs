@@ -11,7 +11,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Counterbalance {
     joint: usize,
+    #[serde(default = "first")]
     orders: u32,
+}
+
+fn first() -> u32 {
+    1
 }
 
 /// Orders of a spring that has a length at rest.

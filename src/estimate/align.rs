@@ -22,19 +22,24 @@ pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     let seat = |row: usize| robot.seat(robot.gauging().target(data.target(row)));
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
     let measured: Vec<Vector3<f64>> = rows.iter().map(|row| data.position[*row]).collect();
+    align_points(&model, &measured)
+}
+
+/// Returns the pose that brings `model` to `measured`, wrong points aside; three points or more.
+pub(crate) fn align_points(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     let mut used: Vec<usize> = Vec::new();
-    let mut pose = best_start(&model, &measured);
+    let mut pose = best_start(model, measured);
     for _ in 0..10 {
-        let errors: Vec<f64> = model.iter().zip(&measured).map(|(a, b)| (pose.point(a) - b).norm()).collect();
+        let errors: Vec<f64> = model.iter().zip(measured).map(|(a, b)| (pose.point(a) - b).norm()).collect();
         let mut sorted = errors.clone();
         sorted.sort_by(f64::total_cmp);
         let limit = TRIM * sorted[sorted.len() / 2];
-        let next: Vec<usize> = (0..rows.len()).filter(|i| errors[*i] <= limit).collect();
+        let next: Vec<usize> = (0..model.len()).filter(|i| errors[*i] <= limit).collect();
         if next == used {
             break;
         }
         used = next;
-        pose = kabsch(&model, &measured, &used);
+        pose = kabsch(model, measured, &used);
     }
     pose
 }

@@ -26,6 +26,7 @@ pub mod threads;
 mod triangle;
 
 pub use align::align;
+pub(crate) use align::align_points;
 pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;

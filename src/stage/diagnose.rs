@@ -1,6 +1,6 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, diagnose};
+use crate::diagnose::{Question, beside, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
@@ -58,7 +58,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -74,8 +74,15 @@ impl Stage for Diagnose {
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
-        let data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements(&self.tracker);
         let asked = reads.split.rows(&reads.recording, &self.on)?;
+        if let Some(simulated) = &reads.recording.simulated {
+            let robot = RobotModel::new(reads.robot.to_description()?);
+            let message = "three rows to fit with sim_x, sim_y, sim_z and a measured point are needed to lay one over the other";
+            data = beside(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
+            context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
+            context.services.warn("parameters correct that simulation: they are not the robot file's".into());
+        }
         // Causes are told apart by whole points; what else was measured takes no part.
         let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
         if fit.len() < FEWEST {

@@ -27,6 +27,8 @@ pub struct Recording {
     pub position: Vec<[f64; 3]>,
     /// Its standard deviation per axis, m, where the recording has it.
     pub position_sigma: Option<Vec<[f64; 3]>>,
+    /// The same point by another simulation, in a frame fixed to the robot's base, m; NaN where it says nothing.
+    pub simulated: Option<Vec<[f64; 3]>>,
     /// s.
     pub time: Option<Vec<f64>>,
     /// kg.
@@ -146,6 +148,12 @@ impl Table for Recording {
                 frame.push(format!("sigma_{name}_mm"), Cell::to_array(present(of(sigma))));
             }
         }
+        if let Some(all) = &self.simulated {
+            for (axis, name) in AXES.iter().enumerate() {
+                let column = all.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect();
+                frame.push(format!("sim_{name}_mm"), Cell::to_array(present(column)));
+            }
+        }
         for (name, values) in [("time_s", &self.time), ("payload_kg", &self.payload), ("temp_c", &self.temperature)] {
             if let Some(values) = values {
                 frame.push(name, Cell::to_array(present(values.clone())));
@@ -224,6 +232,7 @@ impl Table for Recording {
             usage: frame.read("usage")?,
             position: points("")?,
             position_sigma: has("sigma_x_mm").then(|| points("sigma_")).transpose()?,
+            simulated: has("sim_x_mm").then(|| points("sim_")).transpose()?,
             time: optional("time_s")?,
             payload: optional("payload_kg")?,
             temperature: optional("temp_c")?,

@@ -130,3 +130,39 @@ fn a_joint_of_the_wrong_sign_is_named_and_the_rest_is_fitted_all_the_same() {
     let after = said["after"]["validate_rms_mm"].as_f64().expect("held-out rows");
     assert!(after < 1.3 * said["noise_floor_mm"].as_f64().expect("a number"), "{after}");
 }
+
+#[test]
+fn what_another_simulation_knows_is_not_missing_from_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "931", "--points", "120"];
+    calib(&[&arguments[..], &["--family", "joint_compliance", "--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    let case = folder.path().join("sealed/recordings/c0001");
+    let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
+        let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
+        let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
+        let data = inputs.recording.measurements(&stage.tracker);
+        let reads = DiagnoseReads { recording: inputs.recording, robot: inputs.robot, split: inputs.split };
+        let reads = DiagnoseReads { recording: calib::table::Recording { simulated, ..reads.recording }, ..reads };
+        let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+        let findings: Findings = table(&tables).remove(0);
+        let found: Named = findings.0.into_iter().map(|row| (row.effect, row.place)).collect();
+        let parameters: Parameters = table(&tables).remove(0);
+        (found, parameters.model(robot, &[], Load::GravityTorque).expect("a model"), data)
+    };
+    let (alone, mut model, data) = diagnosed(None);
+    let truth = std::fs::read_to_string(folder.path().join("sealed/sealed/c0001.json")).expect("the truth");
+    let truth: Value = serde_json::from_str(&truth).expect("JSON");
+    assert_eq!(alone, wanted(&truth["want"]));
+    // Beside a rigid arm in a frame of its own the same is missing.
+    let rigid = |row: usize| model.robot.forward(data.q(row)).translation;
+    let turned = |p: Vector3<f64>| [p.y + 3.0, -p.x, p.z - 1.0];
+    let (beside, ..) = diagnosed(Some((0..data.rows()).map(|row| turned(rigid(row))).collect()));
+    assert_eq!(beside, alone);
+    // A simulation of the nominal geometry that knows the compliance leaves the errors of geometry alone.
+    let specs = model.stack.specs().to_vec();
+    for (x, _) in model.x.iter_mut().zip(&specs).filter(|(_, spec)| !spec.name.starts_with("joint_compliance")) {
+        *x = 0.0;
+    }
+    let (left, ..) = diagnosed(Some(model.predict(&data).into_iter().map(<[f64; 3]>::from).collect()));
+    assert_eq!(left, Named::new());
+}

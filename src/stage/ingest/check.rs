@@ -82,9 +82,14 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     if columns.anchor.is_some() && columns.distance.is_none() {
         faults.push(Fault::new(format!("{place}.columns.anchor"), "an anchor is the end of a `distance`; map that too"));
     }
-    let sigmas = [&columns.sigma_x, &columns.sigma_y, &columns.sigma_z].iter().filter(|sigma| sigma.is_some()).count();
-    if sigmas == 1 || sigmas == 2 {
-        faults.push(Fault::new(format!("{place}.columns"), "map all of sigma_x, sigma_y, sigma_z, or none"));
+    for (all, names) in [
+        ([&columns.sigma_x, &columns.sigma_y, &columns.sigma_z], "sigma_x, sigma_y, sigma_z"),
+        ([&columns.sim_x, &columns.sim_y, &columns.sim_z], "sim_x, sim_y, sim_z"),
+    ] {
+        let mapped = all.iter().filter(|column| column.is_some()).count();
+        if mapped == 1 || mapped == 2 {
+            faults.push(Fault::new(format!("{place}.columns"), format!("map all of {names}, or none")));
+        }
     }
 }
 

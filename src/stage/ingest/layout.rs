@@ -186,6 +186,12 @@ pub struct Columns {
     pub y: Option<ScalarColumn>,
     /// Measured point, z in the tracker's frame.
     pub z: Option<ScalarColumn>,
+    /// The same point by another simulation, x in any frame fixed to the robot's base: `diagnose` then looks at measured minus simulated.
+    pub sim_x: Option<ScalarColumn>,
+    /// The same point by another simulation, y.
+    pub sim_y: Option<ScalarColumn>,
+    /// The same point by another simulation, z.
+    pub sim_z: Option<ScalarColumn>,
     /// Standard deviation of x.
     pub sigma_x: Option<ScalarColumn>,
     /// Standard deviation of y.
@@ -295,12 +301,13 @@ pub(super) enum Slot {
     SigmaTurn,
     Distance,
     SigmaDistance,
+    Simulated(usize),
 }
 
 impl Slot {
     /// Numbers in a row of a robot with so many joints.
     pub(super) fn count(joints: usize) -> usize {
-        16 + 3 * joints
+        19 + 3 * joints
     }
     pub(super) fn index(self, joints: usize) -> usize {
         match self {
@@ -316,6 +323,7 @@ impl Slot {
             Self::SigmaTurn => 13 + 3 * joints,
             Self::Distance => 14 + 3 * joints,
             Self::SigmaDistance => 15 + 3 * joints,
+            Self::Simulated(axis) => 16 + 3 * joints + axis,
         }
     }
 }
@@ -345,6 +353,9 @@ impl Columns {
             ("x", &self.x, Quantity::Length, Slot::Position(0)),
             ("y", &self.y, Quantity::Length, Slot::Position(1)),
             ("z", &self.z, Quantity::Length, Slot::Position(2)),
+            ("sim_x", &self.sim_x, Quantity::Length, Slot::Simulated(0)),
+            ("sim_y", &self.sim_y, Quantity::Length, Slot::Simulated(1)),
+            ("sim_z", &self.sim_z, Quantity::Length, Slot::Simulated(2)),
             ("sigma_x", &self.sigma_x, Quantity::Length, Slot::Sigma(0)),
             ("sigma_y", &self.sigma_y, Quantity::Length, Slot::Sigma(1)),
             ("sigma_z", &self.sigma_z, Quantity::Length, Slot::Sigma(2)),

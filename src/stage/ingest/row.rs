@@ -262,7 +262,7 @@ fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
         Slot::Time => [f64::MIN, f64::MAX],
         Slot::Payload => [0.0, 1e4],
         Slot::Temperature => [-60.0, 200.0],
-        Slot::Position(_) => [-200.0, 200.0],
+        Slot::Position(_) | Slot::Simulated(_) => [-200.0, 200.0],
         Slot::Sigma(_) => [0.0, 1.0],
         Slot::Q(joint) if arm.prismatic.get(joint) == Some(&true) => [-200.0, 200.0],
         Slot::Q(_) => [-20.0, 20.0],

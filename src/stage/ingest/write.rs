@@ -175,6 +175,7 @@ impl<'a> Chunks<'a> {
             joints: self.joints,
             prismatic: self.prismatic.clone(),
             position_sigma: self.has(Slot::Sigma(0)).then(Vec::new),
+            simulated: self.has(Slot::Simulated(0)).then(Vec::new),
             time: self.has(Slot::Time).then(Vec::new),
             payload: self.has(Slot::Payload).then(Vec::new),
             temperature: self.has(Slot::Temperature).then(Vec::new),
@@ -243,6 +244,7 @@ impl<'a> Chunks<'a> {
         chunk.q.extend(all(Slot::Q));
         chunk.position.push(axes(Slot::Position));
         chunk.position_sigma.iter_mut().for_each(|column| column.push(axes(Slot::Sigma)));
+        chunk.simulated.iter_mut().for_each(|column| column.push(axes(Slot::Simulated)));
         chunk.time.iter_mut().for_each(|column| column.push(one(Slot::Time)));
         chunk.payload.iter_mut().for_each(|column| column.push(one(Slot::Payload)));
         chunk.temperature.iter_mut().for_each(|column| column.push(one(Slot::Temperature)));
