@@ -132,12 +132,10 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         println!("{name}: {before:.3?} -> {after:.3?} mm");
         assert!(after[0] <= 1.001 * before[0], "{name}: {before:?} -> {after:?}");
     }
-    // Named causes carry over, and much better.
-    for (name, from, to) in [("A to C", &a, &c), ("C to A", &c, &a)] {
-        let data = to.recording.measurements(&Instrument::default());
-        let before = after_base(&from.model.predict(&data), &to.recording.position);
-        let after = after_base(&diagnosed(from).unwrap().model().predict(&data), &to.recording.position);
-        println!("{name}, diagnosed: {before:.3?} -> {after:.3?} mm");
-        let _ = after;
-    }
+    // Named causes carry over from random poses to the grid: there is more in them than the points they were found in.
+    let data = a.recording.measurements(&Instrument::default());
+    let before = after_base(&c.model.predict(&data), &a.recording.position);
+    let after = after_base(&diagnosed(&c).unwrap().model().predict(&data), &a.recording.position);
+    println!("C to A, diagnosed: {before:.3?} -> {after:.3?} mm");
+    assert!(after[0] < 0.8 * before[0] && after[1] < before[1], "{before:?} -> {after:?}");
 }
