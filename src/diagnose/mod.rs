@@ -196,7 +196,9 @@ fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Cho
 /// What keeps the numbers of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or between
 /// sparse points: most of its numbers are of one size (empirical Bayes), and none is larger than is plausible.
 fn held_down(form: &Form, robot: &RobotModel, coefficients: &[f64]) -> Vec<Prior> {
-    let Form::JointTable(_) = form else { return Vec::new() };
+    if !matches!(form, Form::JointTable(_)) && !matches!(form, Form::Unknown(unknown) if unknown.is_curve()) {
+        return Vec::new();
+    }
     let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
     let middle = sizes.len() / 2;
     let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };

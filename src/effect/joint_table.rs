@@ -20,8 +20,8 @@ pub struct JointTable {
 const RESOLUTIONS: [f64; 3] = [12.0, 24.0, 36.0];
 /// Measured values for each number of a curve.
 const VALUES_EACH: f64 = 20.0;
-/// How large a number of the curve may be, rad (60 arcsec): holds it down where points are sparse.
-const PLAUSIBLE: f64 = 3e-4;
+/// How large a number of a curve may be, rad (60 arcsec): holds it down where points are sparse.
+pub(super) const PLAUSIBLE: f64 = 3e-4;
 
 impl JointTable {
     pub fn joint(&self) -> usize {

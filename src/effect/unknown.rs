@@ -2,6 +2,7 @@
 
 use super::form::{cosines, parameters};
 use super::frame_shift::{MOTION, unit};
+use super::joint_table::PLAUSIBLE;
 use super::thermal_growth::Warmth;
 use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
 use crate::robot::RobotModel;
@@ -92,6 +93,11 @@ impl Unknown {
             }
             _ => false,
         }
+    }
+
+    /// Whether a joint follows a smooth function of its own angle: nearly geometry, or another law of that angle, in its slow part.
+    pub fn is_curve(&self) -> bool {
+        matches!((self.signature, self.place), (Signature::Angle { by, .. }, Place::Joint(joint)) if by == joint)
     }
 
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
@@ -230,7 +236,8 @@ impl Effect for Unknown {
         let numbers: Vec<(String, Unit, f64)> = match self.place {
             Place::Joint(joint) => {
                 let unit = if robot.is_revolute(joint) { Unit::Radian } else { Unit::Millimetre };
-                (1..=self.count()).map(|k| (format!("c{k}"), unit, 0.01)).collect()
+                let size = if self.is_curve() { PLAUSIBLE } else { 0.01 };
+                (1..=self.count()).map(|k| (format!("c{k}"), unit, size)).collect()
             }
             _ => (1..=self.count())
                 .flat_map(|k| MOTION.into_iter().take(self.axes()).map(move |m| (format!("{}{k}", m.0), m.1, 0.01)))
