@@ -1,6 +1,8 @@
 //! `counterbalance` (and `cable_drag`): a spring missing from the torque model; its torque is periodic in the joint's angle.
 //!
-//! Of first order where the spring's force goes with its length; of second order too where it has a length at rest, or is slack. Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable. It is seen through the joint's compliance: without one it moves nothing.
+//! Of first order where the spring's force goes with its length; of second order too where it has a length at rest, or is slack.
+//! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable. It is seen through the
+//! joint's compliance: without one it moves nothing.
 
 use super::form::parameters;
 use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
