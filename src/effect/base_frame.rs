@@ -55,7 +55,7 @@ impl Effect for BaseFrame {
             .collect()
     }
 
-    fn is_rigid(&self) -> bool {
+    fn is_constant(&self) -> bool {
         true
     }
 

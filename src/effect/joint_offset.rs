@@ -23,7 +23,7 @@ impl Effect for JointOffset {
             .collect()
     }
 
-    fn is_rigid(&self) -> bool {
+    fn is_constant(&self) -> bool {
         true
     }
 

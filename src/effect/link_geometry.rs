@@ -39,7 +39,7 @@ impl Effect for LinkGeometry {
         out
     }
 
-    fn is_rigid(&self) -> bool {
+    fn is_constant(&self) -> bool {
         true
     }
 

@@ -150,7 +150,7 @@ pub trait Effect: Send + Sync {
         false
     }
     /// True if its motions are the same at every row, whatever the joints, the load and the time.
-    fn is_rigid(&self) -> bool {
+    fn is_constant(&self) -> bool {
         false
     }
     /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared

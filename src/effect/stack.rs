@@ -34,15 +34,15 @@ pub struct Scratch {
     target: Option<usize>,
     /// Whether `commanded` is near the next row's joints.
     near: bool,
-    /// Travel of each joint and twist at each station by the rigid effects, where only points are wanted, all of the same parameters.
-    rigid: Option<(Vec<f64>, Vec<Twist>)>,
+    /// Travel of each joint and twist at each station by the constant effects, where only points are wanted, all of the same parameters.
+    constant: Option<(Vec<f64>, Vec<Twist>)>,
 }
 
 impl Scratch {
     /// Partials are wanted again.
     pub(crate) fn points_and_partials(&mut self) {
         self.deflection.bare = false;
-        self.rigid = None;
+        self.constant = None;
     }
 
     /// Whether the next row's joints are near those placed last; their sines then follow by addition theorems.
@@ -108,7 +108,7 @@ impl EffectStack {
             by_joint: vec![Vector3::zeros(); n],
             target: None,
             near: false,
-            rigid: None,
+            constant: None,
         }
     }
 
@@ -117,12 +117,12 @@ impl EffectStack {
     pub(crate) fn only_points(&self, robot: &RobotModel, data: &Measurements, x: &[f64], scratch: &mut Scratch) {
         scratch.deflection.clear();
         scratch.deflection.bare = true;
-        scratch.rigid = None;
+        scratch.constant = None;
         let state = ArmState::new(data, 0, &scratch.posture);
-        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.is_rigid()) {
+        for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.is_constant()) {
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
-        scratch.rigid = Some((scratch.deflection.joint.clone(), scratch.deflection.station.clone()));
+        scratch.constant = Some((scratch.deflection.joint.clone(), scratch.deflection.station.clone()));
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
@@ -134,7 +134,7 @@ impl EffectStack {
             *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
         }
         scratch.deflection.clear();
-        if let Some((joint, station)) = &scratch.rigid {
+        if let Some((joint, station)) = &scratch.constant {
             scratch.deflection.joint.copy_from_slice(joint);
             scratch.deflection.station.copy_from_slice(station);
         }
@@ -291,8 +291,8 @@ impl EffectStack {
     /// Adds the motions of the effects with the given need.
     fn deflect(&self, needs: Needs, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
         let state = ArmState::new(data, row, &scratch.posture);
-        let summed = scratch.rigid.is_some();
-        let due = |effect: &dyn Effect| effect.needs_torque() == (needs == Needs::Torque) && !(summed && effect.is_rigid());
+        let summed = scratch.constant.is_some();
+        let due = |effect: &dyn Effect| effect.needs_torque() == (needs == Needs::Torque) && !(summed && effect.is_constant());
         for (effect, range) in self.effects.iter().filter(|(effect, _)| due(effect.as_ref())) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
