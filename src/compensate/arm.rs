@@ -1,15 +1,12 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::Scratch;
+use crate::effect::{LONG_AFTER, Scratch, is_of_the_measurement};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::Measurements;
 use crate::spatial::{Pose, Twist};
 use nalgebra::Vector3;
-
-/// s; later than anything recorded, so that steps have happened and the arm is warm.
-pub const LONG_AFTER: f64 = 1e9;
 
 /// Under which conditions a command will be carried out.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,12 +30,6 @@ impl Circumstance {
     }
 }
 
-/// Whether an effect belongs to the measurement and not to the arm: a command need not make up for it.
-pub fn silent(effect: &str, place: &str) -> bool {
-    matches!(effect, "tracker_drift" | "tracker_scale" | "joint_log_lag" | "base_shift" | "outlier" | "mislabelled_point")
-        || matches!(place, "tracker" | "recording")
-}
-
 /// An identified arm.
 pub struct Arm {
     model: Model,
@@ -51,7 +42,10 @@ impl Arm {
     pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
         let specs = model.stack.specs();
         let quiet: Vec<usize> = (model.stack.effects())
-            .flat_map(|(effect, range)| range.filter(|k| silent(effect.name(), &specs[*k].place)).collect::<Vec<_>>())
+            .flat_map(|(effect, range)| {
+                let quiet = |k: &usize| is_of_the_measurement(effect.name(), &specs[*k].place, effect.form());
+                range.filter(quiet).collect::<Vec<_>>()
+            })
             .collect();
         for parameter in quiet {
             model.x[parameter] = 0.0;

@@ -12,7 +12,7 @@ mod rigid;
 mod solve;
 mod uncertainty;
 
-pub use arm::{Arm, Circumstance, LONG_AFTER, Reach, silent};
+pub use arm::{Arm, Circumstance, Reach};
 pub use coverage::Coverage;
 pub(crate) use coverage::beyond_limits;
 pub use inverse::inverse;

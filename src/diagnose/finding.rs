@@ -157,8 +157,9 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             effect_rms,
             gain,
         };
+        let table = forms.iter().find_map(|form| if let Form::JointTable(table) = form { Some(table.range()) } else { None });
         let valid = match forms[0].place() {
-            Place::Joint(joint) => Some((joint, looked.survey.range[joint])),
+            Place::Joint(joint) => Some((joint, table.unwrap_or(looked.survey.range[joint]))),
             _ => None,
         };
         let statement = sentence(effect, &place, &forms, &numbers, effect_rms);

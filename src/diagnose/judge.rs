@@ -38,6 +38,11 @@ impl HeldOut {
         (self.0.values().sum::<f64>() / self.0.len() as f64).sqrt()
     }
 
+    /// -2 ln of the odds of `other` against this, by these rows.
+    fn evidence_against(&self, other: &Self) -> f64 {
+        2.0 * 3.0 * self.0.len() as f64 * (other.rms() / self.rms()).ln()
+    }
+
     /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
     fn is_better_than(&self, other: &Self) -> bool {
         let falls: Vec<f64> = self.0.iter().filter_map(|(row, own)| Some(other.0.get(row)? - own)).collect();
@@ -81,28 +86,30 @@ pub(crate) fn judge(
         let without = refit(&now, &others);
         let Some(bare) = HeldOut::of(&without, data, question) else { return (now, worths) };
         let mut best: Option<(HeldOut, usize, Course)> = None;
-        // What does harm has lost its right to be believed before others: then the fit alone says which of them to try.
         let harmful = bare.is_better_than(&seen);
-        let charged = |k: usize| if harmful { pool.charge[k] } else { 0.0 };
-        let bic = pool.bic(set) - set.iter().filter(|k| is_own(k)).map(|k| charged(*k)).sum::<f64>();
+        let belief: f64 = set.iter().filter(|k| is_own(k)).map(|k| pool.charge[*k]).sum();
+        let fit = pool.bic(set) - belief;
         let mut sorted = rest.clone();
         sorted.sort_unstable();
         let state = pool.state(&sorted);
-        let mut tried: Vec<(&str, String)> = vec![group.clone()];
+        let mut tried: Vec<&String> = set.iter().filter(|k| is_own(k)).map(|k| &pool.keys[*k]).collect();
+        let most = tried.len() + RIVALS;
         for (_, h) in state.falls(pool).iter().take(60) {
             let rival = &pool.hypotheses[*h].form;
-            let name = (rival.name(), rival.place().to_string());
             let mut other = sorted.clone();
             other.push(*h);
             other.sort_unstable();
-            if tried.len() > RIVALS || tried.contains(&name) || pool.bic(&other) - charged(*h) - bic > ALIKE {
+            if tried.len() >= most || tried.contains(&&pool.keys[*h]) || pool.bic(&other) - pool.charge[*h] - fit > ALIKE {
                 continue;
             }
-            tried.push(name);
+            tried.push(&pool.keys[*h]);
             let mut chosen = others.clone();
             chosen.push(start(pool, &other, *h, rival));
             let course = refit(&now, &chosen);
-            let Some(other) = HeldOut::of(&course, data, question).filter(|other| other.is_better_than(&seen)) else { continue };
+            // Held-out rows must outweigh what was believed before them; what does harm has lost that right.
+            let prejudice = if harmful { 0.0 } else { pool.charge[*h] - belief };
+            let convinces = |other: &HeldOut| other.is_better_than(&seen) && other.evidence_against(&seen) > prejudice;
+            let Some(other) = HeldOut::of(&course, data, question).filter(convinces) else { continue };
             if best.as_ref().is_none_or(|(best, ..)| other.rms() < best.rms()) {
                 best = Some((other, *h, course));
             }

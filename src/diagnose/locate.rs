@@ -63,7 +63,9 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
             });
         }
         match (form, form.place()) {
-            (Form::GearCyclic(gear), _) => spectrum.push(Line { joint: gear.joint(), motor: false, order: gear.order(), share }),
+            (Form::GearCyclic(gear), _) if !gear.has_overtone() => {
+                spectrum.push(Line { joint: gear.joint(), motor: false, order: gear.order(), share })
+            }
             (Form::GearMotorCyclic(gear), crate::effect::Place::Joint(joint)) => {
                 spectrum.push(Line { joint, motor: true, order: gear.order(), share });
             }
@@ -109,7 +111,8 @@ fn variables(form: &Form) -> impl Iterator<Item = String> {
             Signature::Angle { by, .. } | Signature::Hinge { by, .. } | Signature::Periodic { by, .. } => vec![angle(by)],
             Signature::Bump { .. } => vec![format!("q{number}")],
             Signature::Product { a, b } | Signature::Surface { a, b, .. } => vec![format!("{} and {}", angle(a), angle(b))],
-            Signature::Sway { .. } | Signature::Time { .. } => vec!["time".into()],
+            Signature::Sway { .. } | Signature::Time { .. } | Signature::Creep { .. } => vec!["time".into()],
+            Signature::Side { .. } | Signature::Sag => vec!["direction of gravity".into()],
             Signature::Warming(by) => vec![warmth(by).into()],
             Signature::Payload { .. } => vec!["payload".into()],
         },

@@ -159,11 +159,12 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             }
         }
         if (same && kept_same) || last_round {
-            let mut set = found.set;
+            let mut set = found.set.clone();
             let (last, worths) = judge::judge(next, &mut set, search.pool, &free, rigid, &data, question);
+            let rest = if set == found.set { found.last } else { search.gate(&set) };
             let first = first.unwrap_or(1.0);
             let located = located.unwrap_or_default();
-            let looked = verdict::Looked { pool: search.pool, set, first, last: found.last, survey: &survey, worths, located };
+            let looked = verdict::Looked { pool: search.pool, set, first, last: rest, survey: &survey, worths, located };
             return verdict::conclude(question, &data, &before, &last, repeatability, looked);
         }
         drop(pool);

@@ -64,8 +64,11 @@ impl<'a, 'b> Search<'a, 'b> {
         Self { pool, survey, pose, options, refined: BTreeSet::new() }
     }
 
-    fn gate(&self, set: &[usize]) -> f64 {
-        gate(self.pool, &self.pool.state(set), self.pose, self.options.draws, self.options.seed)
+    /// The probability that what a set of causes, in any order, leaves is noise.
+    pub fn gate(&self, set: &[usize]) -> f64 {
+        let mut set = set.to_vec();
+        set.sort_unstable();
+        gate(self.pool, &self.pool.state(&set), self.pose, self.options.draws, self.options.seed)
     }
 
     /// From a set of causes to the best one. From none it also starts where most arms end, with every joint that yields to its load:

@@ -1,7 +1,7 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
 use super::finding::Number;
-use crate::effect::{Course, Form, GearCyclic, Law, Side, Survey, Warmth};
+use crate::effect::{Course, Form, GearCyclic, Law, Placed, Side, Survey, Warmth};
 
 /// The sentence of a finding from its forms and numbers; `rms` is the size of the whole effect at the measured points, m.
 pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Number], rms: f64) -> String {
@@ -121,9 +121,10 @@ fn amplitude(pair: Option<&[Number]>) -> String {
 fn orders(forms: &[Form], numbers: &[Number]) -> String {
     let gears = forms.iter().filter_map(|form| if let Form::GearCyclic(gear) = form { Some(gear) } else { None });
     let one = |gear: &GearCyclic| {
-        let tag = format!("order{}.", gear.order());
+        let tag = format!("{}.", gear.variant());
         let own: Vec<Number> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
-        format!("{} times a turn by {}", gear.order(), amplitude(own.get(0..2)))
+        let overtone = own.get(2..4).map(|pair| format!(" and {} times by {}", 2 * gear.order(), amplitude(Some(pair))));
+        format!("{} times a turn by {}{}", gear.order(), amplitude(own.get(0..2)), overtone.unwrap_or_default())
     };
     let mut said: Vec<String> = gears.map(one).collect();
     for form in forms {

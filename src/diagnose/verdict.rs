@@ -152,15 +152,24 @@ pub(crate) fn conclude(
     let mut signature =
         (!rest.is_empty()).then(|| rest.iter().map(|finding| finding.statement.clone()).collect::<Vec<_>>().join(" "));
     let kept = &last.screening.kept;
-    let whitened: f64 =
-        kept.iter().map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared()).sum();
+    let whitened = |rows: &[usize]| -> f64 {
+        rows.iter().map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared()).sum()
+    };
     let freedom = (3 * kept.len()).saturating_sub(last.fitted.singular.len()).max(1) as f64;
-    let chi_square = whitened / freedom;
+    let chi_square = whitened(kept) / freedom;
+    // Points that were not fitted also see the errors of what was.
+    let inflation = 1.0 + last.fitted.singular.len() as f64 / freedom;
+    let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
     let physics: Vec<&Finding> = findings.iter().filter(|finding| finding.is_physics()).collect();
     let blind = repeatability.repeats < REPEATS && noise_floor > NOT_NOISE * instrument;
-    let left = (looked.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD;
+    let left = (looked.last <= SIGNIFICANT && chi_square > LOUD) || chi_square > TOO_LOUD || not_carried;
     if left && signature.is_none() {
         signature = looked.best();
+    }
+    if not_carried {
+        let text = "held-out points are off by more than the fitted ones and the noise allow: something differs there \
+                    (another time, another region) that the fitted points do not show";
+        signature = Some(signature.map_or(text.into(), |signature| format!("{signature}; {text}")));
     }
     let only_unknown = !physics.is_empty() && physics.iter().all(|finding| finding.effect == "unknown");
     let verdict = if blind || left || only_unknown {

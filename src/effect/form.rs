@@ -67,6 +67,14 @@ impl Form {
     }
 }
 
+/// Whether an effect belongs to one measurement and not to the arm: it says nothing of another recording, and a command need not
+/// make up for it.
+pub fn is_of_the_measurement(effect: &str, place: &str, form: Option<&Form>) -> bool {
+    matches!(effect, "tracker_drift" | "tracker_scale" | "joint_log_lag" | "base_shift" | "outlier" | "mislabelled_point")
+        || matches!(place, "tracker" | "recording")
+        || matches!(form, Some(Form::Unknown(unknown)) if unknown.is_passing())
+}
+
 impl Effect for Form {
     fn name(&self) -> &'static str {
         self.inner().name()

@@ -41,7 +41,7 @@ pub use base_frame::BaseFrame;
 pub use catalogue::{About, CATALOGUE};
 pub use counterbalance::Counterbalance;
 pub use deflection::{Deflection, Direction};
-pub use form::{Form, Placed};
+pub use form::{Form, Placed, is_of_the_measurement};
 pub use gear_cyclic::GearCyclic;
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::{JointHardening, Law};
@@ -74,6 +74,9 @@ pub struct ParameterSpec {
     /// One sigma of what is known before any measurement, SI; wide.
     pub prior_sigma: f64,
 }
+
+/// s; later than anything recorded, so that steps have happened and the arm is warm.
+pub const LONG_AFTER: f64 = 1e9;
 
 /// The circumstances of one row that effects may depend on.
 #[derive(Debug, Clone, Copy)]

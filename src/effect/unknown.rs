@@ -30,8 +30,14 @@ pub enum Signature {
     Sway { period_s: f64 },
     /// A smooth function of time.
     Time { start_s: f64, end_s: f64 },
+    /// One way in time, by a power of it.
+    Creep { start_s: f64, end_s: f64, power: f64 },
     /// With temperature or warm-up.
     Warming(Warmth),
+    /// Other on either side: a seat with play, by which side of an axis of the tool (0 to 2, zero pose) hangs down.
+    Side { axis: usize },
+    /// With the direction of gravity as the tool sees it: a mounting that yields.
+    Sag,
     /// Differs where a payload is carried.
     Payload { above_kg: f64 },
 }
@@ -52,7 +58,16 @@ impl fmt::Display for Signature {
             Self::Surface { a, b, .. } => write!(f, "function of q{} and q{}", a + 1, b + 1),
             Self::Sway { period_s } => write!(f, "sways with a period of {period_s:.0} s"),
             Self::Time { .. } => f.write_str("function of time"),
+            Self::Creep { power, .. } if (power - 1.0).abs() < 0.3 => f.write_str("creeps steadily with time"),
+            Self::Creep { power, .. } => {
+                write!(f, "creeps with time, {} and {0}", if *power > 1.0 { "faster" } else { "slower" })
+            }
             Self::Warming(_) => f.write_str("goes with the warm-up"),
+            Self::Side { axis } => {
+                let name = ["x", "y", "z"].get(*axis).unwrap_or(&"z");
+                write!(f, "other on either side of its {name}: which one hangs down decides, as where a seat has play")
+            }
+            Self::Sag => f.write_str("goes with the direction in which it hangs, as where a mounting yields"),
             Self::Payload { .. } => f.write_str("differs with the payload"),
         }
     }
@@ -71,6 +86,10 @@ const EACH: usize = 3;
 const SUPPORT: usize = 5;
 /// Widths (rad) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
+/// Powers of time by which something creeps.
+const POWERS: std::ops::RangeInclusive<f64> = 0.3..=3.0;
+/// Lengths of the recording, from its start, over which a creep is believed to go on.
+const CREEPING: f64 = 2.0;
 /// Periods of a sway as shares of the recording.
 const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
 /// Orders in another joint's angle.
@@ -100,6 +119,11 @@ impl Unknown {
         matches!((self.signature, self.place), (Signature::Angle { by, .. }, Place::Joint(joint)) if by == joint)
     }
 
+    /// Whether it is a motion of the base in time: it says nothing of the arm, nor of another time.
+    pub fn is_passing(&self) -> bool {
+        self.place == Place::Base && matches!(self.signature, Signature::Sway { .. } | Signature::Time { .. })
+    }
+
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
         let mut add = |place, signature, tried, charge: f64| {
@@ -111,6 +135,8 @@ impl Unknown {
             let periods = SWAYS.map(|share| share * (end_s - start_s));
             periods.into_iter().for_each(|period_s| add(Place::Base, Signature::Sway { period_s }, SWAYS.len(), 0.0));
         }
+        (0..3).for_each(|axis| add(Place::Tool, Signature::Side { axis }, 3, 0.0));
+        add(Place::Tool, Signature::Sag, 1, 0.0);
         if survey.payload_changes() {
             let signature = Signature::Payload { above_kg: survey.heavy_payload() };
             add(Place::Tool, signature, 1, 6.0);
@@ -155,6 +181,7 @@ impl Unknown {
         let [start_s, end_s] = survey.time;
         if end_s > start_s {
             add(Signature::Time { start_s, end_s }, 1, 0.0);
+            add(Signature::Creep { start_s, end_s, power: 1.0 }, 1, 4.0);
         }
         let warm = Warmth::all(survey);
         warm.iter().for_each(|by| add(Signature::Warming(*by), warm.len(), 4.0));
@@ -200,7 +227,17 @@ impl Unknown {
                 let count = if self.is_joint() { CURVE } else { EACH };
                 cosines(state.time(), [start_s, end_s], count).enumerate().for_each(|(k, value)| each(k, value));
             }
+            Signature::Creep { start_s, end_s, power } => {
+                let share = (state.time() - start_s) / (end_s - start_s);
+                // Long after the recording what was seen last holds.
+                each(0, libm::pow(if share > CREEPING { 1.0 } else { share.max(0.0) }, power));
+            }
             Signature::Warming(by) => each(0, by.at(state)),
+            Signature::Side { axis } => each(0, state.posture.down(self.station(state)).map_or(0.0, |down| down[axis].signum())),
+            Signature::Sag => {
+                let down = state.posture.down(self.station(state)).unwrap_or_default();
+                (0..3).for_each(|axis| each(axis, down[axis]));
+            }
             Signature::Payload { above_kg } => each(0, f64::from(state.payload() > above_kg)),
         }
     }
@@ -209,11 +246,19 @@ impl Unknown {
         matches!(self.place, Place::Joint(_))
     }
 
+    fn station(&self, state: &ArmState) -> usize {
+        match self.place {
+            Place::Tool => state.q.len(),
+            _ => 0,
+        }
+    }
+
     fn count(&self) -> usize {
         match self.signature {
             Signature::Angle { .. } => CURVE,
             Signature::Periodic { .. } | Signature::Sway { .. } => 2,
             Signature::Product { .. } => 4,
+            Signature::Sag => 3,
             Signature::Surface { .. } => EACH * EACH,
             Signature::Time { .. } if self.is_joint() => CURVE,
             Signature::Time { .. } => EACH,
@@ -246,15 +291,16 @@ impl Effect for Unknown {
         parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
     }
 
-    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let axes = self.axes();
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let (axes, station) = (self.axes(), self.station(state));
         self.values(state, |k, value| match self.place {
             Place::Joint(joint) => out.turn(k, p, joint, value),
-            place => {
-                let station = if place == Place::Tool { robot.joints() } else { 0 };
-                (0..axes).for_each(|axis| out.shift(axes * k + axis, p, station, unit(axis) * value));
-            }
+            _ => (0..axes).for_each(|axis| out.shift(axes * k + axis, p, station, unit(axis) * value)),
         });
+    }
+
+    fn needs_torque(&self) -> bool {
+        matches!(self.signature, Signature::Side { .. } | Signature::Sag)
     }
 }
 
@@ -294,6 +340,11 @@ impl Placed for Unknown {
                 let step = libm::pow(1.15, libm::exp2(-0.7 * f64::from(level)));
                 [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor })).to_vec()
             }
+            Signature::Creep { start_s, end_s, power } => {
+                let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
+                let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
+                powers.map(|power| with(Signature::Creep { start_s, end_s, power })).collect()
+            }
             Signature::Warming(by) => by.near(level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
             _ => Vec::new(),
         }
@@ -307,7 +358,10 @@ impl Placed for Unknown {
             Signature::Product { a, b } | Signature::Surface { a, b, .. } => format!("q{}_q{}", a + 1, b + 1),
             Signature::Sway { .. } => "sway".into(),
             Signature::Time { .. } => "time".into(),
+            Signature::Creep { .. } => "creep".into(),
             Signature::Warming(_) => "warm".into(),
+            Signature::Side { .. } => "side".into(),
+            Signature::Sag => "sag".into(),
             Signature::Payload { .. } => "payload".into(),
         }
     }

@@ -113,6 +113,12 @@ impl Posture {
         self.behind[joint].rotation * robot.axis(joint)
     }
 
+    /// Which way is down, in a station's zero-pose axes; `None` without gravity.
+    pub fn down(&self, station: usize) -> Option<Vector3<f64>> {
+        let gravity = self.behind[station].rotation.tr_mul(&self.gravity);
+        gravity.try_normalize(0.0)
+    }
+
     /// Moment (Nm) of all beyond station `station` about `point` (m), both in the station's zero-pose axes.
     pub fn moment(&self, station: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let frame = &self.behind[station];

@@ -111,7 +111,7 @@ pub(crate) fn yes() -> bool {
 }
 
 crate::stage::writes! {
-    /// Output ports of `identify` and `stiffness`.
+    /// Output ports of `identify`, `stiffness` and `transfer`.
     pub struct Identified {
         parameters: Parameters,
         fit: Fit,

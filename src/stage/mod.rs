@@ -18,6 +18,7 @@ mod screened;
 mod simulate;
 pub mod split;
 mod stiffness;
+mod transfer;
 mod validate;
 
 pub use compare::{Compare, CompareReads};
@@ -30,6 +31,7 @@ pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
+pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
 use crate::error::Result;
@@ -262,6 +264,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<split::SplitBy>(),
     StageEntry::of::<Identify>(),
     StageEntry::of::<Stiffness>(),
+    StageEntry::of::<Transfer>(),
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),

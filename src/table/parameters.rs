@@ -28,7 +28,9 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{Anchor, BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, ToolOffset, entry};
+use crate::effect::{
+    Anchor, BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, ToolOffset, entry, is_of_the_measurement,
+};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
 use crate::robot::{self, Gauging, RobotModel, Target};
@@ -42,6 +44,11 @@ const CORRELATED: f64 = 0.9;
 
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
 const SILENT: f64 = 10.0;
+
+fn read_form(text: &str) -> Result<Form> {
+    serde_json::from_str(text)
+        .map_err(|error| Error::data("table parameters", format!("`{text}` is no form of an effect: {error}")))
+}
 
 impl Parameters {
     /// The whole model after a fit. Rows of parameters that the fit kept are taken over from `earlier`.
@@ -130,17 +137,29 @@ impl Parameters {
     /// Effects at a place, in the order of their parameters. Fails where a form cannot be read.
     fn forms(&self) -> Result<Vec<Form>> {
         let texts: BTreeSet<&str> = self.0.iter().filter_map(|row| row.form.as_deref()).collect();
-        let read = |text: &str| {
-            serde_json::from_str(text)
-                .map_err(|error| Error::data("table parameters", format!("`{text}` is no form of an effect: {error}")))
-        };
-        texts.into_iter().map(read).collect()
+        texts.into_iter().map(read_form).collect()
     }
 
     /// The model that these parameters make of `robot`, with all effects that a diagnosis added, and `more` effects of the whole arm
     /// at zero. Fails where a row names an unknown effect or parameter.
     pub fn model(&self, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
-        let base = self.base_pose();
+        self.model_standing(self.base_pose(), robot, more, load)
+    }
+
+    /// What belongs to the arm and not to the measurement by which it was identified. Fails where a form cannot be read.
+    pub fn of_the_arm(&self) -> Result<Self> {
+        let mut rows = Vec::with_capacity(self.0.len());
+        for row in &self.0 {
+            let form = row.form.as_deref().map(read_form).transpose()?;
+            if !is_of_the_measurement(&row.effect, &row.place, form.as_ref()) {
+                rows.push(row.clone());
+            }
+        }
+        Ok(Self(rows))
+    }
+
+    /// [`Parameters::model`] of a robot whose base stands elsewhere.
+    pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
         let load =
             match self.0.iter().find(|row| row.effect == "joint_compliance" && row.form.is_none()).map(|row| row.unit.as_str()) {

@@ -1,9 +1,10 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use crate::compensate::{
-    Arm, Chain, Circumstance, Coverage, Found, LONG_AFTER, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse,
-    least_change, one_step,
+    Arm, Chain, Circumstance, Coverage, Found, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse, least_change,
+    one_step,
 };
+use crate::effect::LONG_AFTER;
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Vector3};
