@@ -1,168 +1,127 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::pipeline_arguments::PipelineArguments;
-use super::{emit, emit_json};
-use crate::error::{Error, Result};
-use crate::pipeline::{Outcome, Selection};
+mod told;
+
+use super::means::Means;
+use super::pipeline_arguments::told_as;
+use super::{emit, emit_json, shell};
+use crate::error::{Error, Result, nearest};
+use crate::pipeline::{Manifest, Selection, StageReport, StageStatus};
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
-use crate::table::{FindingNumbers, Findings, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow};
 use clap::Args;
-use serde_json::{Value, json};
 use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use told::Told;
 
 /// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
 ///
-/// Runs the `diagnose` stage of PIPELINE and what it needs. The simulation is the nominal robot with its geometry, reduction
-/// ratios and declared couplings identified from the recording; everything else is a finding.
+/// Runs the `diagnose` stage of a pipeline and what it needs; of a run, shows what was said then, computing nothing. The simulation is
+/// the nominal robot with its geometry, reduction ratios and declared couplings identified from the recording; everything else is a
+/// finding.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DiagnoseArguments {
+    /// The pipeline's YAML file, or a run as `calib log` names it, RUN/STAGE where it has several diagnoses
+    #[arg(value_name = "PIPELINE|RUN")]
+    what: PathBuf,
+    /// The stage, where there are several `diagnose`
+    #[arg(long, value_name = "STAGE")]
+    step: Option<String>,
     #[command(flatten)]
-    shared: PipelineArguments,
+    means: Means,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+    /// Prints no progress; warnings and errors remain
+    #[arg(long, short)]
+    quiet: bool,
 }
 
 const EXAMPLES: &str = "Examples:
   calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
-  calib diagnose pipeline.yaml --json > diagnosis.json";
+  calib diagnose pipeline.yaml --json > diagnosis.json
+  calib diagnose HEAD
+  calib diagnose HEAD~1/second --json";
 
 pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
-    arguments.shared.told(execute(&arguments.shared, command_line))
+    told_as(arguments.json, execute(arguments, command_line))
 }
 
-fn execute(shared: &PipelineArguments, command_line: &[OsString]) -> Result<()> {
-    let plan = shared.plan()?;
-    let Some(stage) = plan.stages.iter().position(|stage| stage.entry.name == Diagnose::NAME) else {
-        let place = shared.pipeline.display().to_string();
-        return Err(Error::spec(place, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
+fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
+    let store = arguments.means.store()?;
+    let told = if is_pipeline(&arguments.what) {
+        let file = arguments.what.display().to_string();
+        let plan = arguments.means.plan(&arguments.what)?;
+        let own = plan.stages.iter().enumerate().filter(|(_, stage)| stage.entry.name == Diagnose::NAME);
+        let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
+        let Some((at, id)) = one(&file, &own, arguments.step.as_deref())? else {
+            return Err(Error::spec(file, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
+        };
+        let id = id.to_string();
+        let plan = plan.needed_for(at);
+        let outcome = arguments.means.run(&plan, &store, Selection::default(), arguments.quiet, command_line)?;
+        let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
+        Told::read(&outcome.manifest.run_id, stage, &store)?
+    } else {
+        if arguments.means.overrides() {
+            return Err(Error::spec("--set", "nothing of a run can be set again; give its pipeline instead"));
+        }
+        let name = arguments.what.to_string_lossy();
+        let (run, step) = match name.split_once('/') {
+            Some((run, step)) => (run, Some(step)),
+            None => (&*name, arguments.step.as_deref()),
+        };
+        let (manifest, stage) = diagnosis(&store, run, step)?;
+        Told::read(&manifest.run_id, &stage, &store)?
     };
-    let plan = plan.needed_for(stage);
-    let store = shared.store()?;
-    let outcome = shared.run(&plan, &store, Selection::default(), command_line)?;
-    let told = Told::read(&outcome, &store)?;
-    if shared.json { emit_json(&told.document()) } else { emit(&told.text()) }
+    let store = arguments.means.store_again();
+    if arguments.json { emit_json(&told.document(&store)) } else { emit(&told.text(&store)) }
 }
 
-/// The tables of a diagnosis.
-struct Told {
-    verdict: VerdictRow,
-    findings: Findings,
-    numbers: FindingNumbers,
-    rivals: Rivals,
-    shares: Shares,
+/// A file, or what is named like one; everything else names a run.
+fn is_pipeline(what: &Path) -> bool {
+    let ending = what.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    matches!(ending.as_str(), "yaml" | "yml") || what.is_file()
 }
 
-/// Places and variables that are shown.
-const SHOWN: usize = 5;
-
-fn table<T: Table + Default>(outcome: &Outcome, store: &Store) -> Result<T> {
-    let last = outcome.tables(T::KIND).last();
-    last.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
+/// A run by its name, and its stage `diagnose`: `step` where it has several. Fails with what to type where there is none.
+pub(super) fn diagnosis(store: &Store, run: &str, step: Option<&str>) -> Result<(Manifest, StageReport)> {
+    let manifest = Manifest::of(store, &store.find_run(run)?)?;
+    let place = format!("run {}", manifest.run_id);
+    let own = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME);
+    let own: Vec<(&StageReport, &str)> = own.map(|stage| (stage, stage.id.as_str())).collect();
+    let sets: String = manifest
+        .overrides
+        .iter()
+        .map(|set| format!(" --set {}", shell::quoted(&format!("{}={}", set.target, set.value))))
+        .collect();
+    let again = format!("calib diagnose {}{sets}", shell::quoted(&manifest.pipeline.file));
+    let Some((stage, id)) = one(&place, &own, step)? else {
+        let message = format!(
+            "diagnosed nothing, its pipeline has no stage `diagnose`: put `- uses: diagnose` after the split of {}, then type\n  {again}",
+            manifest.pipeline.file
+        );
+        return Err(Error::spec(place, message));
+    };
+    if !matches!(stage.status, StageStatus::Cached | StageStatus::Executed) {
+        let step = if own.len() > 1 { format!(" --step {}", shell::quoted(id)) } else { String::new() };
+        return Err(Error::spec(place, format!("never came to its stage `{id}`; type\n  {again}{step}")));
+    }
+    let stage = stage.clone();
+    Ok((manifest, stage))
 }
 
-impl Told {
-    fn read(outcome: &Outcome, store: &Store) -> Result<Self> {
-        let verdict: Verdict = table(outcome, store)?;
-        let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
-        let (findings, numbers) = (table(outcome, store)?, table(outcome, store)?);
-        Ok(Self { verdict, findings, numbers, rivals: table(outcome, store)?, shares: table(outcome, store)? })
-    }
-
-    /// What could explain the most of the residual before the findings, more than chance, largest first.
-    fn located(&self, by: &str) -> Vec<&ShareRow> {
-        let all = self.shares.0.iter().filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
-        let mut all: Vec<&ShareRow> = all.collect();
-        all.sort_by(|a, b| b.share.total_cmp(&a.share));
-        all.truncate(SHOWN);
-        all
-    }
-
-    fn document(&self) -> Value {
-        let v = &self.verdict;
-        let errors = |mean: Option<f64>, rms: Option<f64>, max: Option<f64>| json!({ "validate_mean_mm": mean, "validate_rms_mm": rms, "validate_max_mm": max });
-        let findings = self.findings.0.iter().map(|finding| {
-            let numbers = self.numbers.0.iter().filter(|number| number.rank == finding.rank);
-            let numbers = numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma }));
-            let rivals = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank);
-            let rivals =
-                rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic }));
-            let valid = match (finding.valid_joint, finding.valid_from_rad, finding.valid_to_rad) {
-                (Some(joint), Some(from), Some(to)) => {
-                    json!({ format!("q{joint}_deg"): [from.to_degrees(), to.to_degrees()] })
-                }
-                _ => json!({}),
-            };
-            json!({
-                "effect": finding.effect, "where": finding.place, "statement": finding.statement,
-                "parameters": numbers.collect::<Vec<_>>(),
-                "evidence": {
-                    "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
-                    "heldout_gain_mm": finding.heldout_gain_mm, "effect_rms_mm": finding.effect_rms_mm,
-                },
-                "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,
-            })
-        });
-        let lines = |text: &str| text.lines().map(String::from).collect::<Vec<_>>();
-        json!({
-            "verdict": v.verdict,
-            "noise_floor_mm": v.noise_floor_mm,
-            "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
-            "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
-            "held_out": v.held_out,
-            "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
-            "findings": findings.collect::<Vec<_>>(),
-            "not_observable": lines(&v.not_observable),
-            "leftover": {
-                "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
-            },
-            "next_measurements": v.next_measurements.as_deref().map(lines),
-            "noise": { "repeatability_rad": v.repeatability_rad, "repeats": v.repeats },
-        })
-    }
-
-    fn located_json(&self, by: &str) -> Vec<Value> {
-        let one = |row: &&ShareRow| json!({ "name": row.name, "share": row.share, "delta_bic": row.delta_bic });
-        self.located(by).iter().map(one).collect()
-    }
-
-    fn text(&self) -> String {
-        let v = &self.verdict;
-        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
-        let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
-        let mut text = format!("{}\n\n", v.verdict.replace('_', " "));
-        text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
-        for (name, mean, rms, max) in [
-            ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
-            ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
-        ] {
-            text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
-        }
-        text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
-        for (by, what) in [("place", "where"), ("variable", "goes with")] {
-            let all = self.located(by);
-            let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
-            if !all.is_empty() {
-                text.push_str(&format!("{what:9}  {}\n", all.join(", ")));
-            }
-        }
-        if !self.shares.0.is_empty() {
-            text.push_str("           (of the squared residual, what one cause there could explain at most)\n\n");
-        }
-        for finding in &self.findings.0 {
-            text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
-            let rivals: Vec<String> = (self.rivals.0.iter().filter(|rival| rival.rank == finding.rank))
-                .map(|rival| format!("{} at {}", rival.effect, rival.place))
-                .collect();
-            if !rivals.is_empty() {
-                text.push_str(&format!("   these data cannot tell it from: {}\n", rivals.join(", ")));
-            }
-        }
-        for line in v.not_observable.lines() {
-            text.push_str(&format!("not observable: {line}\n"));
-        }
-        for line in v.next_measurements.iter().flat_map(|lines| lines.lines()) {
-            text.push_str(&format!("measure next: {line}\n"));
-        }
-        text
+/// The one that is meant; nothing where there are none.
+fn one<'a, T: Copy>(place: &str, own: &[(T, &'a str)], step: Option<&str>) -> Result<Option<(T, &'a str)>> {
+    let list = || own.iter().map(|(_, id)| *id).collect::<Vec<_>>().join(", ");
+    match (own, step) {
+        ([], _) => Ok(None),
+        (_, Some(step)) => own.iter().find(|(_, id)| *id == step).copied().map(Some).ok_or_else(|| {
+            let near = nearest(step, own.iter().map(|(_, id)| *id)).map(|near| format!("did you mean `{near}`? "));
+            Error::spec(place, format!("no stage `{step}` diagnoses; {}allowed: {}", near.unwrap_or_default(), list()))
+        }),
+        ([only], None) => Ok(Some(*only)),
+        _ => Err(Error::spec(place, format!("has several diagnoses; say which with --step: {}", list()))),
     }
 }

@@ -10,9 +10,10 @@ use crate::pipeline::Selection;
 use crate::robot::description::RobotDescription;
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::stage::{Diagnose, Stage};
 use crate::store::frame::FrameBuilder;
 use crate::store::{Store, TableRef};
-use crate::table::{Network, Parameters, Recording, Robot, Table};
+use crate::table::{Network, Parameters, Recording, Robot, Table, standing};
 use clap::Args;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Deserialize;
@@ -23,11 +24,11 @@ use std::path::{Path, PathBuf};
 /// Where the model comes from.
 #[derive(Args)]
 pub(super) struct ModelArguments {
-    /// A pipeline (its stages run as far as they are not done), `latest` or the id of a run in the store, or a table
-    /// `parameters` (Parquet)
+    /// A pipeline (its stages run as far as they are not done), a run as `calib log` names it (`latest`: the last that is done), or a
+    /// table `parameters` (Parquet)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The stage whose parameters to take [default: the last that writes some]
+    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some]
     #[arg(long, value_name = "STAGE")]
     step: Option<String>,
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
@@ -63,6 +64,7 @@ struct Record {
 #[derive(Deserialize)]
 struct StageRecord {
     id: String,
+    uses: String,
     inputs: Vec<TableRecord>,
     outputs: Vec<TableRecord>,
 }
@@ -89,10 +91,13 @@ impl ModelArguments {
         let store = self.means.store()?;
         let record = if matches!(ending.as_str(), "yaml" | "yml") {
             let plan = self.means.plan(&self.model)?;
-            let last = plan
-                .stages
-                .iter()
-                .rposition(|stage| stage.outputs.iter().any(|port| port.kind == Parameters::KIND || port.kind == Network::KIND));
+            let stages = &plan.stages;
+            let writes = |at: usize, kind: &str| stages[at].outputs.iter().any(|port| port.kind == kind);
+            let steps = || (0..stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND));
+            let own = || steps().map(|at| (stages[at].id.as_str(), writes(at, Parameters::KIND)));
+            let diagnosed = stages.iter().rfind(|stage| stage.entry.name == Diagnose::NAME && self.step.is_none());
+            let stands = diagnosed.and_then(|stage| standing(own(), &stage.id));
+            let last = steps().rfind(|at| stands.is_none_or(|id| stages[*at].id == id));
             let Some(last) = last else {
                 let message = "identifies nothing; put a stage `identify` after the split";
                 return Err(Error::spec(self.model.display().to_string(), message));
@@ -108,7 +113,7 @@ impl ModelArguments {
         self.of_record(&record, &store)
     }
 
-    /// The id of a run by its name: whole, its beginning, or `latest`.
+    /// The id of a run by its name, or of the last that is done by `latest`.
     fn run(&self, store: &Store) -> Result<String> {
         let name = self.model.to_string_lossy();
         let runs = store.runs()?;
@@ -117,18 +122,13 @@ impl ModelArguments {
             let place = store.root().display().to_string();
             return runs.iter().rev().find(done).cloned().ok_or_else(|| Error::spec(place, "has no run that is done"));
         }
-        let fits: Vec<&String> = runs.iter().filter(|id| id.starts_with(&*name)).collect();
-        match fits[..] {
-            [id] => Ok(id.clone()),
-            [] => Err(Error::spec(
-                &*name,
-                format!(
-                    "neither a pipeline (.yaml), a table (.parquet) nor a run in {}; `latest` is the last run",
-                    store.root().display()
-                ),
-            )),
-            _ => Err(Error::spec(&*name, format!("{} runs begin with this; give more of the id", fits.len()))),
-        }
+        store.find_run(&name).map_err(|error| match error {
+            Error::Spec(faults) => {
+                let why = faults.into_iter().next().map(|fault| fault.message).unwrap_or_default();
+                Error::spec(&*name, format!("neither a pipeline (.yaml), a table (.parquet) nor a run: {why}"))
+            }
+            other => other,
+        })
     }
 
     fn of_record(&self, record: &Record, store: &Store) -> Result<Identified> {
@@ -145,7 +145,10 @@ impl ModelArguments {
                 let hint = nearest(step, ids.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
                 Error::spec("--step", format!("no stage `{step}` writes parameters; {hint}allowed: {}", ids.join(", ")))
             })?,
-            None => found.last().ok_or_else(|| Error::spec(&record.run_id, "the run identified nothing"))?,
+            None => {
+                let diagnosed = found.iter().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
+                diagnosed.or(found.last()).ok_or_else(|| Error::spec(&record.run_id, "the run identified nothing"))?
+            }
         };
         let (stage, table) = chosen;
         let robot = last(Robot::KIND).ok_or_else(|| Error::spec(&record.run_id, "the run has no table `robot`"))?;
@@ -185,6 +188,11 @@ fn identified(
     data: Option<Measurements>,
     origin: String,
 ) -> Result<Identified> {
+    if parameters.is_beside() {
+        let message = "these parameters correct the simulation of sim_x, sim_y, sim_z, not the model of the robot file, which alone can be \
+                       compensated and exported: take another stage's with --step, or diagnose the recording without these columns";
+        return Err(Error::spec(origin, message));
+    }
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
     Ok(Identified { robot, parameters, model, correction, data, origin })
 }

@@ -1,5 +1,6 @@
 //! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
 
+use super::shell::quoted;
 use super::surroundings::{cores, open_store, surroundings};
 use crate::error::Result;
 use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
@@ -30,6 +31,16 @@ impl Means {
 
     pub fn store(&self) -> Result<Store> {
         open_store(self.store.as_deref())
+    }
+
+    /// Whether anything is to be set on the command line.
+    pub fn overrides(&self) -> bool {
+        !self.set.is_empty()
+    }
+
+    /// `--store` as it was given, to be typed again; empty for the usual place.
+    pub fn store_again(&self) -> String {
+        self.store.as_ref().map_or_else(String::new, |store| format!(" --store {}", quoted(&store.display().to_string())))
     }
 
     pub fn jobs(&self) -> usize {

@@ -41,11 +41,16 @@ impl PipelineArguments {
 
     /// The result, whose failure is also a document where one is asked for.
     pub fn told(&self, result: Result<()>) -> Result<()> {
-        if let (true, Err(error)) = (self.json, &result) {
-            emit_json(&failure(error))?;
-        }
-        result
+        told_as(self.json, result)
     }
+}
+
+/// A result, whose failure is also a document under `json`.
+pub(super) fn told_as(json: bool, result: Result<()>) -> Result<()> {
+    if let (true, Err(error)) = (json, &result) {
+        emit_json(&failure(error))?;
+    }
+    result
 }
 
 fn failure(error: &Error) -> serde_json::Value {

@@ -72,6 +72,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     text.push_str(&corrections::corrections(&outcome, &store)?);
     text.push_str(&searches::searches(&outcome, &store)?);
     text.push_str(&tables::rejected(&outcome));
+    text.push_str(&tables::headline(&outcome, &store)?);
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }

@@ -1,9 +1,10 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
 use crate::error::Result;
-use crate::pipeline::Outcome;
+use crate::pipeline::{Outcome, StageReport};
+use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
-use crate::table::{Statistics, StatisticsRow, Table};
+use crate::table::{Parameters, Prediction, Statistics, StatisticsRow, Table, standing};
 use serde_json::json;
 
 fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
@@ -32,6 +33,34 @@ pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
     text.push_str(&folds(&rows));
     text.push_str(&references(&rows));
     Ok(text)
+}
+
+/// What the diagnosed model makes of the held-out set with most points, in a line; nothing without a diagnosis.
+pub(super) fn headline(outcome: &Outcome, store: &Store) -> Result<String> {
+    let stages = &outcome.manifest.stages;
+    let writes = |stage: &StageReport, kind: &str| stage.outputs.iter().any(|output| output.kind == kind);
+    let steps = stages.iter().filter(|stage| writes(stage, Prediction::KIND));
+    let steps = steps.map(|stage| (stage.id.as_str(), writes(stage, Parameters::KIND)));
+    let Some(diagnosed) = stages.iter().rfind(|stage| stage.uses == Diagnose::NAME && writes(stage, Parameters::KIND)) else {
+        return Ok(String::new());
+    };
+    for output in diagnosed.outputs.iter().filter(|output| output.kind == Parameters::KIND) {
+        if Parameters::from_frame(&store.load(&output.table)?)?.is_beside() {
+            return Ok(String::new());
+        }
+    }
+    let rows = rows(outcome, store)?;
+    let Some(standing) = standing(steps, &diagnosed.id) else { return Ok(String::new()) };
+    let own = rows.iter().filter(|row| row.held_out && row.step == standing);
+    let Some(after) = own.max_by_key(|row| row.points) else { return Ok(String::new()) };
+    let earlier = rows.iter().filter(|row| row.held_out && row.set == after.set && row.order < after.order);
+    let before = earlier.min_by_key(|row| row.order).map_or_else(String::new, |row| {
+        format!("mean {:.4} mm, max {:.4} mm after `{}`, now ", row.mean_mm, row.max_mm, row.step)
+    });
+    Ok(format!(
+        "the diagnosed model, {} held-out points of set {}: {before}mean {:.4} mm, max {:.4} mm after `{}`\n",
+        after.points, after.set, after.mean_mm, after.max_mm, after.step
+    ))
 }
 
 /// Training points under fits without them; nothing where no step made folds.

@@ -15,6 +15,7 @@ mod outside;
 mod pool;
 mod search;
 mod sense;
+mod separate;
 mod state;
 mod statement;
 mod verdict;
@@ -23,10 +24,12 @@ pub use finding::{Evidence, Finding, Number, Rival};
 pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
 pub use outside::beside;
+pub use separate::{Standing, contest, other_means};
 pub use verdict::{Diagnosis, Errors, Verdict};
 
 use crate::effect::{
-    BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey,
+    BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, Place, Placed, ReductionRatio, Setting,
+    Survey,
 };
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
 use crate::robot::{Measurements, RobotModel};
@@ -113,7 +116,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         round += 1;
         let looked_at = thinned(&now.screening.kept);
         let pose = poses(&data, &looked_at);
-        let yielding = yielding(&now, robot.joints());
+        let yielding = yielding(&now.model);
         let lens = Lens::new(&now.model, &data, &looked_at, yielding.iter().any(|compliance| *compliance > 0.0));
         let torque = lens.torques();
         let survey = Survey::new(robot, &data, &looked_at, &torque, &yielding);
@@ -305,14 +308,14 @@ fn pool_of<'a>(lens: &'a Lens<'a>, now: &Course, free: &[usize], survey: &Survey
     Pool::new(lens, &jacobian, &residual, hypotheses)
 }
 
-/// How far each joint yields in the present model, rad/Nm.
-fn yielding(now: &Course, joints: usize) -> Vec<f64> {
-    let mut out = vec![0.0; joints];
-    for Chosen { form, coefficients, .. } in start_of(now) {
-        if let (Form::JointCompliance(_) | Form::JointHardening(_), crate::effect::Place::Joint(joint)) =
-            (&form, crate::effect::Placed::place(&form))
+/// How far each joint yields in a model, rad/Nm.
+fn yielding(model: &Model) -> Vec<f64> {
+    let mut out = vec![0.0; model.robot.joints()];
+    for (effect, range) in model.stack.effects() {
+        if let Some(form @ (Form::JointCompliance(_) | Form::JointHardening(_))) = effect.form()
+            && let Place::Joint(joint) = form.place()
         {
-            out[joint] += coefficients.first().copied().unwrap_or(0.0).max(0.0);
+            out[joint] += model.x[range].first().copied().unwrap_or(0.0).max(0.0);
         }
     }
     out

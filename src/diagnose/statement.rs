@@ -181,22 +181,26 @@ pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     out
 }
 
+/// Where nothing else is needed.
+const POSES: &str = "more poses, chosen to tell them apart (`calib poses --run`)";
+
 /// What would tell findings from their rivals, a sentence each.
 pub(crate) fn next(findings: &[super::Finding]) -> Vec<String> {
     let mut out = Vec::new();
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
-            let how = advice(finding.effect, rival.effect);
+            let how = other_means(finding.effect, rival.effect).unwrap_or(POSES);
             out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
         }
     }
     out
 }
 
-fn advice(a: &str, b: &str) -> &'static str {
+/// What is not a pose and may tell two effects apart.
+pub(crate) fn other_means(a: &str, b: &str) -> Option<&'static str> {
     let pair = |x: &str, y: &str| (a == x && b == y) || (a == y && b == x);
     let either = |x: &str| a == x || b == x;
-    if pair("joint_compliance", "joint_hardening") {
+    let means = if pair("joint_compliance", "joint_hardening") {
         "measure with a third payload between none and full, and with joints near their largest load"
     } else if either("counterbalance") || either("link_mass") || either("payload_error") || either("cable_drag") {
         "log motor currents at rest, or measure with two payloads over the joint's full range (for a balancer also disconnected)"
@@ -209,6 +213,7 @@ fn advice(a: &str, b: &str) -> &'static str {
     } else if either("axis_wobble") {
         "measure a second target off the first"
     } else {
-        "more poses over the full range of these joints (`calib poses --separate`)"
-    }
+        return None;
+    };
+    Some(means)
 }

@@ -10,18 +10,24 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// The steps in pipeline order, each with the colour it has in all pictures.
-pub(super) struct Steps(BTreeMap<i64, String>);
+pub(super) struct Steps {
+    names: BTreeMap<i64, String>,
+    standing: Option<i64>,
+}
 
 impl Steps {
-    pub fn new(statistics: &Statistics) -> Self {
-        Self(statistics.0.iter().map(|row| (row.order, row.step.clone())).collect())
+    /// `standing` is the step that the report speaks of; without one, the last.
+    pub fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
+        let names: BTreeMap<i64, String> = statistics.0.iter().map(|row| (row.order, row.step.clone())).collect();
+        let named = names.iter().rev().find(|(_, name)| Some(name.as_str()) == standing).or(names.last_key_value());
+        Self { standing: named.map(|(order, _)| *order), names }
     }
-    fn last(&self) -> Option<i64> {
-        self.0.last_key_value().map(|(order, _)| *order)
+    pub fn standing(&self) -> Option<i64> {
+        self.standing
     }
     fn colour(&self, order: i64) -> String {
-        // Colours of the steps between the first and the last repeat after five.
-        if Some(order) == self.last() {
+        // Colours of the steps but the first and the one that stands repeat after five.
+        if Some(order) == self.standing {
             "s-last".into()
         } else {
             format!("s{}", if order == 0 { 0 } else { 1 + (order - 1) % 5 })
@@ -29,7 +35,7 @@ impl Steps {
     }
     /// Colour of a step by name; a step without predictions has the first one's.
     pub fn colour_of(&self, step: &str) -> String {
-        let order = self.0.iter().rev().find(|(_, name)| *name == step).map_or(0, |(order, _)| *order);
+        let order = self.names.iter().rev().find(|(_, name)| *name == step).map_or(0, |(order, _)| *order);
         self.colour(order)
     }
 }
@@ -37,7 +43,7 @@ impl Steps {
 #[derive(Serialize)]
 pub(super) struct Errors {
     verdict: Verdict,
-    /// Sets still held out after the last step, the verdict's first; then those that a later step was fitted to.
+    /// Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
     held_out: Vec<Block>,
     training: Vec<Block>,
     folds: Vec<Fold>,
@@ -69,7 +75,7 @@ struct Row {
     step: String,
     colour: String,
     points: String,
-    /// Of the last step of the pipeline.
+    /// Of the step that stands.
     last: bool,
     /// mean, std, p95, max, rms, median, rms x, y, z, noise.
     values: Vec<String>,
@@ -107,14 +113,14 @@ struct Picture {
 impl Errors {
     pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
         let rows = &tables.statistics.0;
-        let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.last() && r.held_out).collect();
+        let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
         if let Some(wished) = wished
             && !last.iter().any(|row| row.set == wished)
         {
             let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
             return Err(Error::spec(
                 "with.set",
-                format!("`{wished}` is no set held out after the last step; allowed: {}", allowed.join(", ")),
+                format!("`{wished}` is no set held out after the step that stands; allowed: {}", allowed.join(", ")),
             ));
         }
         last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));
@@ -134,7 +140,7 @@ impl Errors {
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
-            legend: steps.0.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
+            legend: steps.names.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
         })
     }
 }
@@ -167,7 +173,7 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         step: row.step.clone(),
         colour: steps.colour(row.order),
         points: count(row.points),
-        last: Some(row.order) == steps.last(),
+        last: Some(row.order) == steps.standing(),
         values: values.into_iter().map(mm).collect(),
     }
 }
@@ -287,7 +293,7 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
     }
 }
 
-/// The error over the workspace before the first and after the last step.
+/// The error over the workspace after the first step and after the one that stands.
 #[derive(Serialize)]
 pub(super) struct Workspace {
     legend: Vec<(String, String)>,
@@ -303,10 +309,11 @@ struct Panel {
 
 impl Workspace {
     /// Nothing where nothing was predicted.
-    pub fn new(prediction: &[Prediction]) -> Option<Self> {
+    pub fn new(prediction: &[Prediction], standing: Option<&str>) -> Option<Self> {
         let mut filled = prediction.iter().filter(|table| !table.0.is_empty());
         let first = filled.next()?;
-        let last = filled.next_back();
+        let is = |table: &&Prediction| table.0.first().is_some_and(|row| Some(row.step.as_str()) == standing);
+        let last = filled.clone().rfind(is).or_else(|| filled.next_back());
         let colours = Colours::new(first, last.unwrap_or(first));
         let mut panels = Vec::new();
         for view in VIEWS {

@@ -46,6 +46,7 @@ pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement:
         "robot": super::data::robot_name(&tables.robot),
         "calib": env!("CARGO_PKG_VERSION"),
         "identity": wishes.identity,
+        "standing": tables.standing,
         "limits": limits,
         "statistics": statistics.collect::<Vec<_>>(),
         "diagnosis": diagnosis,

@@ -1,9 +1,11 @@
-//! The verdict against the user's limits: figures of the held-out points after the last step, each beside what it may be.
+//! The verdict against the user's limits: figures of the held-out points of the model that stands, each beside what it may be.
 
-use crate::table::{Statistics, StatisticsRow};
+use super::Tables;
+use super::errors::Steps;
+use crate::table::StatisticsRow;
 use serde::Serialize;
 
-/// What the user accepts, mm; of held-out points after the last step.
+/// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Limits {
     pub mean_mm: Option<f64>,
@@ -21,22 +23,22 @@ pub(super) struct Judgement {
     pub kept: bool,
 }
 
-/// The row that is judged: of `set`, else of the held-out set with most points, after the last step.
-pub(super) fn judged<'a>(statistics: &'a Statistics, set: Option<&str>) -> Option<&'a StatisticsRow> {
-    let last = statistics.0.iter().map(|row| row.order).max()?;
-    let rows = statistics.0.iter().filter(|row| row.held_out && row.order == last);
+/// The row that is judged: of `set`, else of the held-out set with most points, after the step that stands.
+pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a StatisticsRow> {
+    let standing = Steps::new(&tables.statistics, tables.standing.as_deref()).standing()?;
+    let rows = tables.statistics.0.iter().filter(|row| row.held_out && row.order == standing);
     let rows = rows.filter(|row| set.is_none_or(|set| row.set == set));
     rows.max_by_key(|row| row.points)
 }
 
 impl Judgement {
     /// None where there are no limits.
-    pub fn new(statistics: &Statistics, limits: &Limits, set: Option<&str>) -> Option<Self> {
+    pub fn new(tables: &Tables, limits: &Limits, set: Option<&str>) -> Option<Self> {
         let asked = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
         if asked.iter().all(|(_, limit)| limit.is_none()) {
             return None;
         }
-        let Some(row) = judged(statistics, set) else {
+        let Some(row) = judged(tables, set) else {
             let sentence = "The limits cannot be judged: no points were held out.".into();
             return Some(Self { kind: "worse", sentence, lines: Vec::new(), kept: false });
         };

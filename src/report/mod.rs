@@ -49,6 +49,8 @@ pub struct Tables {
     pub rivals: Vec<Rivals>,
     pub suspects: Vec<Suspects>,
     pub curves: Curves,
+    /// The step that the report speaks of; without one, the last.
+    pub standing: Option<String>,
 }
 
 /// What the person who asked for the report chose.
@@ -91,9 +93,9 @@ pub struct Pages {
 
 /// The report; fails where `wishes.set` is no held-out set.
 pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
-    let steps = errors::Steps::new(&tables.statistics);
+    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
     let robot = data::robot_name(&tables.robot);
-    let judgement = limits::Judgement::new(&tables.statistics, &wishes.limits, wishes.set);
+    let judgement = limits::Judgement::new(tables, &wishes.limits, wishes.set);
     let title = wishes.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
     let json = json::document(tables, wishes, &title, judgement.as_ref())?;
     let page = Page {
@@ -106,7 +108,7 @@ pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
         errors: errors::Errors::new(tables, &steps, wishes.set)?,
-        workspace: errors::Workspace::new(&tables.prediction),
+        workspace: errors::Workspace::new(&tables.prediction, tables.standing.as_deref()),
         parameters: parameters::Section::new(&tables.parameters),
         fits: fits::Section::new(tables, &steps),
         comparisons: corrections::comparisons(tables),

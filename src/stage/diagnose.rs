@@ -58,7 +58,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 5;
+    const IMPLEMENTATION: u32 = 6;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -99,6 +99,7 @@ impl Stage for Diagnose {
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
         fit.iter().for_each(|row| held_out[*row] = false);
+        let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
         let covariance = diagnosis.fitted.covariance.as_ref();
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         Ok(DiagnoseWrites {
@@ -108,7 +109,7 @@ impl Stage for Diagnose {
             rivals: Rivals::of(&diagnosis),
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
-            parameters: Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None),
+            parameters: if reads.recording.simulated.is_some() { parameters.beside() } else { parameters },
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside),
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),

@@ -7,7 +7,7 @@ use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
     Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
-    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict,
+    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,17 +69,22 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 5;
+    const IMPLEMENTATION: u32 = 6;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;
         let hashes = hashes(&reads)?;
+        // A diagnosis beside an outside simulation speaks of that, not of this robot's model.
+        let diagnosed = reads.findings.last().filter(|_| reads.recording.simulated.is_none()).map(|findings| &findings.stage);
+        let model = |stage: &String| reads.models.iter().find(|model| model.stage == *stage).map(|model| model.table.clone());
+        let steps = reads.prediction.iter().map(|step| (step.stage.as_str(), model(&step.stage).is_some()));
+        let standing = diagnosed.and_then(|stage| standing(steps, stage)).map(String::from);
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
-            parameters: reads.parameters,
+            parameters: diagnosed.and_then(model).unwrap_or(reads.parameters),
             robot: reads.robot,
             recording: reads.recording,
             split: reads.split,
@@ -95,6 +100,7 @@ impl Stage for Report {
             rivals: unlabelled(reads.rivals),
             suspects: unlabelled(reads.suspects),
             curves,
+            standing,
         };
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
         let limits = Limits { mean_mm, p95_mm, max_mm };

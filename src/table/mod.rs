@@ -91,7 +91,7 @@ pub use robot::{Robot, RobotRow};
 pub use scoreboard::{Scoreboard, ScoreboardRow};
 pub use searches::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 pub use split::{Split, SplitRow};
-pub use statistics::{Statistics, StatisticsRow};
+pub use statistics::{Statistics, StatisticsRow, standing};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
 pub use training::{Training, TrainingRow};

@@ -42,6 +42,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
 
+/// The remark of parameters that correct what stood in `sim_x`, `sim_y`, `sim_z`.
+const BESIDE: &str = "corrects the outside simulation, not the robot file's model";
+
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
 const SILENT: f64 = 10.0;
 
@@ -126,6 +129,19 @@ impl Parameters {
             }
         }
         self
+    }
+
+    /// The same, marked as a correction of an outside simulation.
+    pub fn beside(mut self) -> Self {
+        for row in &mut self.0 {
+            row.remark = Some(row.remark.take().map_or_else(|| BESIDE.into(), |remark| format!("{BESIDE}; {remark}")));
+        }
+        self
+    }
+
+    /// Whether these correct an outside simulation, and say nothing of the robot file's model.
+    pub fn is_beside(&self) -> bool {
+        self.0.iter().any(|row| row.remark.as_ref().is_some_and(|remark| remark.starts_with(BESIDE)))
     }
 
     /// The effects of the whole arm in this model, in the registry's order.

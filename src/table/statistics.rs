@@ -55,3 +55,17 @@ crate::table::rows! { "statistics",
         reference_max_mm: Option<f64>,
     }
 }
+
+/// The step that stands for a run with a diagnosis: the diagnosed model with what was learned on it. `steps` are those that predict, in
+/// their order, each with whether it has a model of its own.
+pub fn standing<'a>(steps: impl IntoIterator<Item = (&'a str, bool)>, diagnosed: &str) -> Option<&'a str> {
+    let mut found = None;
+    for (step, own) in steps {
+        match found {
+            Some(_) if own => break,
+            None if step != diagnosed => (),
+            _ => found = Some(step),
+        }
+    }
+    found
+}

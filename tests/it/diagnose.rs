@@ -166,3 +166,139 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
     let (left, ..) = diagnosed(Some(model.predict(&data).into_iter().map(<[f64; 3]>::from).collect()));
     assert_eq!(left, Named::new());
 }
+
+/// A recording of the twin in `sealed/recordings/c0001` of a new folder.
+fn concealed(family: &str, seed: &str, points: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", seed, "--points", points];
+    calib(&[&arguments[..], &["--family", family, "--robot", "compact6", "--faulty", "0"]].concat(), folder.path());
+    folder
+}
+
+fn refused(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// The pipeline of cases, with one text in place of another.
+fn case_with(folder: &Path, changes: &[(&str, &str)]) {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml")).expect("it");
+    let text = changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    });
+    std::fs::write(folder.join("p.yaml"), text).expect("written");
+}
+
+const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
+
+#[test]
+fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
+    let folder = concealed("zero_shift", "923", "60");
+    let here = folder.path();
+    let twice = ("  - uses: validate\n", "  - {id: again, uses: diagnose}\n\n  - uses: validate\n");
+    case_with(here, &[]);
+    let made =
+        [calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here), calib(&["diagnose", "HEAD", "--json"], here)];
+    let runs = std::fs::read_dir(here.join(".calib/runs")).expect("runs").count();
+    assert_eq!(calib(&["diagnose", "HEAD"], here), made[0]);
+    // Nothing was run, and nothing was computed anew.
+    assert_eq!(std::fs::read_dir(here.join(".calib/runs")).expect("runs").count(), runs);
+    assert_eq!(calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here), made[1]);
+    calib(&["tag", "HEAD", "found"], here);
+    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9"], &CASE[..]].concat(), here);
+    let (code, said) = refused(&["diagnose", "HEAD"], here);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("never came to its stage `diagnose`"), "{said}");
+    assert!(said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"), "{said}");
+    assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
+    case_with(here, &[("  - uses: diagnose\n", "")]);
+    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
+    let (code, said) = refused(&["diagnose", "HEAD"], here);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"), "{said}");
+    case_with(here, &[twice]);
+    calib(&[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(), here);
+    for place in [&["HEAD"][..], &[&["p.yaml"], &CASE[..]].concat()] {
+        let (code, said) = refused(&[&["diagnose"], place].concat(), here);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains("has several diagnoses; say which with --step: diagnose, again"), "{said}");
+    }
+    assert_eq!(
+        calib(&["diagnose", "HEAD/again", "--json"], here),
+        calib(&["diagnose", "HEAD", "--step", "again", "--json"], here)
+    );
+    let (code, said) = refused(&["diagnose", "HEAD", "--set", "seed=2"], here);
+    assert_eq!((code, said.contains("nothing of a run can be set again")), (Some(2), true), "{said}");
+}
+
+#[test]
+fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_own() {
+    let folder = concealed("joint_compliance", "931", "60");
+    let here = folder.path();
+    let file = here.join("sealed/recordings/c0001/tracker.csv");
+    let text = std::fs::read_to_string(&file).expect("the tracker's");
+    let column = text.lines().next().and_then(|head| head.split(',').position(|name| name == "x_mm")).expect("x_mm");
+    let beside = |(row, line): (usize, &str)| match row {
+        0 => format!("{line},sx,sy,sz\n"),
+        _ => {
+            let cells: Vec<&str> = line.split(',').collect();
+            let near =
+                |k: usize| cells[column + k].parse::<f64>().expect("a number") + 0.05 * (row as f64 * (k + 1) as f64).sin();
+            format!("{line},{},{},{}\n", near(0), near(1), near(2))
+        }
+    };
+    std::fs::write(&file, text.lines().enumerate().map(beside).collect::<String>()).expect("written");
+    let z = "            z: {column: z_mm, unit: mm}\n";
+    let simulated = ["x", "y", "z"].map(|axis| format!("            sim_{axis}: {{column: s{axis}, unit: mm}}\n")).concat();
+    case_with(here, &[(z, &format!("{z}{simulated}"))]);
+    calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
+    let table = ".calib/tables/case/diagnose.parameters.parquet";
+    let robot = "sealed/recordings/c0001/robot.json";
+    for verb in [
+        &["compensate", "HEAD", "t.csv"][..],
+        &["export", "latest", "--format", "json"],
+        &["export", table, "--robot", robot, "--format", "json"],
+    ] {
+        let (code, said) = refused(verb, here);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains("correct the simulation of sim_x, sim_y, sim_z") && said.contains("--step"), "{said}");
+    }
+    calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
+    calib(&["export", "HEAD", "--step", "geometry", "--format", "json", "--quiet"], here);
+}
+
+#[test]
+fn what_no_pose_tells_apart_is_said_with_what_would() {
+    let folder = concealed("gear_cyclic", "5", "60");
+    let here = folder.path();
+    case_with(here, &[]);
+    let found = |here: &Path| -> Value {
+        let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here);
+        serde_json::from_str(&said).expect("JSON")
+    };
+    // A balancer at a joint of unknown stiffness is a gear error of order 1.
+    assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "counterbalance");
+    let said = calib(&["poses", "--run", "HEAD", "--separate", "gear_cyclic", "counterbalance@j4"], here);
+    assert!(said.contains("no pose tells gear_cyclic at joint 4 from counterbalance at joint 4"), "{said}");
+    assert!(said.contains("instead: log motor currents at rest"), "{said}");
+    let folder = concealed("zero_shift", "9", "60");
+    let here = folder.path();
+    case_with(here, &[]);
+    // A step of the first joint is one turn of the base.
+    assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "base_shift");
+    let said = calib(&["poses", "--run", "HEAD", "--separate"], here);
+    assert!(said.contains("whatever zero_shift at joint 1 does, base_shift at base can do too"), "{said}");
+    assert!(said.contains("instead: return to a few anchor poses"), "{said}");
+    for (names, wanted) in [
+        (&["9"][..], "`9` is no finding of run"),
+        (&["zero_shift@joint 7"], "is no finding of run"),
+        (&["1", "gear_cyclc@joint 1"], "did you mean `gear_cyclic`?"),
+        (&["1", "gear_cyclic@joint 9"], "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2"),
+        (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),
+    ] {
+        let (code, said) = refused(&[&["poses", "--run", "HEAD", "--separate"], names].concat(), here);
+        assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
+    }
+}

@@ -1,13 +1,23 @@
 //! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them, deg and mm.
 
-use super::Work;
 use crate::error::{Error, Result};
-use crate::robot::description::JointKind;
+use crate::robot::Measurements;
+use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::Unit;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
 use parquet::arrow::ArrowWriter;
 use std::path::Path;
 use std::sync::Arc;
+
+/// Poses to drive to.
+pub(super) struct Drive<'a> {
+    pub robot: &'a RobotDescription,
+    /// rad or m.
+    pub ranges: &'a [[f64; 2]],
+    pub poses: &'a Measurements,
+    /// +1 or -1, row-major.
+    pub direction: &'a [f64],
+}
 
 /// A column: its name, its values, and the decimals that people read (none: whole numbers).
 pub(super) struct Column {
@@ -19,8 +29,8 @@ pub(super) struct Column {
 /// Decimals of joint positions: 1e-4 deg is 0.004 mm at 2.5 m.
 const JOINT_DECIMALS: usize = 4;
 
-pub(super) fn columns(work: &Work) -> Vec<Column> {
-    let (poses, direction) = (&work.proposal.poses, &work.proposal.direction);
+pub(super) fn columns(drive: &Drive) -> Vec<Column> {
+    let Drive { robot, ranges, poses, direction } = *drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
     let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| Column {
@@ -29,7 +39,7 @@ pub(super) fn columns(work: &Work) -> Vec<Column> {
         decimals,
     };
     let mut out = vec![column("sequence".into(), 0, &|row| (row + 1) as f64)];
-    for (j, (joint, range)) in work.robot.joints.iter().zip(&work.ranges).enumerate() {
+    for (j, (joint, range)) in robot.joints.iter().zip(ranges).enumerate() {
         let (ending, unit) = match joint.kind {
             JointKind::Revolute => ("deg", Unit::Degree),
             JointKind::Prismatic => ("mm", Unit::Millimetre),
@@ -62,24 +72,31 @@ fn kind(path: &Path) -> Option<&'static str> {
     ["csv", "parquet"].into_iter().find(|known| *known == ending)
 }
 
-pub(super) fn write(path: &Path, work: &Work) -> Result<()> {
-    let bytes = if kind(path) == Some("parquet") { parquet(work)? } else { csv(work).into_bytes() };
+pub(super) fn write(path: &Path, drive: &Drive) -> Result<()> {
+    let bytes = if kind(path) == Some("parquet") { parquet(drive)? } else { csv(drive).into_bytes() };
     std::fs::write(path, bytes).map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))
 }
 
-fn csv(work: &Work) -> String {
-    let columns = columns(work);
+/// The poses as JSON, an object each.
+pub(super) fn objects(drive: &Drive) -> Vec<serde_json::Value> {
+    let columns = columns(drive);
+    let object = |row: usize| columns.iter().map(|column| (column.name.clone(), serde_json::json!(column.values[row]))).collect();
+    (0..drive.poses.rows()).map(|row| serde_json::Value::Object(object(row))).collect()
+}
+
+fn csv(drive: &Drive) -> String {
+    let columns = columns(drive);
     let mut text = columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",") + "\n";
-    for row in 0..work.proposal.poses.rows() {
+    for row in 0..drive.poses.rows() {
         let cells = columns.iter().map(|column| format!("{:.*}", column.decimals, column.values[row]));
         text.push_str(&(cells.collect::<Vec<_>>().join(",") + "\n"));
     }
     text
 }
 
-fn parquet(work: &Work) -> Result<Vec<u8>> {
+fn parquet(drive: &Drive) -> Result<Vec<u8>> {
     let bug = |error: &dyn std::fmt::Display| Error::Bug(error.to_string());
-    let arrays = columns(work).into_iter().map(|column| {
+    let arrays = columns(drive).into_iter().map(|column| {
         let array: ArrayRef = match column.name.as_str() {
             "sequence" => Arc::new(column.values.iter().map(|value| *value as i64).collect::<Int64Array>()),
             _ => Arc::new(Float64Array::from(column.values)),

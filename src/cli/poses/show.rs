@@ -1,6 +1,6 @@
 //! What the proposed poses promise, as a short table and as JSON.
 
-use super::{Work, output};
+use super::{PosesArguments, Work, output};
 use crate::estimate::choose::{Score, median};
 use serde_json::json;
 
@@ -42,7 +42,7 @@ pub(super) fn text(work: &Work) -> String {
     let width = sets.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     text.push_str(&format!(
         "\npredicted, for points good to {} mm per axis\n  {:width$}  {:>6}  {:>9}  {:>9}  {:>24}\n",
-        work.arguments.sigma, "", "", "", "sigma of", "sigma of position, mm"
+        work.sigma, "", "", "", "sigma of", "sigma of position, mm"
     ));
     text.push_str(&format!(
         "  {:width$}  {:>6}  {:>9}  {:>9}  {:>10}  {:>12}\n",
@@ -67,12 +67,17 @@ pub(super) fn text(work: &Work) -> String {
         "\nof an error by direction of approach, {:.0} % of every joint's stays visible with the directions given\n",
         1e2 * proposal.approach_seen
     ));
-    text.push_str("self-collision and collision with the cell are not checked: drive the poses slowly first\n");
-    text.push_str(&match &work.arguments.out {
-        Some(path) => format!("poses: {}\n", path.display()),
-        None => "no file was written: give --out poses.csv (or .parquet)\n".into(),
-    });
+    text.push_str(&closing(work.arguments));
     text
+}
+
+/// What every proposal ends with.
+pub(super) fn closing(arguments: &PosesArguments) -> String {
+    let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
+    match &arguments.out {
+        Some(path) => format!("{text}poses: {}\n", path.display()),
+        None => format!("{text}no file was written: give --out poses.csv (or .parquet)\n"),
+    }
 }
 
 fn separation(work: &Work) -> String {
@@ -123,23 +128,18 @@ pub(super) fn document(work: &Work) -> serde_json::Value {
             "imitated": part.imitated.iter().map(|parameter| name(*parameter)).collect::<Vec<_>>(),
         })
     });
-    let columns = output::columns(work);
-    let poses = (0..proposal.poses.rows()).map(|row| {
-        let cells = columns.iter().map(|column| (column.name.clone(), json!(column.values[row])));
-        serde_json::Value::Object(cells.collect())
-    });
     json!({
         "robot": work.robot.name,
         "seed": work.arguments.seed,
         "effects": work.effects,
         "left_out": work.left_out.iter().map(|(effect, reason)| json!({"effect": effect, "reason": reason})).collect::<Vec<_>>(),
-        "sigma_mm": work.arguments.sigma,
+        "sigma_mm": work.sigma,
         "sets": sets.iter().map(set).collect::<Vec<_>>(),
         "parameters": parameters.collect::<Vec<_>>(),
         "separation": separation.collect::<Vec<_>>(),
         "approach_visible_share": proposal.approach_seen,
         "self_collision_checked": false,
         "out": work.arguments.out,
-        "poses": poses.collect::<Vec<_>>(),
+        "poses": output::objects(&work.drive()),
     })
 }

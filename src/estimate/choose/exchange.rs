@@ -4,6 +4,7 @@
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
 use super::sight::{Sight, factor, product};
+use crate::estimate::factor::Factor;
 use crate::estimate::model::Model;
 use crate::estimate::triangle::axpy;
 use crate::robot::Measurements;
@@ -22,8 +23,10 @@ const WORTH: f64 = 1e-6;
 pub(super) struct Term {
     weight: f64,
     sight: Sight,
-    /// Upper triangular: makes the random candidates round.
+    /// Upper triangular: makes the random candidates round, or what is known before.
     round: Mat<f64>,
+    /// Information in every direction before the first pose, in these coordinates.
+    ridge: f64,
 }
 
 /// What chosen poses make as large as possible.
@@ -37,12 +40,20 @@ impl Term {
         let scale = (drawn.rows() as f64).sqrt();
         let inverse = factor(&sight.rows(model, drawn)).inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j) * scale);
-        Some(Self { weight, sight, round })
+        Some(Self { weight, sight, round, ridge: RIDGE })
+    }
+
+    /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
+    pub fn beside(weight: f64, sight: Sight, known: &Factor) -> Option<Self> {
+        let inverse = known.inverse()?;
+        let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
+        Some(Self { weight, sight, round, ridge: 1.0 })
     }
 
     fn state(&self, model: &Model, pool: &Measurements) -> State {
         let rows = product(self.sight.rows(model, pool).as_ref(), self.round.as_ref());
-        State { weight: self.weight, p: self.round.ncols(), rows, cover: Mat::zeros(0, 0), spread: vec![[0.0; 6]; pool.rows()] }
+        let (p, spread) = (self.round.ncols(), vec![[0.0; 6]; pool.rows()]);
+        State { weight: self.weight, p, ridge: self.ridge, rows, cover: Mat::zeros(0, 0), spread }
     }
 }
 
@@ -50,6 +61,7 @@ impl Term {
 struct State {
     weight: f64,
     p: usize,
+    ridge: f64,
     /// A of all candidates, three rows each.
     rows: Mat<f64>,
     /// V, p x p.
@@ -73,7 +85,7 @@ impl State {
         for (i, candidate) in chosen.iter().enumerate() {
             seen.as_mut().subrows_mut(3 * i, 3).copy_from(self.block(*candidate));
         }
-        let mut information = DMatrix::<f64>::identity(p, p) * RIDGE;
+        let mut information = DMatrix::<f64>::identity(p, p) * self.ridge;
         let squares = product(seen.transpose(), seen.as_ref());
         for j in 0..p {
             axpy(1.0, squares.col_as_slice(j), information.column_mut(j).as_mut_slice());

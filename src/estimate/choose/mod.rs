@@ -8,12 +8,14 @@ mod drive;
 mod exchange;
 mod sight;
 mod site;
+mod tell;
 
 pub use sight::{Score, Sight};
-pub use site::Site;
+pub use site::{Circumstances, Site};
+pub use tell::{Contest, Proposed, Side, Told, tell};
 
 use super::model::Model;
-use crate::robot::Measurements;
+use crate::robot::{Measurements, Named};
 use exchange::{Criterion, Term};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -198,6 +200,13 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
         position: rows.iter().map(|row| data.position[*row]).collect(),
         sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
         payload: rows.iter().map(|row| data.payload[*row]).collect(),
+        time: data.time.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
+        temperature: data.temperature.as_ref().map(|all| rows.iter().map(|row| all[*row]).collect()),
+        direction: data.direction.as_ref().map(|all| {
+            let of = |row: &usize| all[row * data.joints..(row + 1) * data.joints].iter().copied();
+            rows.iter().flat_map(of).collect()
+        }),
+        target: data.target.as_ref().map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
         ..Measurements::default()
     }
 }

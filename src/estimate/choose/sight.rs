@@ -21,6 +21,8 @@ pub struct Sight {
     free: Vec<usize>,
     /// The parameters of `free` are in units of these, SI.
     prior: Vec<f64>,
+    /// Parameters that are a last column together, each at its size, SI; empty for none.
+    sized: Vec<(usize, f64)>,
 }
 
 /// What a set of poses promises, before any measurement.
@@ -45,7 +47,12 @@ impl Sight {
         let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();
-        Self { prior: free.iter().map(prior).collect(), free }
+        Self { prior: free.iter().map(prior).collect(), free, sized: Vec::new() }
+    }
+
+    /// All parameters in `free`, seen or not; last, as one, what those in `sized` do at these sizes (SI).
+    pub(super) fn given(model: &Model, free: Vec<usize>, sized: Vec<(usize, f64)>) -> Self {
+        Self { prior: free.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect(), free, sized }
     }
 
     /// Positions in the stack.
@@ -55,11 +62,15 @@ impl Sight {
 
     /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma.
     pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Mat<f64> {
-        let p = self.free.len();
-        let mut column = vec![usize::MAX; model.stack.specs().len()];
+        let count = model.stack.specs().len();
+        let (mut column, mut size) = (vec![usize::MAX; count], vec![0.0; count]);
         for (j, parameter) in self.free.iter().enumerate() {
             column[*parameter] = j;
         }
+        self.sized.iter().for_each(|(parameter, of)| size[*parameter] += of);
+        let mut scale = self.prior.clone();
+        scale.extend((!self.sized.is_empty()).then_some(1.0));
+        let p = scale.len();
         let poses: Vec<Vec<Vector3<f64>>> = (0..data.rows())
             .into_par_iter()
             .with_min_len(32)
@@ -71,16 +82,21 @@ impl Sight {
                         if let Some(sum) = line.get_mut(column[parameter]) {
                             *sum += derivative;
                         }
+                        if size[parameter] != 0.0
+                            && let Some(sum) = line.last_mut()
+                        {
+                            *sum += derivative * size[parameter];
+                        }
                     });
                     line
                 },
             )
             .collect();
         let mut out = Mat::zeros(3 * data.rows(), p);
-        for (j, prior) in self.prior.iter().enumerate() {
+        for (j, scale) in scale.iter().enumerate() {
             let column = out.col_as_slice_mut(j);
             for (row, (line, sigma)) in poses.iter().zip(&data.sigma).enumerate() {
-                let derivative = line[j] * *prior;
+                let derivative = line[j] * *scale;
                 column[3 * row] = derivative.x / sigma.x;
                 column[3 * row + 1] = derivative.y / sigma.y;
                 column[3 * row + 2] = derivative.z / sigma.z;

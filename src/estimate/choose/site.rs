@@ -1,6 +1,6 @@
 //! Where the arm may go: joint ranges, a box and a floor for what is known of the arm, and the payloads at hand.
 
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, Named, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 use rand::rngs::ChaCha8Rng;
@@ -18,6 +18,28 @@ pub struct Site {
     pub floor: f64,
     /// kg, at least one.
     pub payloads: Vec<f64>,
+}
+
+/// What stands beside joints and payload in rows that are yet to be measured; none where the recording has no such column.
+#[derive(Debug, Clone, Default)]
+pub struct Circumstances {
+    /// s on the recording's clock.
+    pub time: Option<f64>,
+    /// Of the arm, C.
+    pub temperature: Option<f64>,
+    pub target: Option<String>,
+}
+
+impl Circumstances {
+    /// Fills them in, with either side of approach of every joint by chance where rows have none.
+    pub(super) fn complete(&self, data: &mut Measurements, draw: &mut ChaCha8Rng) {
+        let rows = data.rows();
+        data.time = self.time.map(|time| vec![time; rows]);
+        data.temperature = self.temperature.map(|temperature| vec![temperature; rows]);
+        data.target = self.target.as_deref().map(|name| Named::of((0..rows).map(|_| name)));
+        let sides = data.direction.get_or_insert_default();
+        sides.extend((sides.len()..rows * data.joints).map(|_| if draw.random::<bool>() { 1.0 } else { -1.0 }));
+    }
 }
 
 /// Random poses in a row that may be refused before one gives up.

@@ -1,0 +1,121 @@
+//! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should tell apart.
+
+use super::lens::Lens;
+use super::pool::Pool;
+use super::state::solve;
+use super::{statement, yielding};
+use crate::effect::{CAUSES, Effect, EffectStack, Form, Hypothesis, Load, Placed, Setting, Survey, entry};
+use crate::estimate::Model;
+use crate::estimate::choose::{Contest, Side};
+use crate::robot::Measurements;
+use std::collections::BTreeSet;
+
+/// Levels of refinement of a rival's shape.
+const LEVELS: i32 = 8;
+
+/// A diagnosed model where it stands.
+pub struct Standing<'a> {
+    pub model: &'a Model,
+    pub data: &'a Measurements,
+    /// Fitted rows, ascending.
+    pub rows: &'a [usize],
+    /// Positions in the stack of what was estimated.
+    pub free: &'a [usize],
+}
+
+/// The finding of these forms beside the rival `effect` at `place` (`joint 2` or `j2`): of its forms the one that fits
+/// best in its place, and as it fits there. Fails with a sentence where the recording knows no such rival.
+pub fn contest(standing: &Standing, finding: &[Form], (effect, place): (&str, &str)) -> Result<(Contest, Form), String> {
+    let Standing { model, data, rows, free } = *standing;
+    let lens = Lens::new(model, data, rows, false);
+    let (torque, yielding) = (lens.torques(), yielding(model));
+    let survey = Survey::new(&model.robot, data, rows, &torque, &yielding);
+    let is = |form: &&Form| finding.contains(*form);
+    let of = |(other, range): (&dyn Effect, std::ops::Range<usize>)| other.form().filter(is).map(|_| range);
+    let own: Vec<usize> = model.stack.effects().filter_map(of).flatten().collect();
+    let mut caused = vec![0.0; lens.lines()];
+    for (form, range) in model.stack.effects().filter_map(|(other, range)| Some((other.form().filter(is)?, range))) {
+        for (column, size) in lens.columns(form).chunks(lens.lines()).zip(&model.x[range]) {
+            caused.iter_mut().zip(column).for_each(|(sum, value)| *sum += value * size);
+        }
+    }
+    let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
+    let jacobian = lens.jacobian(model, &nuisances);
+    let rivals = rivals(&survey, effect, place, finding)?;
+    let open: Vec<f64> = lens.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
+    // As diagnosis names rivals: by what fits in place of the finding.
+    let mut pool = Pool::new(&lens, &jacobian, &open, rivals);
+    let Some((_, mut best)) = best(&pool, 0) else { return Err(format!("no form of {effect} at {place} can be tried")) };
+    for level in 0..LEVELS {
+        let own = pool.hypotheses[best].clone();
+        let near = own.form.near(&survey, level).into_iter().map(|form| Hypothesis { form, ..own.clone() });
+        let first = pool.add(near.collect());
+        match self::best(&pool, first) {
+            Some((score, k)) if score < self::score(&pool, best) => best = k,
+            _ => (),
+        }
+    }
+    let fitted = solve(&pool, &[best]).coefficients;
+    let rival = &pool.hypotheses[best];
+    let both = with(model, &rival.form);
+    let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
+    let theirs: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
+    let sizes = own.iter().map(|k| model.x[*k]).collect();
+    let sides = [Side { parameters: own, sizes }, Side { parameters: theirs, sizes: fitted }];
+    Ok((Contest { model: both, nuisances, sides }, rival.form.clone()))
+}
+
+/// How well one form fits, with a charge for every number.
+fn score(pool: &Pool, k: usize) -> f64 {
+    let (solution, lines) = (solve(pool, &[k]), pool.lines as f64);
+    lines * ((pool.square - solution.gain).max(f64::MIN_POSITIVE) / lines).ln() + lines.ln() * solution.rank as f64
+}
+
+/// The best of the forms from `first` on, with its score.
+fn best(pool: &Pool, first: usize) -> Option<(f64, usize)> {
+    (first..pool.hypotheses.len()).map(|k| (score(pool, k), k)).min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// What is not a pose and may tell the two apart, where there is such a thing.
+pub fn other_means(effect: &str, rival: &str) -> Option<&'static str> {
+    statement::other_means(effect, rival)
+}
+
+/// All that diagnosis would try under this name at this place.
+fn rivals(survey: &Survey, effect: &str, place: &str, finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
+    let named = |form: &Form| match form {
+        Form::Unknown(unknown) if unknown.is_hose() => matches!(effect, "cable_drag" | "unknown"),
+        _ => form.name() == effect,
+    };
+    let all = CAUSES.iter().flat_map(|cause| (cause.propose)(survey)).filter(|hypothesis| named(&hypothesis.form));
+    let all: Vec<Hypothesis> = all.filter(|hypothesis| finding != std::slice::from_ref(&hypothesis.form)).collect();
+    let here = |form: &Form| form.place().to_string() == place || form.place().tag() == place;
+    let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| here(&hypothesis.form)).cloned().collect();
+    if !own.is_empty() {
+        return Ok(own);
+    }
+    let places: BTreeSet<String> = all.iter().map(|hypothesis| hypothesis.form.place().to_string()).collect();
+    if places.is_empty() {
+        return Err(format!("{effect} cannot be tried on this robot and recording"));
+    }
+    Err(format!("{effect} has no place `{place}` here; allowed: {}", places.into_iter().collect::<Vec<_>>().join(", ")))
+}
+
+/// The model with one form more, at zero, where it has it not.
+fn with(model: &Model, form: &Form) -> Model {
+    if model.stack.effects().any(|(other, _)| other.form() == Some(form)) {
+        return model.clone();
+    }
+    let setting = Setting { base: *model.stack.base(), load: Load::GravityTorque };
+    let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
+        match effect.form() {
+            Some(form) => Some(Box::new(form.clone())),
+            None => entry(effect.name()).map(|entry| (entry.make)(&setting)),
+        }
+    };
+    let mut effects: Vec<Box<dyn Effect>> = model.stack.effects().filter_map(|(effect, _)| again(effect)).collect();
+    effects.push(Box::new(form.clone()));
+    let mut both = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
+    both.x[..model.x.len()].copy_from_slice(&model.x);
+    both
+}
