@@ -1,4 +1,6 @@
 //! The library in words: what each effect is, how large it usually is, what it is easily taken for, and what shows it.
+//!
+//! [`EFFECTS`](super::EFFECTS) and [`CAUSES`](super::CAUSES) hold what is computed and no words; some names have no computation of their own.
 
 /// An entry of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

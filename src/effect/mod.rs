@@ -190,7 +190,6 @@ pub struct Setting {
 /// A line of the registry.
 pub struct EffectEntry {
     pub name: &'static str,
-    pub summary: &'static str,
     /// Where two parameters do the same, the one whose effect has the lower precedence number is kept.
     pub precedence: u8,
     pub make: fn(&Setting) -> Box<dyn Effect>,
@@ -198,54 +197,14 @@ pub struct EffectEntry {
 
 /// Every effect that can be identified, predicted and compensated.
 pub const EFFECTS: &[EffectEntry] = &[
-    EffectEntry {
-        name: "anchor",
-        summary: "where the far end of a draw-wire or ballbar is",
-        precedence: 0,
-        make: |_| Box::new(Anchor),
-    },
-    EffectEntry {
-        name: "base_frame",
-        summary: "where the robot stands in the tracker's frame",
-        precedence: 1,
-        make: |s| Box::new(BaseFrame::new(s.base)),
-    },
-    EffectEntry {
-        name: "tool_offset",
-        summary: "where the measured point sits on the tool",
-        precedence: 2,
-        make: |_| Box::new(ToolOffset),
-    },
-    EffectEntry {
-        name: "joint_offset",
-        summary: "zero error of a joint",
-        precedence: 3,
-        make: |_| Box::new(joint_offset::JointOffset),
-    },
-    EffectEntry {
-        name: "link_geometry",
-        summary: "length and twist errors of a link",
-        precedence: 4,
-        make: |_| Box::new(link_geometry::LinkGeometry),
-    },
-    EffectEntry {
-        name: "reduction_ratio",
-        summary: "output angle scaled by k",
-        precedence: 5,
-        make: |_| Box::new(reduction_ratio::ReductionRatio),
-    },
-    EffectEntry {
-        name: "coupling_ratio",
-        summary: "a joint moves with another joint",
-        precedence: 6,
-        make: |_| Box::new(coupling_ratio::CouplingRatio),
-    },
-    EffectEntry {
-        name: "joint_compliance",
-        summary: "wind-up of a joint proportional to its load",
-        precedence: 7,
-        make: |s| Box::new(joint_compliance::JointCompliance::new(s.load)),
-    },
+    EffectEntry { name: "anchor", precedence: 0, make: |_| Box::new(Anchor) },
+    EffectEntry { name: "base_frame", precedence: 1, make: |s| Box::new(BaseFrame::new(s.base)) },
+    EffectEntry { name: "tool_offset", precedence: 2, make: |_| Box::new(ToolOffset) },
+    EffectEntry { name: "joint_offset", precedence: 3, make: |_| Box::new(joint_offset::JointOffset) },
+    EffectEntry { name: "link_geometry", precedence: 4, make: |_| Box::new(link_geometry::LinkGeometry) },
+    EffectEntry { name: "reduction_ratio", precedence: 5, make: |_| Box::new(reduction_ratio::ReductionRatio) },
+    EffectEntry { name: "coupling_ratio", precedence: 6, make: |_| Box::new(coupling_ratio::CouplingRatio) },
+    EffectEntry { name: "joint_compliance", precedence: 7, make: |s| Box::new(joint_compliance::JointCompliance::new(s.load)) },
 ];
 
 /// The registry entry of a canonical name.
@@ -256,38 +215,29 @@ pub fn entry(name: &str) -> Option<&'static EffectEntry> {
 /// What may be left out of a model: causes that diagnosis tries, each at all its places and in all its forms.
 pub struct Cause {
     pub name: &'static str,
-    pub summary: &'static str,
     /// Every hypothesis that the recording can speak of.
     pub propose: fn(&Survey) -> Vec<Hypothesis>,
 }
 
 /// Every cause that diagnosis tries, one line each.
 pub const CAUSES: &[Cause] = &[
-    Cause { name: "joint_compliance", summary: "wind-up proportional to load", propose: JointCompliance::propose },
-    Cause { name: "joint_hardening", summary: "wind-up not proportional to load", propose: JointHardening::propose },
-    Cause { name: "link_compliance", summary: "bending of a link", propose: link_compliance::LinkCompliance::propose },
-    Cause { name: "base_compliance", summary: "the foundation tilts", propose: base_compliance::BaseCompliance::propose },
-    Cause { name: "gear_cyclic", summary: "error periodic in the joint angle", propose: GearCyclic::propose },
-    Cause {
-        name: "gear_motor_cyclic",
-        summary: "error periodic in the motor angle",
-        propose: gear_motor_cyclic::GearMotorCyclic::propose,
-    },
-    Cause { name: "joint_table", summary: "repeatable joint error of no simple form", propose: JointTable::propose },
-    Cause { name: "backlash", summary: "lost motion", propose: Backlash::propose },
-    Cause { name: "thermal_growth", summary: "links grow with temperature", propose: ThermalGrowth::propose },
-    Cause { name: "counterbalance", summary: "balancer missing from the torque model", propose: Counterbalance::propose },
-    Cause { name: "link_mass", summary: "mass or centre of a link is wrong", propose: LinkMass::propose },
-    Cause { name: "payload_error", summary: "payload differs from the declared", propose: PayloadError::propose },
-    Cause { name: "axis_wobble", summary: "an axis moves as its joint turns", propose: axis_wobble::AxisWobble::propose },
-    Cause { name: "zero_shift", summary: "a joint's zero steps", propose: zero_shift::ZeroShift::propose },
-    Cause { name: "base_shift", summary: "base or tool mounting steps", propose: frame_shift::FrameShift::propose },
-    Cause { name: "tracker_drift", summary: "the tracker's frame creeps", propose: TrackerDrift::propose },
-    Cause { name: "coupling_ratio", summary: "a joint moves with another", propose: coupling_ratio::PairRatio::propose },
-    Cause {
-        name: "joint_log_lag",
-        summary: "joints logged before the arm settled",
-        propose: joint_log_lag::JointLogLag::propose,
-    },
-    Cause { name: "unknown", summary: "something that no entry explains", propose: Unknown::propose },
+    Cause { name: "joint_compliance", propose: JointCompliance::propose },
+    Cause { name: "joint_hardening", propose: JointHardening::propose },
+    Cause { name: "link_compliance", propose: link_compliance::LinkCompliance::propose },
+    Cause { name: "base_compliance", propose: base_compliance::BaseCompliance::propose },
+    Cause { name: "gear_cyclic", propose: GearCyclic::propose },
+    Cause { name: "gear_motor_cyclic", propose: gear_motor_cyclic::GearMotorCyclic::propose },
+    Cause { name: "joint_table", propose: JointTable::propose },
+    Cause { name: "backlash", propose: Backlash::propose },
+    Cause { name: "thermal_growth", propose: ThermalGrowth::propose },
+    Cause { name: "counterbalance", propose: Counterbalance::propose },
+    Cause { name: "link_mass", propose: LinkMass::propose },
+    Cause { name: "payload_error", propose: PayloadError::propose },
+    Cause { name: "axis_wobble", propose: axis_wobble::AxisWobble::propose },
+    Cause { name: "zero_shift", propose: zero_shift::ZeroShift::propose },
+    Cause { name: "base_shift", propose: frame_shift::FrameShift::propose },
+    Cause { name: "tracker_drift", propose: TrackerDrift::propose },
+    Cause { name: "coupling_ratio", propose: coupling_ratio::PairRatio::propose },
+    Cause { name: "joint_log_lag", propose: joint_log_lag::JointLogLag::propose },
+    Cause { name: "unknown", propose: Unknown::propose },
 ];

@@ -3,7 +3,7 @@
 use calib::estimate::network::descent::{Descent, descend};
 use calib::estimate::network::loss::{Batch, Loss, Scratch};
 use calib::estimate::network::{Activation, OUTPUTS, Shape};
-use calib::estimate::swarm::{Algorithm, Bounds, Budget, Objective, Outcome};
+use calib::estimate::swarm::{Algorithm, Bounds, Budget, Outcome};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -13,18 +13,6 @@ const RUNS: usize = 7;
 const TRAININGS: usize = 20;
 /// Most iterations to get to another program's loss.
 const ITERATIONS: usize = 2000;
-
-struct Fitness<'a>(Loss<'a>);
-
-impl Objective for Fitness<'_> {
-    type Scratch = Scratch;
-    fn scratch(&self) -> Scratch {
-        Scratch::new(self.0.shape)
-    }
-    fn value(&self, x: &[f64], scratch: &mut Scratch) -> f64 {
-        self.0.value(x, scratch)
-    }
-}
 
 /// Searches with a beetle swarm, and trains by gradient from each of the file's starts until its loss is reached.
 pub fn train(file: &str) {
@@ -39,7 +27,7 @@ pub fn train(file: &str) {
     let search = |seed: u64| -> Outcome {
         let budget = Budget { generations: count("generations"), evaluations: None, target: None, seed, jobs: 1 };
         let bounds = Bounds::cube(shape.parameters(), -1.0, 1.0);
-        Algorithm::Bso.minimise(count("beetles"), &Fitness(loss), &bounds, &budget, |_, _| {})
+        Algorithm::Bso.minimise(count("beetles"), &loss, &bounds, &budget, |_, _| {})
     };
     let swarm = least(RUNS, || drop(search(1)));
     let found: Vec<f64> = (1..=count("seeds") as u64).map(|seed| search(seed).value).collect();

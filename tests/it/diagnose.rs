@@ -2,10 +2,12 @@
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
-use calib::effect::Load;
-use calib::robot::RobotModel;
+use calib::effect::{Effect, Form, Load};
+use calib::estimate::choose::{Site, median};
+use calib::estimate::{FitOptions, Model, fit};
+use calib::robot::{Instrument, Measurements, RobotModel};
 use calib::stage::{Diagnose, DiagnoseReads};
-use calib::table::{Findings, Parameters, Prediction, Verdict};
+use calib::table::{Findings, ParameterRow, Parameters, Prediction, Recording, Robot, Verdict};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -267,6 +269,114 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     }
     calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
     calib(&["export", "HEAD", "--step", "geometry", "--format", "json", "--quiet"], here);
+}
+
+/// A table that a run of the pipeline of cases wrote.
+fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
+    let path = folder.join(".calib/tables/case").join(name);
+    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table")
+}
+
+/// What is left, squared and over the noise, of points that `truth` makes where `other` is fitted to them in all that is `free`.
+fn left(truth: &Model, other: &Model, free: &[usize], data: &Measurements) -> f64 {
+    let mut data = data.clone();
+    data.position = truth.predict(&data);
+    let mut fitted = other.clone();
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
+    let off = fitted.predict(&data).into_iter().zip(&data.position).zip(&data.sigma);
+    off.map(|((model, point), sigma)| (model - point).component_div(sigma).norm_squared()).sum()
+}
+
+/// Rows of a recording followed by some more.
+fn joined(data: &Measurements, rows: &[usize], more: &Measurements, sigma: f64) -> Measurements {
+    let q = rows.iter().flat_map(|row| data.q(*row)).chain(&more.q).copied().collect();
+    let payload: Vec<f64> = rows.iter().map(|row| data.payload[*row]).chain(more.payload.iter().copied()).collect();
+    let count = payload.len();
+    let position = vec![Vector3::zeros(); count];
+    Measurements {
+        joints: data.joints,
+        q,
+        payload,
+        position,
+        sigma: vec![Vector3::repeat(sigma); count],
+        ..Measurements::default()
+    }
+}
+
+#[test]
+fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_ones() {
+    const COUNT: usize = 50;
+    let folder = concealed("base_compliance", "6", "60");
+    let here = folder.path();
+    case_with(here, &[]);
+    let said = calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    // The command is printed as it is to be typed.
+    let command = said.lines().find_map(|line| line.split_once(": calib ")).expect("a command").1;
+    assert!(command.ends_with("--separate 1 'link_compliance@link 1'"), "{said}");
+    let words: Vec<&str> = command.trim_end_matches(" 'link_compliance@link 1'").split(' ').collect();
+    let more = ["link_compliance@link 1", "--count", "50", "--json"];
+    let told: Value = serde_json::from_str(&calib(&[&words[..], &more].concat(), here)).expect("JSON");
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let sides = told["separation"].as_array().expect("both");
+    assert_eq!(sides[0]["if"], "base_compliance at base");
+    for side in sides {
+        assert!(number(&side["recorded"]) < 25.0 && number(&side["proposed"]) > 25.0, "{told:#}");
+    }
+    // Measured: recordings without noise, made by the diagnosed model at these poses, and the rival fitted to them with all else.
+    let robot = table_of::<Robot>(here, "robot.robot.parquet").to_description().expect("a robot");
+    let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
+    let truth = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model");
+    let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements(&Instrument::default());
+    let prediction: Prediction = table_of(here, "diagnose.prediction.parquet");
+    let rows: Vec<usize> = (0..data.rows()).filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect).collect();
+    let form = told["rival"]["form"].to_string();
+    let parsed: Form = serde_json::from_str(&form).expect("a form");
+    let mut table = parameters.clone();
+    let own = table.0.iter().position(|row| row.effect == "base_compliance").expect("the finding");
+    let row = table.0.remove(own);
+    table.0.retain(|row| row.effect != "base_compliance");
+    for spec in parsed.parameters(&RobotModel::new(robot.clone())) {
+        let more = ParameterRow { name: spec.name, form: Some(form.clone()), value: 0.0, ..row.clone() };
+        table.0.push(ParameterRow { effect: "link_compliance".into(), unit: spec.unit.symbol().into(), ..more });
+    }
+    let other = table.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model");
+    let estimated = |name: &String| table.0.iter().any(|row| row.name == *name && row.status == "free");
+    let free: Vec<usize> = (0..other.x.len()).filter(|k| estimated(&other.stack.specs()[*k].name)).collect();
+    let sigma = number(&told["sigma_mm"]) * 1e-3;
+    let measured = |more: &Measurements| left(&truth, &other, &free, &joined(&data, &rows, more, sigma));
+    let mut proposed = Measurements { joints: 6, ..Measurements::default() };
+    for pose in told["poses"].as_array().expect("poses") {
+        proposed.q.extend((1..=6).map(|joint| number(&pose[format!("q{joint}_deg")]).to_radians()));
+        proposed.payload.push(number(&pose["payload_kg"]));
+    }
+    assert_eq!(proposed.payload.len(), COUNT);
+    // The robot file says no limits: joints keep to where they were.
+    let ranges = (0..6).map(|joint| {
+        let all = rows.iter().map(|row| data.q(*row)[joint]);
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+    });
+    let mut payloads: Vec<f64> = proposed.payload.clone();
+    payloads.sort_by(f64::total_cmp);
+    payloads.dedup();
+    let bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 3];
+    let site = Site { ranges: ranges.collect(), bounds, floor: f64::NEG_INFINITY, payloads };
+    let random = (0..9).map(|seed| {
+        let mut drawn = site.draw(&truth.robot, COUNT, sigma, 70 + seed).expect("poses");
+        // One payload a pose.
+        let count = site.payloads.len();
+        let kept: Vec<usize> = (0..COUNT).map(|k| k * count + k % count).collect();
+        drawn = Measurements {
+            q: kept.iter().flat_map(|row| drawn.q(*row)).copied().collect(),
+            payload: kept.iter().map(|row| drawn.payload[*row]).collect(),
+            ..Measurements { joints: 6, ..Measurements::default() }
+        };
+        measured(&drawn)
+    });
+    let (ours, theirs) = (measured(&proposed), median(random.collect()));
+    println!("L with {COUNT} proposed poses {ours:.1}, with random ones {theirs:.1}; predicted {}", sides[0]["proposed"]);
+    assert!(ours >= 3.0 * theirs, "{ours:.1}, with random poses {theirs:.1}");
+    assert!((ours / number(&sides[0]["proposed"]) - 1.0).abs() < 0.2, "{ours:.1}: {told:#}");
 }
 
 #[test]

@@ -29,6 +29,8 @@ struct Apart<'a> {
     run: String,
     finding: FindingRow,
     rival: Name,
+    /// None where the two are one by an identity.
+    form: Option<Form>,
     robot: RobotDescription,
     ranges: Vec<[f64; 2]>,
     rows: usize,
@@ -70,6 +72,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
     let sigma = arguments.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && (&row.effect, &row.place) == (&rival.0, &rival.1));
+    let mut tried = None;
     let told = match contest(&standing, &forms, (&rival.0, &rival.1)) {
         Ok((contest, form)) => {
             rival = (form.name().to_string(), form.place().to_string());
@@ -77,6 +80,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
             if forms.iter().chain([&form]).any(|form| matches!(form, Form::JointTable(_) | Form::Unknown(_))) {
                 within(&mut site, &recorded);
             }
+            tried = Some(form);
             let wish = wish(arguments, Aim::Information, sigma);
             tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
         }
@@ -89,6 +93,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
         run: manifest.run_id,
         finding,
         rival,
+        form: tried,
         robot,
         ranges: site.ranges,
         rows: rows.len(),

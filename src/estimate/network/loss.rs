@@ -7,6 +7,7 @@
 use super::activation::FARTHEST;
 use super::lanes::{BLOCK, Column, LANES, Product, dot, sum};
 use super::perceptron::{OUTPUTS, Shape};
+use crate::estimate::swarm::Objective;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Scaled training rows in blocks.
@@ -109,6 +110,17 @@ pub struct Loss<'a> {
     pub batch: &'a Batch,
     /// Weight of half the summed squared weights beside half the summed squared errors.
     pub decay: f64,
+}
+
+/// As the swarm sees it.
+impl Objective for Loss<'_> {
+    type Scratch = Scratch;
+    fn scratch(&self) -> Scratch {
+        Scratch::new(self.shape)
+    }
+    fn value(&self, x: &[f64], scratch: &mut Scratch) -> f64 {
+        Loss::value(self, x, scratch)
+    }
 }
 
 /// What is asked of a loss, as a piece of work: unlike a closure it is sure to be compiled for the instructions it is dispatched to.

@@ -9,7 +9,7 @@ use super::descent::{Iteration, descend};
 use super::loss::{Batch, Loss, Scratch};
 use super::perceptron::{OUTPUTS, Shape};
 use super::region::Region;
-use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation, Objective};
+use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation};
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -208,7 +208,7 @@ impl<'a> Prepared<'a> {
                 seed: rng.random(),
                 jobs: self.recipe.jobs,
             };
-            let outcome = algorithm.minimise(self.recipe.beetles, &Fitness(loss), bounds, &budget, |generation, best| {
+            let outcome = algorithm.minimise(self.recipe.beetles, &loss, bounds, &budget, |generation, best| {
                 if search > 0 {
                     return;
                 }
@@ -287,19 +287,6 @@ impl<'a> Prepared<'a> {
     /// Root of the mean squared length, m, from mean squares of the scaled outputs.
     fn rms(&self, squares: [f64; OUTPUTS]) -> f64 {
         squares.iter().zip(&self.dress.outputs).map(|(s, o)| s * o.scale * o.scale).sum::<f64>().sqrt()
-    }
-}
-
-/// The loss as the swarm sees it.
-struct Fitness<'a>(Loss<'a>);
-
-impl Objective for Fitness<'_> {
-    type Scratch = Scratch;
-    fn scratch(&self) -> Scratch {
-        Scratch::new(self.0.shape)
-    }
-    fn value(&self, x: &[f64], scratch: &mut Scratch) -> f64 {
-        self.0.value(x, scratch)
     }
 }
 

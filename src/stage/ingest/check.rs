@@ -218,23 +218,26 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
         }
         return;
     }
-    let [first, second] = files.as_slice() else {
-        faults.push(Fault::new("join", format!("joins two files, not {}", files.len())));
+    if files.len() < 2 {
+        faults.push(Fault::new("join", format!("joins two files or more, not {}", files.len())));
         return;
-    };
+    }
     complete(files, &needed, "files", faults);
     let key = match join {
         Join::Id {} => Some("point_id"),
         Join::Time { .. } => Some("time"),
         _ => None,
     };
-    for name in second.columns.names() {
-        if first.columns.names().contains(&name) && Some(name) != key {
-            faults.push(Fault::new(format!("files[1].columns.{name}"), "mapped in both files; map it in one"));
+    for (index, file) in files.iter().enumerate().skip(1) {
+        for name in file.columns.names() {
+            if files[..index].iter().any(|other| other.columns.names().contains(&name)) && Some(name) != key {
+                faults.push(Fault::new(format!("files[{index}].columns.{name}"), "mapped in two files; map it in one"));
+            }
         }
-    }
-    if second.columns.sequence.is_some() {
-        faults.push(Fault::new("files[1].columns.sequence", "rows keep the order of the first file; map it there"));
+        if file.columns.sequence.is_some() {
+            let message = "rows keep the order of the first file; map it there";
+            faults.push(Fault::new(format!("files[{index}].columns.sequence"), message));
+        }
     }
     for (index, file) in files.iter().enumerate() {
         let Some(key) = key else { continue };

@@ -237,7 +237,8 @@ impl Axis {
     }
 }
 
-/// How two files become one recording. Rows keep the order of the first file.
+/// How several files become one recording: every other one is joined to the first, whose order the rows keep. A row without its partner
+/// in any of them is rejected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Join {
@@ -247,11 +248,11 @@ pub enum Join {
     Time {
         /// Largest difference, s.
         tolerance_s: f64,
-        /// Clock of the second file minus clock of the first, s.
+        /// Clock of the second file minus clock of the first, s; further files, e.g. a simulation's, have the clock of the first.
         #[serde(default)]
         offset_s: f64,
     },
-    /// The n-th data row of one file belongs to the n-th of the other.
+    /// The n-th data row of one file belongs to the n-th of the others.
     Order {},
     /// No join: one file continues the other, each with all quantities. Any number of files.
     Append {},

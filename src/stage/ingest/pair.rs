@@ -1,4 +1,4 @@
-//! Duplicates within a file, and partners across two.
+//! Duplicates within a file, and partners across several: every other file is joined to the first.
 
 use super::layout::{Duplicates, Join};
 use super::scan::{Key, Scan};
@@ -20,8 +20,17 @@ pub(super) struct Twin {
 pub(super) struct Fate {
     /// Rows given up as duplicates, by data row.
     pub twins: BTreeMap<u32, Twin>,
-    /// For a join, the data row of the other file for each data row of this one, from 1; [`NONE`] where there is none.
-    pub partner: Option<Vec<u32>>,
+    /// For a join, the data row of each other file for each data row of the first, from 1; [`NONE`] where there is none. For the
+    /// others that of the first alone, [`NONE`] also where that lacks another partner. Empty without a join.
+    pub partners: Vec<Vec<u32>>,
+}
+
+impl Fate {
+    /// Whether a data row, from 1, has all its partners.
+    pub fn is_whole(&self, number: usize) -> bool {
+        let row = number.wrapping_sub(1);
+        self.partners.iter().all(|partner| partner.get(row).is_some_and(|partner| *partner != NONE))
+    }
 }
 
 /// Decides for all files. Files that continue each other share their ids.
@@ -42,7 +51,8 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
     for scan in scans.iter_mut() {
         single(&mut scan.keys, duplicates, &mut fates);
     }
-    if let ([first, second], [one, other]) = (scans, fates.as_mut_slice()) {
+    let ([first, others @ ..], [one, fates_of_others @ ..]) = (scans, fates.as_mut_slice()) else { return fates };
+    for (index, (second, other)) in others.iter().zip(fates_of_others.iter()).enumerate() {
         let pairs = match join {
             Some(Join::Id {}) => by_id(&first.keys, &second.keys),
             Some(Join::Time { tolerance_s, offset_s }) => {
@@ -50,7 +60,9 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
                     let rows = scan.times.iter().filter(|(_, number)| !fate.twins.contains_key(number));
                     rows.map(|(time, number)| (time - offset, *number)).collect()
                 };
-                by_time(times(first, one, 0.0), times(second, other, *offset_s), *tolerance_s)
+                // What comes third was made of the first, and has its clock.
+                let offset = if index == 0 { *offset_s } else { 0.0 };
+                by_time(times(first, one, 0.0), times(second, other, offset), *tolerance_s)
             }
             _ => {
                 let usable = |scan: &Scan, fate: &Fate, number: u32| {
@@ -61,13 +73,17 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
             }
         };
         let mut partner = vec![NONE; first.read as usize];
-        let mut back = vec![NONE; second.read as usize];
         for (a, b) in pairs {
             partner[a as usize - 1] = b;
-            back[b as usize - 1] = a;
         }
-        one.partner = Some(partner);
-        other.partner = Some(back);
+        one.partners.push(partner);
+    }
+    for (k, (second, other)) in others.iter().zip(fates_of_others).enumerate() {
+        let mut back = vec![NONE; second.read as usize];
+        for number in (1..=first.read as usize).filter(|number| one.is_whole(*number)) {
+            back[one.partners[k][number - 1] as usize - 1] = number as u32;
+        }
+        other.partners.push(back);
     }
     fates
 }

@@ -112,7 +112,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
     }
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
-    let packed = (joined && index == 1).then(|| Packed { slots: slots.clone(), ..Packed::default() });
+    let packed = (joined && index > 0).then(|| Packed { slots: slots.clone(), ..Packed::default() });
     let mut scan = Scan {
         label,
         lines: 0,

@@ -3,7 +3,7 @@
 use super::Ingest;
 use super::arm::Arm;
 use super::layout::{Columns, Limits};
-use super::pair::{Fate, NONE};
+use super::pair::Fate;
 use super::row::Reason;
 use super::scan::{Count, Scan};
 use crate::error::{Error, Fault, Result};
@@ -14,10 +14,10 @@ const SMALL_IN_DEGREES: f64 = 6.5;
 
 /// Rows of a file that become part of the recording.
 pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
-    match &fate.partner {
-        Some(partner) => partner.iter().filter(|partner| **partner != NONE).count() as u64,
-        None => scan.used() - fate.twins.len() as u64,
+    if fate.partners.is_empty() {
+        return scan.used() - fate.twins.len() as u64;
     }
+    (1..=scan.read as usize).filter(|number| fate.is_whole(*number)).count() as u64
 }
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
@@ -79,7 +79,7 @@ fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Faul
     let first_twin = fate.twins.values().map(|twin| u64::from(twin.line)).min().unwrap_or_default();
     for (reason, rows, first_line, detail) in [
         (Reason::DuplicateId, twins, first_twin, "point ids that occur more than once"),
-        (Reason::Unmatched, scan.used() - accepted - twins, 0, "no partner in the other file"),
+        (Reason::Unmatched, scan.used() - accepted - twins, 0, "no partner in another file"),
     ] {
         if rows > 0 {
             counts.insert(reason, Count { rows, first_line, first_detail: detail.into() });

@@ -28,7 +28,7 @@ pub(super) struct Decided<'a> {
 
 /// Writes the streamed tables.
 pub(super) fn write(decided: &Decided, context: &Context) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
-    let joined = decided.fates.iter().any(|fate| fate.partner.is_some());
+    let joined = decided.fates.iter().any(|fate| !fate.partners.is_empty());
     let leading = if joined { 1 } else { decided.scans.len() };
     let rows = decided.scans.iter().zip(decided.fates).take(leading).map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
     context.services.begin("writing the recording", Some(rows), "rows");
@@ -58,10 +58,10 @@ fn file(
     let mut accepted = 0;
     while let Some(judged) = reading.next()? {
         match judged.and_then(|()| decided.outcome(index, fate, &reading.row)) {
-            Ok(partner) => {
+            Ok(()) => {
                 accepted += 1;
                 if let Some(chunks) = &mut recording {
-                    chunks.push(&reading.row, partner, &scan.label, decided)?;
+                    chunks.push(&reading.row, fate, &scan.label, decided)?;
                     pace.row(chunks.written);
                 }
             }
@@ -85,25 +85,28 @@ fn file(
 }
 
 impl Decided<'_> {
-    /// The partner of a usable row in a join, or why it is not used after all.
-    fn outcome(&self, index: usize, fate: &Fate, row: &Row) -> Result<Option<usize>, Refusal> {
+    /// Why a usable row is not used after all, if so.
+    fn outcome(&self, index: usize, fate: &Fate, row: &Row) -> Result<(), Refusal> {
         if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
             let there =
                 if twin.file as usize == index { String::new() } else { format!(" of {}", self.name(twin.file as usize)) };
             let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
             return Err(Refusal { reason: Reason::DuplicateId, detail });
         }
-        let Some(partner) = &fate.partner else { return Ok(None) };
-        match partner.get((row.number - 1) as usize) {
-            Some(partner) if *partner != NONE => Ok(Some(*partner as usize)),
-            _ => Err(Refusal { reason: Reason::Unmatched, detail: self.lonely(index, row) }),
+        if fate.is_whole(row.number as usize) {
+            return Ok(());
         }
+        let lacks = |partner: &Vec<u32>| partner.get((row.number - 1) as usize).is_none_or(|partner| *partner == NONE);
+        let other = fate.partners.iter().position(lacks).unwrap_or_default();
+        let other = if index == 0 { self.name(other + 1) } else { self.name(0) };
+        Err(Refusal { reason: Reason::Unmatched, detail: self.lonely(other, index, row) })
     }
     fn name(&self, index: usize) -> &str {
         self.names.get(index).map_or("", String::as_str)
     }
-    fn lonely(&self, index: usize, row: &Row) -> String {
-        let other = self.name(1 - index.min(1));
+    /// A row of file `index` has no partner in the file named `other`, or that none in a third.
+    fn lonely(&self, other: &str, index: usize, row: &Row) -> String {
+        let other = if index > 0 && self.names.len() > 2 { format!("{other} (joined to all files)") } else { other.into() };
         match &self.settings.join {
             Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
             Some(Join::Time { tolerance_s, .. }) => {
@@ -190,12 +193,12 @@ impl<'a> Chunks<'a> {
             ..Recording::default()
         }
     }
-    fn push(&mut self, row: &Row, partner: Option<usize>, label: &str, decided: &Decided) -> Result<()> {
+    fn push(&mut self, row: &Row, fate: &Fate, label: &str, decided: &Decided) -> Result<()> {
         self.merged.clone_from(&row.values);
-        let packed = decided.scans.get(1).and_then(|scan| scan.packed.as_ref());
-        let other = partner.and_then(|number| number.checked_sub(1)).zip(packed);
         let mut texts = Texts { id: &row.id, usage: &row.usage, target: &row.target, anchor: &row.anchor };
-        if let Some((index, packed)) = other {
+        for (partner, scan) in fate.partners.iter().zip(decided.scans.iter().skip(1)) {
+            let number = partner.get((row.number - 1) as usize).and_then(|number| number.checked_sub(1));
+            let Some((index, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
             let width = packed.slots.len();
             let values = packed.values.get(index * width..(index + 1) * width).unwrap_or_default();
             for (slot, value) in packed.slots.iter().zip(values) {

@@ -143,7 +143,7 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
         faults(q, xyz, "join: {by: append}"),
         ["files[0].columns: not mapped: x, y, z", "files[1].columns: not mapped: q"]
     );
-    assert_eq!(faults(q, "", "join: {by: order}"), ["join: joins two files, not 1"]);
+    assert_eq!(faults(q, "", "join: {by: order}"), ["join: joins two files or more, not 1"]);
     assert_eq!(
         faults(&format!("{id}{q}"), xyz, "join: {by: id}"),
         ["files[1].columns.point_id: not mapped; the files are joined by point_id"]
@@ -151,7 +151,7 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
     assert_eq!(
         faults(&format!("{id}{time}{q}"), &format!("{id}{time}{xyz}"), "join: {by: id}\nduplicates: keep"),
         [
-            "files[1].columns.time: mapped in both files; map it in one",
+            "files[1].columns.time: mapped in two files; map it in one",
             "duplicates: `keep` cannot go with a join by id; allowed: reject, first, last"
         ]
     );

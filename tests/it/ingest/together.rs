@@ -84,6 +84,54 @@ fn rows_join_by_id_in_the_order_of_the_first_file() {
 }
 
 #[test]
+fn a_simulation_joins_as_a_third_file_by_id_by_time_and_by_order() {
+    let third = PAIR.to_string()
+        + r#"  - file: sim/model.csv
+    columns:
+      KEY: {column: kTHIRD}
+      sim_x: {column: x, unit: m}
+      sim_y: {column: y, unit: m}
+      sim_z: {column: z, unit: m}
+"#;
+    let desk = |arm: &str, tracker: &str, model: &str| {
+        let desk = Desk::default().with("run/z_arm.csv", arm).with("run/b_tracker.csv", tracker);
+        desk.with("sim/model.csv", model)
+    };
+    let by =
+        |key: &str, join: &str| third.replace("KEY", key).replace("LEFT", "").replace("RIGHT", "").replace("THIRD", "") + join;
+    let arm = "k,q1\nC,3\nA,1\nB,2\nD,1\n";
+    let tracker = "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n";
+    let ids = desk(arm, tracker, "k,x,y,z\nC,3,3,4\nA,1,1,2\nD,5,5,5\n");
+    let taken = take(&ids, &by("point_id", "join: {by: id}\n"), robot("r", 2.0)).unwrap();
+    assert_eq!(taken.recording.position, [[3.0; 3], [1.0; 3]]);
+    assert_eq!(taken.recording.simulated, Some(vec![[3.0, 3.0, 4.0], [1.0, 1.0, 2.0]]));
+    assert_eq!(
+        refused(&taken.rejected),
+        [
+            ("b_tracker.csv", 3, "unmatched", "no usable row of z_arm.csv (joined to all files) has the point id `B`"),
+            ("model.csv", 4, "unmatched", "no usable row of z_arm.csv (joined to all files) has the point id `D`"),
+            ("z_arm.csv", 4, "unmatched", "no usable row of model.csv has the point id `B`"),
+            ("z_arm.csv", 5, "unmatched", "no usable row of b_tracker.csv has the point id `D`"),
+        ]
+    );
+    let sound = |row: &calib::table::IntakeRow| row.read == row.accepted + row.rejected;
+    assert!(taken.intake.0.iter().all(sound) && taken.intake.0.len() == 3, "{:?}", taken.intake.0);
+    // The tracker's clock is 1.5 s ahead, the simulation has the controller's.
+    let clocks = desk("k,q1\n10,1\n20,2\n", "k,x,y,z\n11.5,1,1,1\n21.5,2,2,2\n", "k,x,y,z\n20,2,2,3\n10,1,1,2\n");
+    let seconds = by("time", "join: {by: time, tolerance_s: 0.1, offset_s: 1.5}\n");
+    let seconds = ["k"; 3].iter().fold(seconds, |text, _| text.replacen("time: {column: k}", "time: {column: k, unit: s}", 1));
+    let taken = take(&clocks, &seconds, robot("r", 2.0)).unwrap();
+    assert_eq!(taken.recording.position, [[1.0; 3], [2.0; 3]]);
+    assert_eq!(taken.recording.simulated, Some(vec![[1.0, 1.0, 2.0], [2.0, 2.0, 3.0]]));
+    let order: String =
+        by("KEY", "join: {by: order}\n").lines().filter(|l| !l.contains("KEY")).map(|l| format!("{l}\n")).collect();
+    let rows = desk("k,q1\na,1\nb,\nc,2\n", "k,x,y,z\n,1,1,1\n,2,2,2\n,3,3,3\n", "k,x,y,z\n,1,1,2\n,2,2,3\n,3,3,4\n");
+    let taken = take(&rows, &order, robot("r", 2.0)).unwrap();
+    assert_eq!(taken.recording.position, [[1.0; 3], [3.0; 3]]);
+    assert_eq!(taken.recording.simulated, Some(vec![[1.0, 1.0, 2.0], [3.0, 3.0, 4.0]]));
+}
+
+#[test]
 fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "k,q1\n10,1\n20,2\n30,3\n40,1\n")

@@ -107,7 +107,7 @@ impl Apart<'_> {
             "run": self.run,
             "seed": self.arguments.seed,
             "finding": { "rank": self.finding.rank, "effect": self.finding.effect, "where": self.finding.place },
-            "rival": { "effect": self.rival.0, "where": self.rival.1 },
+            "rival": { "effect": self.rival.0, "where": self.rival.1, "form": self.form },
             "sigma_mm": self.sigma,
             "temperature_c": self.circumstances.temperature,
             "points": self.rows,
