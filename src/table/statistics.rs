@@ -69,3 +69,18 @@ pub fn standing<'a>(steps: impl IntoIterator<Item = (&'a str, bool)>, diagnosed:
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::standing;
+
+    #[test]
+    fn a_diagnosis_stands_with_what_was_learned_on_it_and_not_with_another_model() {
+        let steps =
+            [("nominal", true), ("network", false), ("diagnose", true), ("on_top", false), ("joint", true), ("more", false)];
+        assert_eq!(standing(steps, "diagnose"), Some("on_top"));
+        assert_eq!(standing(steps, "joint"), Some("more"));
+        assert_eq!(standing(steps, "nominal"), Some("network"));
+        assert_eq!(standing(steps, "other"), None);
+    }
+}
