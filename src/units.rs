@@ -29,6 +29,13 @@ pub enum Unit {
     RadianPerNewtonMetre,
     RadianPerAmpere,
     MetrePerSecondSquared,
+    RadianPerSecond,
+    DegreePerSecond,
+    MillimetrePerSecond,
+    MetrePerSecond,
+    /// How far a joint trails behind for its speed.
+    RadianPerRadianPerSecond,
+    ArcsecondPerDegreePerSecond,
 }
 
 /// What a unit measures; only units of one quantity convert into each other.
@@ -47,6 +54,9 @@ pub enum Quantity {
     Compliance,
     CurrentCompliance,
     Acceleration,
+    AngularRate,
+    LinearRate,
+    Trailing,
 }
 
 use Quantity as Q;
@@ -77,6 +87,12 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
     (Unit::RadianPerNewtonMetre, "rad/Nm", Q::Compliance, 1.0, 0.0),
     (Unit::RadianPerAmpere, "rad/A", Q::CurrentCompliance, 1.0, 0.0),
     (Unit::MetrePerSecondSquared, "m/s2", Q::Acceleration, 1.0, 0.0),
+    (Unit::RadianPerSecond, "rad/s", Q::AngularRate, 1.0, 0.0),
+    (Unit::DegreePerSecond, "deg/s", Q::AngularRate, std::f64::consts::PI / 180.0, 0.0),
+    (Unit::MillimetrePerSecond, "mm/s", Q::LinearRate, 1e-3, 0.0),
+    (Unit::MetrePerSecond, "m/s", Q::LinearRate, 1.0, 0.0),
+    (Unit::RadianPerRadianPerSecond, "rad/(rad/s)", Q::Trailing, 1.0, 0.0),
+    (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)", Q::Trailing, 1.0 / 3600.0, 0.0),
 ];
 
 impl Unit {
@@ -106,10 +122,11 @@ impl Unit {
     pub fn symbols(quantity: Quantity) -> Vec<&'static str> {
         UNITS.iter().filter(|row| row.2 == quantity).map(|row| row.1).collect()
     }
-    /// The unit in which tables store a quantity: mm for lengths, rad for angles, else the SI unit.
+    /// The unit in which tables store a quantity: mm and mm/s for lengths and their rates, rad for angles, else the SI unit.
     pub fn stored(quantity: Quantity) -> Unit {
         match quantity {
             Quantity::Length => Unit::Millimetre,
+            Quantity::LinearRate => Unit::MillimetrePerSecond,
             other => UNITS.iter().find(|row| row.2 == other && row.3 == 1.0 && row.4 == 0.0).expect("SI unit").0,
         }
     }

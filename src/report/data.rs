@@ -72,6 +72,7 @@ impl Section {
             (recording.temperature.is_some(), "temperature"),
             (recording.current.is_some(), "motor current"),
             (recording.direction.is_some(), "direction of approach"),
+            (recording.velocity.is_some(), "joint velocities"),
         ];
         let mut sets: BTreeMap<&str, i64> = BTreeMap::new();
         for row in &tables.split.0 {

@@ -23,6 +23,8 @@ pub struct Measurements {
     pub temperature: Option<Vec<f64>>,
     /// Direction of the last move of each joint, +1 / -1; without it the order of the rows tells.
     pub direction: Option<Vec<f64>>,
+    /// Velocity of each joint when the point was measured, rad/s or m/s; without it the arm stood.
+    pub velocity: Option<Vec<f64>>,
     /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
     pub spread: Option<Vec<Matrix3<f64>>>,
     /// The target that each row measured; the tool point where rows name none.
@@ -86,6 +88,18 @@ impl Measurements {
         }
         let moves = (0..=row).rev().map(|k| self.last_move(k, joint));
         moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
+    }
+
+    /// Velocity of a joint, rad/s or m/s; 0 where none was recorded.
+    pub fn velocity(&self, row: usize, joint: usize) -> f64 {
+        let all = self.velocity.as_ref();
+        all.and_then(|all| all.get(row * self.joints + joint)).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+    }
+
+    /// Whether these rows are a recording of motion: in one of ten at least a joint moved.
+    pub fn in_motion(&self, rows: &[usize]) -> bool {
+        let moves = |row: &&usize| (0..self.joints).any(|joint| self.velocity(**row, joint) != 0.0);
+        self.velocity.is_some() && 10 * rows.iter().filter(moves).count() > rows.len()
     }
 
     /// Whether rows `a` and `b` are the same pose under the same payload.

@@ -8,6 +8,7 @@ mod bind;
 mod check;
 mod layout;
 mod lines;
+mod motion;
 mod number;
 mod orientation;
 mod pair;
@@ -15,12 +16,14 @@ mod parquet;
 mod reading;
 mod row;
 mod scan;
+mod slot;
 mod verdict;
 mod write;
 
 pub use layout::{
     Axis, ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
 };
+pub use motion::Motion;
 pub use orientation::OrientationColumns;
 
 use crate::error::Result;
@@ -49,6 +52,10 @@ pub struct Ingest {
     /// orientations or distances are mapped. Of those listed a cell may be blank where its column is `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<Vec<Axis>>,
+    /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
+    /// takes the usual settings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "half")]
     pub max_rejected_fraction: f64,

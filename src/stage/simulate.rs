@@ -9,6 +9,7 @@ use crate::twin::plan::{Block, Climate, Poses};
 use crate::twin::recorder::{Experiment, Motors, Shot};
 use crate::twin::tracker::Tracker;
 use crate::twin::truth::TrueRobot;
+use crate::twin::way::Way;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -51,6 +52,9 @@ pub struct Simulate {
     pub poses: Poses,
     /// Runs of points in the order of measurement; their labels become the column `usage`.
     pub blocks: Vec<Block>,
+    /// The arm moves while it is measured: the rows of all blocks follow one way, so many a second. Missing: it stands at every point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Way>,
     /// The clock and the temperature.
     #[serde(default)]
     pub climate: Climate,
@@ -102,6 +106,13 @@ impl Stage for Simulate {
         if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && self.climate.warm_up_h > 0.0) {
             fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h above 0");
         }
+        if let Some(way) = &self.motion {
+            let positive = [way.rate_hz, way.speed_deg_s].iter().all(|value| *value > 0.0 && value.is_finite());
+            let more = [way.dwell_s, way.wander_s].iter().all(|value| *value >= 0.0 && value.is_finite());
+            if !(positive && more) {
+                fault("motion", "expected rate_hz and speed_deg_s above 0, dwell_s and wander_s of 0 or more");
+            }
+        }
         faults
     }
 
@@ -114,6 +125,10 @@ impl Stage for Simulate {
             return Err(Error::Spec(faults.into_iter().map(named).collect()));
         }
         let effects = self.acting();
+        let tick = |done: &mut u64| {
+            *done += 1;
+            context.services.advance(*done, "");
+        };
         let experiment = Experiment {
             robot: &robot,
             truth: &self.truth,
@@ -129,12 +144,11 @@ impl Stage for Simulate {
         let points: usize = self.blocks.iter().map(|block| block.points).sum();
         context.services.begin("measuring the twin", Some(points as u64), "points");
         let mut done = 0;
-        let shots = experiment
-            .record(|| {
-                done += 1;
-                context.services.advance(done, "");
-            })
-            .map_err(|message| Error::spec(place, message))?;
+        let shots = match &self.motion {
+            Some(way) => experiment.follow(way, || tick(&mut done)),
+            None => experiment.record(|| tick(&mut done)),
+        };
+        let shots = shots.map_err(|message| Error::spec(place, message))?;
         context.services.note(format!("{points} points measured on a twin with {} effects besides its truth", effects.len()));
         Ok(SimulateWrites {
             recording: self.recording(&robot, &shots),
@@ -159,6 +173,10 @@ impl Simulate {
             self.truth.faults(robot).into_iter().map(|(at, what)| Fault::new(format!("truth.{at}"), what)).collect();
         for (index, effect) in self.effects.iter().enumerate() {
             faults.extend(effect.fault(joints).map(|what| Fault::new(format!("effects[{index}]"), what)));
+            if self.motion.is_none() && effect.moves_only() {
+                let what = "shows on a moving arm only; say `motion`, e.g. motion: {rate_hz: 100}";
+                faults.push(Fault::new(format!("effects[{index}]"), what));
+            }
         }
         for (name, list) in [("motors.sign", &self.motors.sign), ("repeatability_arcsec", &self.repeatability_arcsec)] {
             if !list.is_empty() && list.len() != joints {
@@ -200,7 +218,12 @@ impl Simulate {
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
             payload: Some(shots.iter().map(|shot| self.blocks[shot.block].payload_kg).collect()),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
-            current: Some(shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
+            current: self.motion.is_none().then(|| shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
+            velocity: self
+                .motion
+                .as_ref()
+                .is_some_and(|way| way.log_velocity)
+                .then(|| shots.iter().flat_map(|shot| shot.velocity.iter().copied()).collect()),
             direction: Some(shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
             ..Recording::default()
         }

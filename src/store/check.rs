@@ -82,6 +82,10 @@ fn layout<'a>(
                 settled.push(group);
                 let members: Vec<&FieldSchema> =
                     schema.fields.iter().filter(|other| other.either.as_ref() == Some(group)).collect();
+                let given_any = |member: &&FieldSchema| (1..=joints).any(|joint| given.contains_key(&member.column(Some(joint))));
+                if members.iter().all(|member| member.optional) && !members.iter().any(given_any) {
+                    continue;
+                }
                 for joint in 1..=joints {
                     let mut there = members.iter().filter(|member| given.contains_key(&member.column(Some(joint))));
                     match (there.next(), there.next()) {

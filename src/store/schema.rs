@@ -1,7 +1,7 @@
 //! The table-schema dialect of `schemas/*.json`: columns with type, unit, meaning, key, range and diff tolerance.
 //!
 //! A `per_joint` field stands for `{j}` = 1..n, n being counted in the frame; of `per_joint` fields with the same `either`
-//! every joint has exactly one; an `optional` field may be absent (for all joints or for none).
+//! every joint has exactly one; an `optional` field, or all of one `either`, may be absent (for all joints or for none).
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -251,8 +251,8 @@ impl FieldSchema {
         if self.per_joint != self.name.contains("{j}") {
             return Some("`per_joint` goes with `{j}` in the name".into());
         }
-        if self.either.is_some() && (!self.per_joint || self.optional) {
-            return Some("`either` goes with `per_joint` and without `optional`".into());
+        if self.either.is_some() && !self.per_joint {
+            return Some("`either` goes with `per_joint`".into());
         }
         if !unit_known {
             return Some(format!("unit `{}` is unknown", self.unit.as_deref().unwrap_or_default()));
@@ -290,6 +290,8 @@ mod tests {
             ("A", "_a"),
             ("Nm/A", "_nm_a"),
             ("m/s2", "_m_s2"),
+            ("rad/s", "_rad_s"),
+            ("mm/s", "_mm_s"),
         ];
         for schema in all() {
             for field in &schema.fields {

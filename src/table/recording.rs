@@ -39,6 +39,8 @@ pub struct Recording {
     pub current: Option<Vec<f64>>,
     /// Direction of the last move of each joint, +1 / -1 / 0.
     pub direction: Option<Vec<f64>>,
+    /// Velocity of each joint when the point was measured, rad/s or m/s.
+    pub velocity: Option<Vec<f64>>,
     /// The target that was measured; the tool point where a row names none.
     pub target: Option<Vec<Option<String>>>,
     /// Orientation of the target in the tracker's frame, as a rotation vector, rad; NaN where it was not measured.
@@ -96,6 +98,7 @@ impl Recording {
             time: self.time.clone(),
             temperature: self.temperature.clone(),
             direction: self.direction.clone(),
+            velocity: self.velocity.clone(),
             spread: None,
             target: self.target.as_ref().map(|names| named(names)),
             turn: self
@@ -185,6 +188,10 @@ impl Table for Recording {
                     frame.push(format!("{prefix}{}{ending}", joint + 1), Cell::to_array(column));
                 }
             }
+            if let Some(velocity) = &self.velocity {
+                let (ending, unit) = rate_unit(self.prismatic.get(joint).copied().unwrap_or(false));
+                frame.push(format!("dq{}_{ending}", joint + 1), Cell::to_array(present(per_joint(velocity, joint, unit))));
+            }
         }
         frame.finish()
     }
@@ -218,6 +225,13 @@ impl Table for Recording {
             let columns = AXES.iter().map(|axis| absent(frame, &format!("r{axis}_rad"))).collect::<Result<Vec<_>>>()?;
             Ok((0..frame.rows()).map(|row| [columns[0][row], columns[1][row], columns[2][row]]).collect())
         };
+        let rates = prismatic.iter().enumerate().map(|(joint, &slides)| {
+            let (ending, unit) = rate_unit(slides);
+            let column = absent(frame, &format!("dq{}_{ending}", joint + 1))?;
+            Ok(column.into_iter().map(|value| unit.to_si(value)).collect())
+        });
+        let moving = has("dq1_rad_s") || has("dq1_mm_s");
+        let velocity = moving.then(|| rates.collect::<Result<Vec<_>>>().map(|columns| interleave(&columns))).transpose()?;
         let q = prismatic.iter().enumerate().map(|(joint, &slides)| {
             let (ending, unit) = joint_unit(slides);
             let column = frame.read::<f64>(&format!("q{}_{ending}", joint + 1))?;
@@ -238,6 +252,7 @@ impl Table for Recording {
             temperature: optional("temp_c")?,
             current: optional_joints("i", "_a")?,
             direction: optional_joints("dir", "")?,
+            velocity,
             target: names("target")?,
             rotation: has("rx_rad").then(rotations).transpose()?,
             rotation_sigma: optional("sigma_r_rad")?,
@@ -252,6 +267,10 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn joint_unit(prismatic: bool) -> (&'static str, Unit) {
     if prismatic { ("mm", Unit::Millimetre) } else { ("rad", Unit::Radian) }
+}
+
+fn rate_unit(prismatic: bool) -> (&'static str, Unit) {
+    if prismatic { ("mm_s", Unit::MillimetrePerSecond) } else { ("rad_s", Unit::RadianPerSecond) }
 }
 
 /// NaN -> null.

@@ -8,11 +8,12 @@ use std::fmt::Write;
 /// Time from the controller's stamp to the tracker's, s.
 const TRACKER_LATER_S: f64 = 1.5;
 
-/// Decimals of what is written: joint angles in deg, coordinates in mm.
+/// Decimals of what is written: joint angles in deg and deg/s, coordinates in mm, times in s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals {
     pub angle: usize,
     pub length: usize,
+    pub time: usize,
 }
 
 /// A recording in SI; per-joint quantities are row-major. A quantity that is missing is not written.
@@ -30,6 +31,10 @@ pub struct Log {
     pub current: Option<Vec<f64>>,
     /// +1, -1 or 0.
     pub direction: Option<Vec<f64>>,
+    /// rad/s; the arm moved, and both clocks were one.
+    pub velocity: Option<Vec<f64>>,
+    /// Whether the tracker's stamps are the controller's: of standing points it looks some time after the arm has settled.
+    pub at_once: bool,
     /// C.
     pub temperature_c: Option<Vec<f64>>,
     /// Tracker frame, m.
@@ -46,17 +51,20 @@ impl Log {
         titles.extend(numbered(&|joint| format!("q{joint}_deg")));
         titles.extend(self.current.iter().flat_map(|_| numbered(&|joint| format!("i{joint}_a"))));
         titles.extend(self.direction.iter().flat_map(|_| numbered(&|joint| format!("dir{joint}"))));
+        titles.extend(self.velocity.iter().flat_map(|_| numbered(&|joint| format!("dq{joint}_deg_s"))));
         titles.extend(self.temperature_c.is_some().then(|| "temp_c".into()));
         let mut text = titles.join(",") + "\n";
         for (row, id) in self.id.iter().enumerate() {
             let joints = row * self.joints..(row + 1) * self.joints;
             let mut cells = vec![word(id)];
-            cells.extend(self.time_s.iter().map(|time| fixed(time[row], 2)));
+            cells.extend(self.time_s.iter().map(|time| fixed(time[row], decimals.time)));
             cells.push(word(&self.usage[row]));
             cells.push(fixed(self.payload_kg[row], 1));
             cells.extend(self.q[joints.clone()].iter().map(|angle| fixed(angle.to_degrees(), decimals.angle)));
             cells.extend(self.current.iter().flat_map(|all| &all[joints.clone()]).map(|current| fixed(*current, 4)));
             cells.extend(self.direction.iter().flat_map(|all| &all[joints.clone()]).map(|side| fixed(*side, 0)));
+            let rates = self.velocity.iter().flat_map(|all| &all[joints.clone()]);
+            cells.extend(rates.map(|rate| fixed(rate.to_degrees(), decimals.angle)));
             cells.extend(self.temperature_c.iter().map(|celsius| fixed(celsius[row], 2)));
             let _ = writeln!(text, "{}", cells.join(","));
         }
@@ -67,8 +75,9 @@ impl Log {
     pub fn tracker(&self, decimals: Decimals) -> String {
         let title = if self.time_s.is_some() { "time_s," } else { "" };
         let mut text = format!("point_id,{title}x_mm,y_mm,z_mm\n");
+        let later = if self.at_once { 0.0 } else { TRACKER_LATER_S };
         for (row, (id, position)) in self.id.iter().zip(&self.position).enumerate() {
-            let time = self.time_s.as_ref().map_or_else(String::new, |time| fixed(time[row] + TRACKER_LATER_S, 2) + ",");
+            let time = self.time_s.as_ref().map_or_else(String::new, |time| fixed(time[row] + later, decimals.time) + ",");
             let [x, y, z] = position.map(|coordinate| fixed(1e3 * coordinate, decimals.length));
             let _ = writeln!(text, "{},{time}{x},{y},{z}", word(id));
         }

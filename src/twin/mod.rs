@@ -16,3 +16,4 @@ pub mod reveal;
 pub mod statics;
 pub mod tracker;
 pub mod truth;
+pub mod way;

@@ -128,7 +128,8 @@ pub fn plan(
     Ok(out)
 }
 
-fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64; 2]>, String> {
+/// The range of every joint, rad or m; fails where the robot has no limits and the poses no ranges.
+pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64; 2]>, String> {
     if poses.range_deg.is_empty() {
         let limits =
             robot.joints.iter().enumerate().map(|(index, joint)| {

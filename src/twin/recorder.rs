@@ -1,4 +1,5 @@
-//! The experiment: every planned point settled, seen by the tracker, with the currents that the controller would log.
+//! The experiment: every planned point settled, seen by the tracker, with the currents that the controller would log; or a way of
+//! the moving arm, on which statics hold all the same: it is slow against its own vibrations.
 
 use super::arm::Arm;
 use super::effect::{JointCompliance, Motion, Physical};
@@ -8,6 +9,7 @@ use super::plan::{self, Block, Climate, Point, Poses};
 use super::statics::{Row, settle};
 use super::tracker::Tracker;
 use super::truth::{ARCSEC, TrueRobot};
+use super::way::{Path, Way};
 use crate::robot::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -52,6 +54,8 @@ pub struct Shot {
     /// Tracker frame, m, and its standard deviation per axis.
     pub position: Vector,
     pub sigma: f64,
+    /// Velocities as the controller logs them, rad/s or m/s; empty where the arm stood.
+    pub velocity: Vec<f64>,
 }
 
 impl Experiment<'_> {
@@ -60,6 +64,64 @@ impl Experiment<'_> {
         let arm = Arm::new(self.robot, self.truth);
         let points = plan::plan(self.robot, &arm, self.poses, self.blocks, self.climate, self.seed)?;
         Ok(self.measure(points, tick))
+    }
+
+    /// The moving arm: rows of all blocks one after another along one way. No currents: the motors accelerate the arm, too.
+    pub fn follow(&self, way: &Way, mut tick: impl FnMut()) -> Result<Vec<Shot>, String> {
+        let mut arm = Arm::new(self.robot, self.truth);
+        let rows: usize = self.blocks.iter().map(|block| block.points).sum();
+        let path = Path::draw(way, self.robot, &arm, self.poses, rows as f64 / way.rate_hz, self.seed)?;
+        let effects = self.all_effects(&arm);
+        for effect in &effects {
+            effect.shape(&mut arm);
+        }
+        let later: f64 = effects.iter().map(Physical::later).sum();
+        let base = self.tracker.base();
+        let mut beam = Noise::new(self.seed, Purpose::Tracker);
+        let mut play = Noise::new(self.seed, Purpose::Repeatability);
+        let lasts = if way.wander_s > 0.0 { (-1.0 / (way.rate_hz * way.wander_s)).exp() } else { 0.0 };
+        let mut astray: Vec<f64> = self.repeatability_arcsec.iter().map(|_| play.normal()).collect();
+        let mut direction = vec![0.0; arm.links.len()];
+        let blocks =
+            self.blocks.iter().enumerate().flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
+        let mut shots = Vec::with_capacity(rows);
+        for (row, (block, load)) in blocks.enumerate() {
+            let time_s = row as f64 / way.rate_hz;
+            let (mut q, logged) = path.at(time_s);
+            let (command, velocity) = path.at(time_s + later);
+            let mut drive = self.truth.drive(self.robot, &command);
+            for (((position, astray), sigma), link) in
+                drive.iter_mut().zip(&mut astray).zip(self.repeatability_arcsec).zip(&arm.links)
+            {
+                *astray = lasts * *astray + (1.0 - lasts * lasts).sqrt() * play.normal();
+                *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * *astray;
+            }
+            for (side, speed) in direction.iter_mut().zip(&velocity).filter(|(_, speed)| **speed != 0.0) {
+                *side = speed.signum();
+            }
+            let temperature_c = self.climate.temperature(time_s);
+            let payload_kg = load.payload_kg;
+            let row = Row { command, drive, direction: direction.clone(), time_s, temperature_c, payload_kg, velocity };
+            let rest = settle(&arm, &row, &effects);
+            let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            let before = q.clone();
+            for effect in &effects {
+                effect.log(&mut q, &before);
+            }
+            shots.push(Shot {
+                block,
+                q,
+                direction: row.direction,
+                time_s,
+                temperature_c,
+                current: Vec::new(),
+                position: self.tracker.measure(seen, &mut beam),
+                sigma: self.tracker.sigma(seen),
+                velocity: if way.log_velocity { logged } else { Vec::new() },
+            });
+            tick();
+        }
+        Ok(shots)
     }
 
     /// The given points in order.
@@ -80,7 +142,8 @@ impl Experiment<'_> {
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
             let Point { block, before, time_s, temperature_c, payload_kg, .. } = point;
-            let row = Row { command: point.q, drive, direction: point.direction, time_s, temperature_c, payload_kg };
+            let direction = point.direction;
+            let row = Row { command: point.q, drive, direction, time_s, temperature_c, payload_kg, velocity: Vec::new() };
             let rest = settle(&arm, &row, &effects);
             let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
             let mut q = row.command;
@@ -96,6 +159,7 @@ impl Experiment<'_> {
                 direction: row.direction,
                 time_s,
                 temperature_c,
+                velocity: Vec::new(),
             });
             tick();
         }

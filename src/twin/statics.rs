@@ -59,6 +59,8 @@ pub struct Row {
     pub time_s: f64,
     pub temperature_c: f64,
     pub payload_kg: f64,
+    /// Of each joint, rad/s or m/s; empty where the arm stands.
+    pub velocity: Vec<f64>,
 }
 
 /// The arm at rest under its loads.

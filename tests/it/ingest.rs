@@ -1,6 +1,7 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
 mod kinds;
+mod moving;
 mod refusals;
 mod together;
 

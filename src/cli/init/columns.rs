@@ -29,7 +29,7 @@ pub(super) struct Found {
     pub id: Option<String>,
     /// A column that says what a row is for, e.g. fit or validate.
     pub usage: Option<String>,
-    /// Quantities of each joint, by pattern: motor currents, directions of approach.
+    /// Quantities of each joint, by pattern: motor currents, directions of approach, velocities.
     patterns: Vec<(&'static str, &'static str, Option<&'static str>)>,
     /// x, y, z.
     pub point: Vec<String>,
@@ -115,7 +115,9 @@ impl Found {
             found.point_unit = said[column].unit_of(&["mm", "m", "um", "in"]);
             found.point.push(names[column].clone());
         }
-        for (quantity, pattern, unit) in [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None)] {
+        for (quantity, pattern, unit) in
+            [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None), ("velocity", "dq{j}_deg_s", Some("deg/s"))]
+        {
             let column = |n: usize| names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
             let columns: Vec<usize> = (1..).map_while(column).collect();
             if !columns.is_empty() && columns.len() == found.joints.len() {

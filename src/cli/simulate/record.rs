@@ -45,7 +45,9 @@ pub(super) struct RecordArguments {
 }
 
 /// 1e-9 deg is 0.00005 um at 3 m.
-const DECIMALS: Decimals = Decimals { angle: 9, length: 9 };
+const DECIMALS: Decimals = Decimals { angle: 9, length: 9, time: 2 };
+/// Of a moving arm a microsecond counts.
+const MOVING: Decimals = Decimals { time: 6, ..DECIMALS };
 
 pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Result<()> {
     let place = arguments.pipeline.display().to_string();
@@ -54,6 +56,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let Some(stage) = stage else { return Err(Error::spec(place, "has no stage `simulate`")) };
     vacant(&arguments.out)?;
     let plan = plan.needed_for(stage);
+    let moves = plan.stages.last().is_some_and(|stage| stage.stage.settings().get("motion").is_some());
     let store = open_store(arguments.store.as_deref())?;
     let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
@@ -64,7 +67,8 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let robot = table::<Robot>(&outcome, &store)?.to_description()?;
     let (recording, truth): (Recording, Truth) = (table(&outcome, &store)?, table(&outcome, &store)?);
     let rows = recording.rows();
-    let log = log(recording);
+    let log = log(recording, moves);
+    let decimals = if moves { MOVING } else { DECIMALS };
     let description = folder::robot(&robot).map_err(|fault| Error::spec(&place, fault))?;
     let mut numbers = "name,effect,where,unit,value\n".to_string();
     for row in &truth.0 {
@@ -74,8 +78,8 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     std::fs::create_dir_all(&arguments.out).map_err(fault)?;
     let files = [
         ("robot.json", description),
-        ("controller.csv", log.controller(DECIMALS)),
-        ("tracker.csv", log.tracker(DECIMALS)),
+        ("controller.csv", log.controller(decimals)),
+        ("tracker.csv", log.tracker(decimals)),
         ("truth.csv", numbers),
     ];
     for (name, text) in files {
@@ -94,7 +98,7 @@ fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {
 }
 
 /// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.
-fn log(recording: Recording) -> Log {
+fn log(recording: Recording, at_once: bool) -> Log {
     let rows = recording.rows();
     Log {
         joints: recording.joints,
@@ -104,6 +108,8 @@ fn log(recording: Recording) -> Log {
         q: recording.q,
         current: recording.current,
         direction: recording.direction,
+        velocity: recording.velocity,
+        at_once,
         temperature_c: recording.temperature,
         position: recording.position,
         id: recording.point_id,

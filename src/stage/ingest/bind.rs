@@ -1,8 +1,9 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::Arm;
-use super::layout::{ColumnRef, FileLayout, PerJoint, Slot};
+use super::layout::{ColumnRef, FileLayout};
 use super::orientation::Convention;
+use super::slot::{PerJoint, Slot};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::units::{Quantity, Unit};
 
@@ -208,6 +209,7 @@ impl Binder<'_> {
     }
     fn joints(&mut self, mapped: &PerJoint, arm: &Arm) -> Result<()> {
         let PerJoint { name, columns: joints, quantity, slot } = *mapped;
+        let slides = mapped.linear().is_some();
         let count = arm.joints();
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
             (Some(list), _) => list.clone(),
@@ -237,7 +239,7 @@ impl Binder<'_> {
             self.fault(format!("`{name}` has {there} of its columns; the robot has {count} joints"));
         }
         for (joint, reference) in references.iter().enumerate() {
-            let linear = quantity == Quantity::Angle && arm.prismatic.get(joint).copied().unwrap_or(false);
+            let linear = slides && arm.prismatic.get(joint).copied().unwrap_or(false);
             let symbol = if linear { &joints.linear_unit } else { &joints.unit };
             if symbol.is_none() && quantity != Quantity::Number {
                 let (kind, setting) = if linear { ("prismatic", "linear_unit") } else { ("revolute", "unit") };

@@ -1,8 +1,9 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
 use super::Ingest;
-use super::layout::{ColumnRef, Columns, Duplicates, FileLayout, Join, JointColumns, ScalarColumn};
+use super::layout::{ColumnRef, Columns, Duplicates, FileLayout, Join, ScalarColumn};
 use super::orientation::{Convention, OrientationColumns};
+use super::slot::PerJoint;
 use crate::error::{Fault, nearest};
 use crate::units::{Quantity, Unit};
 
@@ -31,6 +32,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
         file_faults(file, &format!("files[{index}]"), &mut faults);
     }
     together(settings, &mut faults);
+    motion_faults(settings, &mut faults);
     faults
 }
 
@@ -64,7 +66,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         scalar_faults(scalar, quantity, file, &format!("{place}.columns.{name}"), faults);
     }
     for mapped in columns.per_joint() {
-        joint_faults(mapped.columns, mapped.quantity, file, &format!("{place}.columns.{}", mapped.name), faults);
+        joint_faults(&mapped, file, &format!("{place}.columns.{}", mapped.name), faults);
     }
     if let Some(orientation) = &columns.orientation {
         orientation_faults(orientation, file, &format!("{place}.columns.orientation"), faults);
@@ -121,7 +123,8 @@ fn scalar_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, p
     }
 }
 
-fn joint_faults(joints: &JointColumns, quantity: Quantity, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+fn joint_faults(mapped: &PerJoint, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    let (joints, quantity) = (mapped.columns, mapped.quantity);
     one_of(
         joints.column.is_some(),
         joints.columns.is_some(),
@@ -143,27 +146,27 @@ fn joint_faults(joints: &JointColumns, quantity: Quantity, file: &FileLayout, pl
     for (index, entry) in joints.columns.iter().flatten().enumerate() {
         column(Some(entry), file, &format!("{place}.columns[{index}]"), faults);
     }
+    if quantity == Quantity::Angle && joints.optional {
+        faults.push(Fault::new(format!("{place}.optional"), "no recording without joint positions"));
+    }
+    if let Some(linear) = mapped.linear() {
+        if joints.unit.is_some() || joints.linear_unit.is_none() {
+            unit(joints.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
+        }
+        if joints.linear_unit.is_some() {
+            unit(joints.linear_unit.as_deref(), linear, &format!("{place}.linear_unit"), faults);
+        }
+        return;
+    }
     match quantity {
-        Quantity::Angle => {
-            if joints.unit.is_some() || joints.linear_unit.is_none() {
-                unit(joints.unit.as_deref(), Quantity::Angle, &format!("{place}.unit"), faults);
-            }
-            if joints.linear_unit.is_some() {
-                unit(joints.linear_unit.as_deref(), Quantity::Length, &format!("{place}.linear_unit"), faults);
-            }
-            if joints.optional {
-                faults.push(Fault::new(format!("{place}.optional"), "no recording without joint positions"));
-            }
+        Quantity::Number if joints.unit.is_some() => {
+            faults.push(Fault::new(format!("{place}.unit"), "a direction (1, -1, 0) has no unit"));
         }
-        Quantity::Number => {
-            if joints.unit.is_some() {
-                faults.push(Fault::new(format!("{place}.unit"), "a direction (1, -1, 0) has no unit"));
-            }
-        }
+        Quantity::Number => (),
         other => unit(joints.unit.as_deref(), other, &format!("{place}.unit"), faults),
     }
-    if quantity != Quantity::Angle && joints.linear_unit.is_some() {
-        faults.push(Fault::new(format!("{place}.linear_unit"), "for the positions `q` of prismatic joints only"));
+    if joints.linear_unit.is_some() {
+        faults.push(Fault::new(format!("{place}.linear_unit"), "for the positions and velocities of prismatic joints only"));
     }
 }
 
@@ -268,6 +271,19 @@ fn optional_key(file: &FileLayout, key: &str) -> bool {
     let id = file.columns.point_id.as_ref().is_some_and(|id| id.optional);
     let time = file.columns.time.as_ref().is_some_and(|time| time.optional || time.column.is_none());
     if key == "time" { time } else { id }
+}
+
+/// Velocities by the joints over time need both in one file.
+fn motion_faults(settings: &Ingest, faults: &mut Vec<Fault>) {
+    let Some(motion) = &settings.motion else { return };
+    faults.extend(motion.faults());
+    let columns = || settings.files.iter().map(|file| &file.columns);
+    let given = columns().any(|columns| columns.velocity.is_some());
+    let timed = |columns: &Columns| columns.time.as_ref().is_some_and(|time| time.column.is_some());
+    if !given && columns().any(|columns| columns.q.is_some() && !timed(columns)) {
+        let message = "joint velocities follow from the joints over time: map `time` in the file that has `q`, or map `velocity`";
+        faults.push(Fault::new("motion", message));
+    }
 }
 
 fn complete(files: &[FileLayout], needed: &[&str], place: &str, faults: &mut Vec<Fault>) {

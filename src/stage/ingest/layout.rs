@@ -3,6 +3,7 @@
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
 use super::orientation::OrientationColumns;
+use super::slot::{PerJoint, Slot};
 use crate::stage::RawFile;
 use crate::units::Quantity;
 use schemars::JsonSchema;
@@ -153,10 +154,10 @@ pub struct JointColumns {
     /// Names or numbers of the columns from the first joint to the last, instead of a pattern.
     #[serde(default)]
     pub columns: Option<Vec<ColumnRef>>,
-    /// Unit of the file's numbers; for positions that of the revolute joints, e.g. `deg`.
+    /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
     #[serde(default)]
     pub unit: Option<String>,
-    /// Unit of the positions of prismatic joints, e.g. `mm`.
+    /// Unit of the positions or velocities of prismatic joints, e.g. `mm`.
     #[serde(default)]
     pub linear_unit: Option<String>,
     /// The columns may be missing from the file, and their cells may be blank.
@@ -216,6 +217,9 @@ pub struct Columns {
     pub current: Option<JointColumns>,
     /// Direction of the last move of each joint: 1, -1 or 0; no unit.
     pub direction: Option<JointColumns>,
+    /// Joint velocities while the point was measured, where the arm moved: `{column: "dq{j}", unit: deg/s}`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<JointColumns>,
 }
 
 /// An axis of the tracker's frame.
@@ -244,7 +248,8 @@ impl Axis {
 pub enum Join {
     /// Rows of equal `point_id`.
     Id {},
-    /// Rows nearest in `time`, each being the nearest of the other.
+    /// Rows nearest in `time`, each being the nearest of the other. Where joint velocities are known (mapped, or by `motion`), the
+    /// joints are carried to the moment of the point.
     Time {
         /// Largest difference, s.
         tolerance_s: f64,
@@ -286,59 +291,6 @@ pub enum Limits {
     Ignore,
 }
 
-/// Where the quantities of a row live in its list of numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Slot {
-    Time,
-    Payload,
-    Temperature,
-    Position(usize),
-    Sigma(usize),
-    Q(usize),
-    Current(usize),
-    Direction(usize),
-    /// Numbers of the orientation in the file's convention.
-    Turn(usize),
-    SigmaTurn,
-    Distance,
-    SigmaDistance,
-    Simulated(usize),
-}
-
-impl Slot {
-    /// Numbers in a row of a robot with so many joints.
-    pub(super) fn count(joints: usize) -> usize {
-        19 + 3 * joints
-    }
-    pub(super) fn index(self, joints: usize) -> usize {
-        match self {
-            Self::Time => 0,
-            Self::Payload => 1,
-            Self::Temperature => 2,
-            Self::Position(axis) => 3 + axis,
-            Self::Sigma(axis) => 6 + axis,
-            Self::Q(joint) => 9 + joint,
-            Self::Current(joint) => 9 + joints + joint,
-            Self::Direction(joint) => 9 + 2 * joints + joint,
-            Self::Turn(number) => 9 + 3 * joints + number,
-            Self::SigmaTurn => 13 + 3 * joints,
-            Self::Distance => 14 + 3 * joints,
-            Self::SigmaDistance => 15 + 3 * joints,
-            Self::Simulated(axis) => 16 + 3 * joints + axis,
-        }
-    }
-}
-
-/// Columns that are mapped for every joint.
-pub(super) struct PerJoint<'a> {
-    /// The setting.
-    pub name: &'static str,
-    pub columns: &'a JointColumns,
-    /// For positions that of a revolute joint.
-    pub quantity: Quantity,
-    pub slot: fn(usize) -> Slot,
-}
-
 impl Columns {
     /// The mapped texts.
     pub(super) fn texts(&self) -> Vec<(&'static str, &TextColumn)> {
@@ -374,6 +326,7 @@ impl Columns {
             ("q", &self.q, Quantity::Angle, Slot::Q as fn(usize) -> Slot),
             ("current", &self.current, Quantity::Current, Slot::Current),
             ("direction", &self.direction, Quantity::Number, Slot::Direction),
+            ("velocity", &self.velocity, Quantity::AngularRate, Slot::Velocity),
         ];
         let mapped = listed.into_iter().filter_map(|(name, columns, quantity, slot)| {
             columns.as_ref().map(|columns| PerJoint { name, columns, quantity, slot })

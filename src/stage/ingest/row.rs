@@ -2,9 +2,10 @@
 
 use super::arm::Arm;
 use super::bind::{Binding, Text};
-use super::layout::{Decimal, Limits, Slot};
+use super::layout::{Decimal, Limits};
 use super::lines::Record;
 use super::number::{self, Fault};
+use super::slot::Slot;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
@@ -271,6 +272,7 @@ fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
         Slot::Turn(_) => [-TURNS, TURNS],
         Slot::SigmaTurn | Slot::SigmaDistance => [0.0, 1.0],
         Slot::Distance => [0.0, 200.0],
+        Slot::Velocity(_) => [-100.0, 100.0],
     }
 }
 

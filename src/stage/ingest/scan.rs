@@ -1,13 +1,15 @@
 //! First reading of a file: which rows are usable, and what is needed to find duplicates and partners.
 //!
 //! Memory: 24 bytes a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all; the second
-//! file of a join is held with its numbers.
+//! file of a join is held with its numbers. Where the arm moves, 16 bytes a joint and row for its velocities.
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{FileLayout, Join, Slot};
+use super::layout::{FileLayout, Join};
+use super::motion::{Samples, Track};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
+use super::slot::Slot;
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use std::collections::BTreeMap;
@@ -89,6 +91,8 @@ pub(super) struct Scan {
     pub beyond: Odd,
     /// Largest angle of a revolute joint, rad.
     pub largest: f64,
+    /// Where the arm moves: of the file with the joints.
+    pub track: Option<Track>,
 }
 
 impl Scan {
@@ -126,7 +130,9 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
         turns: Odd::default(),
         beyond: Odd::default(),
         largest: 0.0,
+        track: None,
     };
+    let mut samples = is_track(settings, layout).then(Samples::default);
     let keyed = layout.columns.point_id.is_some() && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
@@ -147,6 +153,9 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
                     scan.times.push((time, narrow(row.number, &scan.label)?));
                 }
                 scan.odd(row, arm);
+                if let Some(samples) = &mut samples {
+                    sample(samples, row, layout, arm);
+                }
             }
             Err(refusal) => tally(&mut scan.tally, row.line, refusal),
         }
@@ -176,7 +185,26 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
     if scan.read == 0 {
         return Err(Error::data(scan.label, "has a header but no data row; allowed: at least one"));
     }
+    if let Some(samples) = samples {
+        scan.track = Some(samples.track(settings.motion.as_ref(), scan.read, arm, &scan.label, context)?);
+    }
     Ok(scan)
+}
+
+/// Whether velocities, or what they change by, follow from this file's joints over time.
+fn is_track(settings: &Ingest, layout: &FileLayout) -> bool {
+    let timed = layout.columns.time.as_ref().is_some_and(|time| time.column.is_some());
+    let moving = settings.motion.is_some() || settings.files.iter().any(|file| file.columns.velocity.is_some());
+    let asked = settings.motion.is_some() || matches!(settings.join, Some(Join::Time { .. }));
+    timed && moving && asked && layout.columns.q.is_some()
+}
+
+fn sample(samples: &mut Samples, row: &Row, layout: &FileLayout, arm: &Arm) {
+    let joints = arm.joints();
+    let all = |slot: fn(usize) -> Slot| row.values.get(slot(0).index(joints)..slot(0).index(joints) + joints).unwrap_or_default();
+    let time = row.values.get(Slot::Time.index(joints)).copied().unwrap_or(f64::NAN);
+    let given = if layout.columns.velocity.is_some() { all(Slot::Velocity) } else { &[] };
+    samples.push(row.number, time, all(Slot::Q), given);
 }
 
 fn narrow(number: u64, label: &str) -> Result<u32> {

@@ -1,11 +1,12 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
 use super::arm::Arm;
-use super::layout::{Columns, FileLayout, Join, Slot};
+use super::layout::{Columns, FileLayout, Join};
 use super::pair::{Fate, NONE};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
 use super::scan::Scan;
+use super::slot::Slot;
 use super::{Ingest, verdict};
 use crate::error::{Error, Result};
 use crate::stage::{Context, Sink, StreamedTable};
@@ -37,7 +38,7 @@ pub(super) fn write(decided: &Decided, context: &Context) -> Result<(StreamedTab
     for (index, layout) in decided.settings.files.iter().enumerate() {
         file(decided, index, layout, (index < leading).then_some(&mut recording), &mut rejected, context)?;
     }
-    Ok((recording.finish()?, rejected.finish()?))
+    Ok((recording.finish(context)?, rejected.finish()?))
 }
 
 fn file(
@@ -61,7 +62,7 @@ fn file(
             Ok(()) => {
                 accepted += 1;
                 if let Some(chunks) = &mut recording {
-                    chunks.push(&reading.row, fate, &scan.label, decided)?;
+                    chunks.push(&reading.row, index, fate, decided)?;
                     pace.row(chunks.written);
                 }
             }
@@ -101,6 +102,32 @@ impl Decided<'_> {
         let other = if index == 0 { self.name(other + 1) } else { self.name(0) };
         Err(Refusal { reason: Reason::Unmatched, detail: self.lonely(other, index, row) })
     }
+    /// The data row of file `file` that is part of a row of file `index`.
+    fn number(&self, file: usize, index: usize, row: &Row, fate: &Fate) -> Option<u64> {
+        if file == index {
+            return Some(row.number);
+        }
+        let partner = fate.partners.get(file.checked_sub(1)?)?.get((row.number - 1) as usize)?;
+        (*partner != NONE).then_some(u64::from(*partner))
+    }
+    /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
+    fn moment(&self, file: usize, row: &Row, fate: &Fate) -> Option<f64> {
+        let time = Slot::Time.index(self.arm.joints());
+        let Some(Join::Time { offset_s, .. }) = &self.settings.join else { return None };
+        if file == 0 {
+            return row.values.get(time).copied();
+        }
+        let packed = self.scans.get(file)?.packed.as_ref()?;
+        let slot = packed.slots.iter().position(|slot| *slot == time)?;
+        let at = (self.number(file, 0, row, fate)? as usize - 1) * packed.slots.len() + slot;
+        Some(packed.values.get(at)? - if file == 1 { *offset_s } else { 0.0 })
+    }
+    /// How much later (s) than its joints the point of a row was measured.
+    fn later(&self, moving: usize, row: &Row, fate: &Fate) -> Option<f64> {
+        let point = self.settings.files.iter().position(|file| file.columns.x.is_some() || file.columns.distance.is_some())?;
+        let later = self.moment(point, row, fate)? - self.moment(moving, row, fate)?;
+        Some(later).filter(|later| later.is_finite())
+    }
     fn name(&self, index: usize) -> &str {
         self.names.get(index).map_or("", String::as_str)
     }
@@ -137,6 +164,10 @@ struct Chunks<'a> {
     named: [bool; 2],
     chunk: Recording,
     merged: Vec<f64>,
+    /// The file with the joints.
+    moving: usize,
+    /// The farthest that joints were carried to the moment of their point, s.
+    carried: f64,
     last_sequence: Option<i64>,
     written: u64,
     /// Data rows of the files before this one.
@@ -152,6 +183,10 @@ impl<'a> Chunks<'a> {
                 *has = true;
             }
         }
+        let moving = decided.settings.files.iter().position(|file| file.columns.q.is_some()).unwrap_or_default();
+        if decided.settings.motion.is_some() {
+            (0..joints).for_each(|joint| has[Slot::Velocity(joint).index(joints)] = true);
+        }
         let sink = context.services.sink(Recording::KIND)?;
         let names = |mapped: fn(&Columns) -> bool| decided.settings.files.iter().any(|file| mapped(&file.columns));
         let prismatic = decided.arm.prismatic.clone();
@@ -163,6 +198,8 @@ impl<'a> Chunks<'a> {
             named: [names(|columns| columns.target.is_some()), names(|columns| columns.anchor.is_some())],
             chunk: Recording::default(),
             merged: Vec::new(),
+            moving,
+            carried: 0.0,
             last_sequence: None,
             written: 0,
             before: 0,
@@ -184,6 +221,7 @@ impl<'a> Chunks<'a> {
             temperature: self.has(Slot::Temperature).then(Vec::new),
             current: self.has(Slot::Current(0)).then(Vec::new),
             direction: self.has(Slot::Direction(0)).then(Vec::new),
+            velocity: self.has(Slot::Velocity(0)).then(Vec::new),
             target: self.named[0].then(Vec::new),
             rotation: self.has(Slot::Turn(0)).then(Vec::new),
             rotation_sigma: self.has(Slot::SigmaTurn).then(Vec::new),
@@ -193,31 +231,33 @@ impl<'a> Chunks<'a> {
             ..Recording::default()
         }
     }
-    fn push(&mut self, row: &Row, fate: &Fate, label: &str, decided: &Decided) -> Result<()> {
+    fn push(&mut self, row: &Row, index: usize, fate: &Fate, decided: &Decided) -> Result<()> {
+        let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
         let mut texts = Texts { id: &row.id, usage: &row.usage, target: &row.target, anchor: &row.anchor };
         for (partner, scan) in fate.partners.iter().zip(decided.scans.iter().skip(1)) {
             let number = partner.get((row.number - 1) as usize).and_then(|number| number.checked_sub(1));
-            let Some((index, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
+            let Some((at, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
             let width = packed.slots.len();
-            let values = packed.values.get(index * width..(index + 1) * width).unwrap_or_default();
+            let values = packed.values.get(at * width..(at + 1) * width).unwrap_or_default();
             for (slot, value) in packed.slots.iter().zip(values) {
                 // Mapped in both files, for a join by time: the time of a row is that of the file that leads.
                 if let Some(merged) = self.merged.get_mut(*slot).filter(|merged| merged.is_nan()) {
                     *merged = *value;
                 }
             }
-            if let Some(id) = packed.ids.get(index) {
+            if let Some(id) = packed.ids.get(at) {
                 texts.id = id;
             }
             for (own, other) in
                 [(&mut texts.usage, &packed.usage), (&mut texts.target, &packed.target), (&mut texts.anchor, &packed.anchor)]
             {
-                if let Some(text) = other.get(index) {
+                if let Some(text) = other.get(at) {
                     *own = text;
                 }
             }
         }
+        self.carry(decided, index, row, fate);
         let number = self.before + row.number;
         let sequence = row.sequence.unwrap_or(number as i64);
         if let Some(last) = self.last_sequence.replace(sequence)
@@ -253,6 +293,7 @@ impl<'a> Chunks<'a> {
         chunk.temperature.iter_mut().for_each(|column| column.push(one(Slot::Temperature)));
         chunk.current.iter_mut().for_each(|column| column.extend(all(Slot::Current)));
         chunk.direction.iter_mut().for_each(|column| column.extend(all(Slot::Direction)));
+        chunk.velocity.iter_mut().for_each(|column| column.extend(all(Slot::Velocity)));
         chunk.target.iter_mut().for_each(|column| column.push(named(texts.target)));
         chunk.anchor.iter_mut().for_each(|column| column.push(named(texts.anchor)));
         chunk.rotation.iter_mut().for_each(|column| column.push(axes(Slot::Turn)));
@@ -261,14 +302,49 @@ impl<'a> Chunks<'a> {
         chunk.distance_sigma.iter_mut().for_each(|column| column.push(one(Slot::SigmaDistance)));
         self.written += 1;
     }
+    /// Velocities that follow from the joints over time; with a join by time joints and velocities at the moment of the point.
+    fn carry(&mut self, decided: &Decided, index: usize, row: &Row, fate: &Fate) {
+        let joints = self.joints;
+        // Of files that continue each other each has its own joints.
+        let moving = if fate.partners.is_empty() { index } else { self.moving };
+        let track = decided.scans.get(moving).and_then(|scan| scan.track.as_ref()).zip(decided.number(moving, index, row, fate));
+        let rates = Slot::Velocity(0).index(joints);
+        if let (Some((track, number)), Some(_)) = (track, &decided.settings.motion)
+            && let Some(velocity) = self.merged.get_mut(rates..rates + joints)
+        {
+            track.fill(number, velocity);
+        }
+        let apart = decided.later(moving, row, fate);
+        let known = decided.settings.motion.as_ref().map_or(0.0, |motion| motion.later_s);
+        let later = apart.unwrap_or(0.0) + known;
+        if later == 0.0 {
+            return;
+        }
+        for joint in 0..joints {
+            let (q, rate) = (Slot::Q(joint).index(joints), Slot::Velocity(joint).index(joints));
+            let velocity = self.merged[rate];
+            let acceleration = track.map_or(0.0, |(track, number)| track.acceleration(number, joint));
+            if velocity.is_finite() {
+                self.merged[q] += later * (velocity + 0.5 * later * acceleration);
+                self.merged[rate] += later * acceleration;
+                self.carried = self.carried.max(later.abs());
+            }
+        }
+    }
     fn flush(&mut self) -> Result<()> {
         let empty = self.empty();
         let full = std::mem::replace(&mut self.chunk, empty);
         self.sink.push(full.to_frame()?)
     }
-    fn finish(mut self) -> Result<StreamedTable<Recording>> {
+    fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
         if self.chunk.rows() > 0 {
             self.flush()?;
+        }
+        if self.carried > 0.0 {
+            let ms = 1e3 * self.carried;
+            context
+                .services
+                .note(format!("joints were carried by their velocity to the moment of their point, over {ms:.2} ms at most"));
         }
         Ok(StreamedTable::new(self.sink.finish()?))
     }

@@ -128,6 +128,7 @@ impl<'a> Bench<'a> {
                 time_s: point.time_s,
                 temperature_c: point.temperature_c,
                 payload_kg: point.payload_kg,
+                velocity: Vec::new(),
             };
             let rest = settle(&arm, &row, &[]);
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 pub type File = (&'static str, String);
 
 /// A controller's display and a tracker's.
-const DECIMALS: Decimals = Decimals { angle: 4, length: 5 };
+const DECIMALS: Decimals = Decimals { angle: 4, length: 5, time: 2 };
 
 impl Case {
     /// The files that a user has; fails with what of the robot they cannot state.
@@ -78,6 +78,8 @@ impl Case {
             q: joints(|shot| &shot.q),
             current: shown(Column::Current).then(|| joints(|shot| &shot.current)),
             direction: shown(Column::Direction).then(|| joints(|shot| &shot.direction)),
+            velocity: None,
+            at_once: false,
             temperature_c: shown(Column::Temperature).then(|| self.thermometer_c.clone()),
             position: self.shots.iter().map(|shot| shot.position).collect(),
         }

@@ -49,6 +49,7 @@ impl Site<'_> {
                 time_s: point.time_s,
                 temperature_c: point.temperature_c,
                 payload_kg: point.payload_kg,
+                velocity: Vec::new(),
             };
             let rest = settle(&arm, &row, effects);
             matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool)

@@ -27,6 +27,7 @@ mod thermal_warm_up;
 mod tool_shift;
 mod tracker_drift;
 mod tracker_scale;
+mod viscous_windup;
 mod zero_shift;
 
 pub use axis_wobble::AxisWobble;
@@ -54,6 +55,7 @@ pub use thermal_warm_up::ThermalWarmUp;
 pub use tool_shift::ToolShift;
 pub use tracker_drift::{Course, TrackerDrift};
 pub use tracker_scale::TrackerScale;
+pub use viscous_windup::ViscousWindup;
 pub use zero_shift::ZeroShift;
 
 use super::arm::{Arm, Posture};
@@ -148,6 +150,14 @@ trait Act {
     fn shape(&self, _arm: &mut Arm) {}
     /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
     fn log(&self, _q: &mut [f64], _before: &[f64]) {}
+    /// How much later than the joints beside it a point is measured, s.
+    fn later(&self) -> f64 {
+        0.0
+    }
+    /// Whether a standing arm knows nothing of it.
+    fn moves_only(&self) -> bool {
+        self.later() != 0.0
+    }
     /// The joint or link that it sits on, from 1, where it has one.
     fn seat(&self) -> Option<usize>;
     /// Multiplies the size of what it does.
@@ -229,6 +239,8 @@ physical! {
     ThermalWarmUp,
     /// The reflector steps at some time.
     ToolShift,
+    /// A joint trails behind while it turns.
+    ViscousWindup,
 }
 
 impl Physical {
@@ -243,6 +255,14 @@ impl Physical {
     /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
     pub fn log(&self, q: &mut [f64], before: &[f64]) {
         self.inner().log(q, before);
+    }
+    /// How much later than the joints beside it a point is measured, s.
+    pub fn later(&self) -> f64 {
+        self.inner().later()
+    }
+    /// Whether a standing arm knows nothing of it.
+    pub fn moves_only(&self) -> bool {
+        self.inner().moves_only()
     }
     /// The same effect, `by` times as large.
     pub fn scaled(&self, by: f64) -> Physical {

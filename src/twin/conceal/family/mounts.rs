@@ -62,7 +62,7 @@ pub(super) fn joint_log_lag(bench: &Bench, form: Form, draw: &mut Noise) -> Opti
         Form::Obvious => (None, "all joints"),
         Form::Other => (Some(bench.turning(draw)), "one joint"),
     };
-    let lag = Physical::JointLogLag(JointLogLag { share: draw.size(1e-4, 1e-3), joint: only });
+    let lag = Physical::JointLogLag(JointLogLag { share: draw.size(1e-4, 1e-3), clock_ms: 0.0, joint: only });
     Some(Draft::new(name, vec![sized("joint_log_lag", "recording".into(), vec![lag])]))
 }
 

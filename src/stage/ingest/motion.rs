@@ -1,0 +1,252 @@
+//! Arms that move while they are measured: joint velocities by the joints over time, and joints carried to the moment of a point.
+//!
+//! Through a row's joints and those of its neighbours in the file goes a parabola in time: its slope in the row is the velocity. What
+//! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
+
+use super::arm::Arm;
+use crate::error::{Error, Fault, Result};
+use crate::stage::Context;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How joint velocities follow from the joints over time, where no columns give them: a parabola through each row and its
+/// neighbours in the file, never across gaps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// Longer steps in time between rows are gaps, s; five times the usual step if not given.
+    #[serde(default)]
+    pub gap_s: Option<f64>,
+    /// Least time from the first to the last row of a parabola, s: more than two steps where joints are logged coarsely.
+    #[serde(default)]
+    pub over_s: f64,
+    /// How much later the points were measured than the joints beside them, s, as `diagnose` says it: joints are carried there.
+    #[serde(default)]
+    pub later_s: f64,
+}
+
+impl Motion {
+    pub(super) fn faults(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        if self.gap_s.is_some_and(|gap| !(gap > 0.0 && gap.is_finite())) {
+            faults.push(Fault::new("motion.gap_s", "allowed: above 0, e.g. 0.1"));
+        }
+        if !(self.over_s >= 0.0 && self.over_s.is_finite()) {
+            faults.push(Fault::new("motion.over_s", "allowed: 0 and above, e.g. 0.02"));
+        }
+        if !self.later_s.is_finite() {
+            faults.push(Fault::new("motion.later_s", "not a finite number"));
+        }
+        faults
+    }
+}
+
+/// Steps beyond so many usual ones are gaps.
+const GAP: f64 = 5.0;
+/// Velocities that are off by more than this share are worth a warning, and beyond that no velocities: the arm stood at the points.
+const ROUGH: f64 = 0.03;
+const TOO_ROUGH: f64 = 0.25;
+/// Columns of velocities that are so many times what the joints over time say are in another unit.
+const OTHER_UNIT: f64 = 3.0;
+
+/// Times and joints of a file's usable rows.
+#[derive(Default)]
+pub(super) struct Samples {
+    numbers: Vec<u64>,
+    time: Vec<f64>,
+    q: Vec<f64>,
+    /// Velocities that the file gives.
+    given: Vec<f64>,
+}
+
+/// Velocity and acceleration of the joints by data row. 16 bytes a joint and row.
+pub(super) struct Track {
+    joints: usize,
+    /// By data row: velocities, then accelerations; NaN where neither is known.
+    rates: Vec<f64>,
+}
+
+impl Samples {
+    pub(super) fn push(&mut self, number: u64, time: f64, q: &[f64], given: &[f64]) {
+        if time.is_finite() {
+            self.numbers.push(number);
+            self.time.push(time);
+            self.q.extend_from_slice(q);
+            self.given.extend_from_slice(given);
+        }
+    }
+
+    /// Neighbours of a row in one stretch without a gap: the rows of its parabola (the same twice where there are but two), `wide`
+    /// times as far apart.
+    fn around(&self, i: usize, [start, end]: [usize; 2], reach: usize) -> Option<[usize; 3]> {
+        let reach = reach.min((end - start) / 2);
+        match reach {
+            0 if end > start => Some([start, start, end]),
+            0 => None,
+            _ => {
+                let middle = i.clamp(start + reach, end - reach);
+                Some([middle - reach, middle, middle + reach])
+            }
+        }
+    }
+
+    /// Velocity and acceleration of joint `joint` in row `i` by the parabola through three rows.
+    fn rate(&self, joints: usize, joint: usize, i: usize, [a, b, c]: [usize; 3]) -> [f64; 2] {
+        let (t, q) = (|k: usize| self.time[k], |k: usize| self.q[k * joints + joint]);
+        let slope = (q(c) - q(a)) / (t(c) - t(a));
+        if a == b {
+            return [slope, 0.0];
+        }
+        let curvature = ((q(c) - q(b)) / (t(c) - t(b)) - (q(b) - q(a)) / (t(b) - t(a))) / (t(c) - t(a));
+        [slope + curvature * (2.0 * t(i) - t(a) - t(c)), 2.0 * curvature]
+    }
+
+    /// The track of a file of `rows` data rows, with a word to the user; fails where `motion` asks for velocities and the rows are too
+    /// far apart in time for them, and where those that the file gives are in another unit.
+    pub(super) fn track(self, motion: Option<&Motion>, rows: u64, arm: &Arm, label: &str, context: &Context) -> Result<Track> {
+        let joints = arm.joints();
+        let mut steps: Vec<f64> =
+            self.time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0 && step.is_finite()).collect();
+        let middle = steps.len() / 2;
+        let given = self.given.iter().any(|value| value.is_finite());
+        if steps.is_empty() && (given || motion.is_none()) {
+            return Ok(Track { joints, rates: Vec::new() });
+        }
+        if steps.is_empty() {
+            return Err(Error::data(label, "the times of no two rows in a row ascend: joint velocities cannot be derived"));
+        }
+        let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let gap = motion.and_then(|motion| motion.gap_s).unwrap_or(GAP * usual);
+        let reach = (0.5 * motion.map_or(0.0, |motion| motion.over_s) / usual - 1e-9).ceil().max(1.0) as usize;
+        let mut rates = vec![f64::NAN; rows as usize * 2 * joints];
+        let (mut lonely, mut start) = (0, 0);
+        let (mut squares, mut errors) = (vec![0.0; joints], vec![0.0; joints]);
+        let (mut theirs, mut both) = (vec![0.0; joints], vec![0.0; joints]);
+        while start < self.time.len() {
+            let connected =
+                |k: &usize| (0.0..=gap).contains(&(self.time[*k] - self.time[*k - 1])) && self.time[*k] > self.time[*k - 1];
+            let end = (start + 1..self.time.len()).take_while(connected).last().unwrap_or(start);
+            for i in start..=end {
+                let Some(near) = self.around(i, [start, end], reach) else {
+                    lonely += 1;
+                    continue;
+                };
+                let far = self.around(i, [start, end], 2 * reach).filter(|far| far[0] < near[0] && far[2] > near[2]);
+                let at = (self.numbers[i] as usize - 1) * 2 * joints;
+                for joint in 0..joints {
+                    let [velocity, acceleration] = self.rate(joints, joint, i, near);
+                    rates[at + joint] = velocity;
+                    rates[at + joints + joint] = acceleration;
+                    if let Some(far) = far {
+                        squares[joint] += velocity * velocity;
+                        errors[joint] += ((self.rate(joints, joint, i, far)[0] - velocity) / 3.0).powi(2);
+                    }
+                    let given = self.given.get(i * joints + joint).copied().unwrap_or(f64::NAN);
+                    if given.is_finite() {
+                        theirs[joint] += given * given;
+                        both[joint] += given * velocity;
+                    }
+                }
+            }
+            start = end + 1;
+        }
+        let fastest = |sums: &[f64]| sums.iter().copied().fold(0.0, f64::max);
+        // The joint that moves most of each kind speaks for the others.
+        let rough = |prismatic: bool| {
+            let own = |sums: &[f64]| -> Vec<f64> {
+                sums.iter().zip(&arm.prismatic).filter(|(_, slides)| **slides == prismatic).map(|(sum, _)| *sum).collect()
+            };
+            let (all, wrong) = (own(&squares).iter().sum::<f64>(), own(&errors).iter().sum::<f64>());
+            if all > 0.0 { (wrong / all).sqrt() } else { 0.0 }
+        };
+        let rough = rough(false).max(rough(true));
+        if !given && motion.is_some() {
+            self.tell(rough, usual, gap, lonely, label, context)?;
+        } else if rough > TOO_ROUGH {
+            rates.fill(f64::NAN);
+        } else {
+            for joint in (0..joints).filter(|joint| squares[*joint] > 0.01 * fastest(&squares) && theirs[*joint] > 0.0) {
+                // Least squares either way round: noise in either makes it no larger.
+                let factor = theirs[joint] / both[joint].abs().max(f64::MIN_POSITIVE);
+                let against = both[joint] < 0.0;
+                if against || !(1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&factor) {
+                    let how = if against { "run against".to_string() } else { format!("are {factor:.3} times") };
+                    let message = format!(
+                        "the velocities of joint {} {how} what its positions over time say; allowed: the unit and sign that the file has",
+                        joint + 1
+                    );
+                    return Err(Error::data(label, message));
+                }
+            }
+        }
+        Ok(Track { joints, rates })
+    }
+
+    fn tell(&self, rough: f64, usual: f64, gap: f64, lonely: usize, label: &str, context: &Context) -> Result<()> {
+        let (ms, gap) = (1e3 * usual, 1e3 * gap);
+        if rough > TOO_ROUGH {
+            let message = format!(
+                "rows are {ms:.1} ms apart, too far for the joints' velocities, which would be off by some {:.0} %; where the arm stood at every point leave `motion` out, else log more often or map `velocity`",
+                100.0 * rough
+            );
+            return Err(Error::data(label, message));
+        }
+        let alone = if lonely > 0 { format!("; {lonely} rows between gaps have none") } else { String::new() };
+        context.services.note(format!(
+            "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
+            100.0 * rough
+        ));
+        if rough > ROUGH {
+            context.services.warn(format!(
+                "{label}: the velocities are right to {:.0} % only: log more often, or try `motion: {{over_s: ...}}` where joints are logged coarsely",
+                100.0 * rough
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl Track {
+    fn of(&self, number: u64) -> Option<(&[f64], &[f64])> {
+        let at = usize::try_from(number).ok()?.checked_sub(1)? * 2 * self.joints;
+        Some(self.rates.get(at..at + 2 * self.joints)?.split_at(self.joints))
+    }
+
+    /// Velocities of a data row (from 1) into those of `velocity` that are not known.
+    pub(super) fn fill(&self, number: u64, velocity: &mut [f64]) {
+        let Some((own, _)) = self.of(number) else { return };
+        for (known, own) in velocity.iter_mut().zip(own).filter(|(known, _)| known.is_nan()) {
+            *known = *own;
+        }
+    }
+
+    /// Acceleration of a joint in a data row (from 1), zero where it is not known.
+    pub(super) fn acceleration(&self, number: u64, joint: usize) -> f64 {
+        self.of(number).and_then(|(_, all)| all.get(joint)).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> Samples {
+        let mut samples = Samples::default();
+        times.iter().zip(1..).for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
+        samples
+    }
+
+    #[test]
+    fn a_parabola_in_time_has_its_own_slope_everywhere() {
+        let samples = samples(&[0.0, 0.01, 0.025, 0.03, 0.05], |t| 3.0 * t * t - t);
+        for i in 0..5 {
+            for reach in 1..3 {
+                let around = samples.around(i, [0, 4], reach).unwrap();
+                let [velocity, acceleration] = samples.rate(1, 0, i, around);
+                assert!((velocity - (6.0 * samples.time[i] - 1.0)).abs() < 1e-12 && (acceleration - 6.0).abs() < 1e-9);
+            }
+        }
+        assert_eq!(samples.around(2, [2, 2], 1), None);
+        assert_eq!(samples.around(2, [1, 2], 1), Some([1, 1, 2]));
+    }
+}

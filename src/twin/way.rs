@@ -1,0 +1,127 @@
+//! A way through joint space, smooth and at random: waves that never stop, or moves from pose to pose by polynomials of fifth degree.
+
+use super::arm::Arm;
+use super::noise::{Noise, Purpose};
+use super::plan::{self, Poses};
+use crate::robot::description::{JointKind, RobotDescription};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// How the arm travels while it is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Way {
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// Fastest that a joint turns, deg/s (mm/s for a prismatic joint).
+    pub speed_deg_s: f64,
+    pub shape: Shape,
+    /// Standstill between two moves, s.
+    pub dwell_s: f64,
+    /// Time for which a joint's deviation (`repeatability_arcsec`) lasts, s; 0: a new one in every row.
+    pub wander_s: f64,
+    /// Whether the controller logs joint velocities.
+    pub log_velocity: bool,
+}
+
+impl Default for Way {
+    fn default() -> Self {
+        Self { rate_hz: 100.0, speed_deg_s: 40.0, shape: Shape::Waves, dwell_s: 0.0, wander_s: 0.0, log_velocity: true }
+    }
+}
+
+/// Shapes of a way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// Three sines a joint; within the joints' range, but neither `floor_mm` nor `clearance_mm` is kept.
+    Waves,
+    /// From one allowed pose to the next, all joints together, at rest at either end.
+    Moves,
+}
+
+/// A drawn way.
+pub enum Path {
+    /// Middle, and amplitude, angular frequency, phase of each wave, of every joint.
+    Waves(Vec<(f64, [[f64; 3]; 3])>),
+    Moves(Vec<Move>),
+}
+
+/// From a pose to the next.
+pub struct Move {
+    start_s: f64,
+    duration_s: f64,
+    from: Vec<f64>,
+    to: Vec<f64>,
+}
+
+/// Amplitudes of the three waves as shares of half the range, and their frequencies as multiples of the first.
+const SHARES: [f64; 3] = [0.5, 0.28, 0.15];
+const FREQUENCIES: [f64; 3] = [1.0, 1.7, 2.9];
+/// Time before the first row and after the last one, s: the arm moves already, and clocks may be apart.
+const MARGIN_S: f64 = 2.0;
+/// The fastest moment of a move of fifth degree, in travel over duration.
+const PEAK: f64 = 1.875;
+/// No move is shorter, s.
+const SHORTEST_S: f64 = 0.3;
+
+impl Path {
+    /// A way of so many seconds; fails where no pose is allowed.
+    pub fn draw(way: &Way, robot: &RobotDescription, arm: &Arm, poses: &Poses, seconds: f64, seed: u64) -> Result<Self, String> {
+        let ranges = plan::ranges(robot, poses)?;
+        let mut draw = Noise::new(seed, Purpose::Poses);
+        let speeds: Vec<f64> = robot
+            .joints
+            .iter()
+            .map(|joint| if joint.kind == JointKind::Revolute { way.speed_deg_s.to_radians() } else { 1e-3 * way.speed_deg_s })
+            .collect();
+        if way.shape == Shape::Waves {
+            let joints = ranges.iter().zip(&speeds);
+            return Ok(Self::Waves(joints.map(|(range, speed)| waves(*range, *speed, &mut draw)).collect()));
+        }
+        let mut moves: Vec<Move> = Vec::new();
+        let (mut at, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
+        let mut time = -MARGIN_S;
+        while time < seconds + MARGIN_S {
+            let (to, _) = plan::allowed(arm, poses, &ranges, &mut draw)?;
+            let longest = at.iter().zip(&to).zip(&speeds).map(|((a, b), speed)| PEAK * (b - a).abs() / speed);
+            let duration_s = longest.fold(SHORTEST_S, f64::max);
+            let from = std::mem::replace(&mut at, to.clone());
+            moves.push(Move { start_s: time, duration_s, from, to });
+            time += duration_s + way.dwell_s;
+        }
+        Ok(Self::Moves(moves))
+    }
+
+    /// Joint positions and velocities at a time, rad or m, and a second.
+    pub fn at(&self, time: f64) -> (Vec<f64>, Vec<f64>) {
+        match self {
+            Self::Waves(joints) => {
+                let sum = |of: &dyn Fn(&[f64; 3]) -> f64, waves: &[[f64; 3]; 3]| waves.iter().map(of).sum::<f64>();
+                let place = |[size, pace, phase]: &[f64; 3]| size * (pace * time + phase).sin();
+                let speed = |[size, pace, phase]: &[f64; 3]| size * pace * (pace * time + phase).cos();
+                joints.iter().map(|(middle, waves)| (middle + sum(&place, waves), sum(&speed, waves))).unzip()
+            }
+            Self::Moves(moves) => {
+                let next = moves.partition_point(|one| one.start_s <= time).max(1) - 1;
+                let Some(one) = moves.get(next) else { return (Vec::new(), Vec::new()) };
+                let u = ((time - one.start_s) / one.duration_s).clamp(0.0, 1.0);
+                let share = u * u * u * (10.0 - u * (15.0 - 6.0 * u));
+                let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) / one.duration_s;
+                one.from.iter().zip(&one.to).map(|(from, to)| (from + share * (to - from), rate * (to - from))).unzip()
+            }
+        }
+    }
+}
+
+fn waves([low, high]: [f64; 2], speed: f64, draw: &mut Noise) -> (f64, [[f64; 3]; 3]) {
+    let half = 0.5 * (high - low);
+    let sizes = SHARES.map(|share| half * share * draw.uniform(0.7, 1.0));
+    let paces = FREQUENCIES.map(|times| times * draw.uniform(0.9, 1.1));
+    // Never faster than allowed, even where all waves meet.
+    let fastest: f64 = sizes.iter().zip(&paces).map(|(size, pace)| size * pace).sum();
+    let first = speed * draw.uniform(0.6, 1.0) / fastest.max(1e-12);
+    let wave = |k: usize, draw: &mut Noise| [sizes[k], first * paces[k], draw.uniform(0.0, TAU)];
+    (0.5 * (low + high), [wave(0, draw), wave(1, draw), wave(2, draw)])
+}
