@@ -12,7 +12,7 @@ mod tell;
 
 pub use sight::{Score, Sight};
 pub use site::{Circumstances, Site};
-pub use tell::{Contest, Proposed, Side, Told, tell};
+pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
 
 use super::model::Model;
 use crate::robot::{Measurements, Named};

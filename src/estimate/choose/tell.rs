@@ -55,6 +55,9 @@ pub struct Proposed {
     pub random: [f64; 2],
 }
 
+/// Explanations whose L is below this cannot be told apart.
+pub const TOLD: f64 = 25.0;
+
 /// Of a squared effect less than this is rounding and second order.
 const NOTHING: f64 = 1e-6;
 
@@ -116,7 +119,7 @@ pub fn tell(
     let alike = [0, 1].map(|truth| {
         let whole = |rows: &Mat<f64>| rows.col(rows.ncols() - 1).squared_norm_l2();
         let seen = gather(&views[truth].sight.rows(model, data), rows);
-        views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
+        before[truth] < TOLD && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
     });
     if alike == [true; 2] {
         return Ok(Told { before, alike, proposed: None });

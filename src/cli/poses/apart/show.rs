@@ -4,11 +4,8 @@ use super::Apart;
 use crate::cli::poses::output::{self, Drive};
 use crate::cli::poses::show::closing;
 use crate::diagnose::other_means;
-use crate::estimate::choose::{Proposed, Told};
+use crate::estimate::choose::{Proposed, TOLD, Told};
 use serde_json::{Value, json};
-
-/// Explanations whose expected L is below this cannot be told apart.
-const TOLD: f64 = 25.0;
 
 /// Nobody measures more poses than these.
 const MOST: f64 = 10_000.0;
