@@ -202,7 +202,7 @@ fn leaves(main: &str) -> &'static [&'static str] {
         "counterbalance" | "cable_drag" => &["gear_cyclic", "unknown", "joint_table", "backlash"],
         "joint_hardening" => &["backlash", "unknown"],
         "joint_compliance" => &["unknown"],
-        "backlash" => &["joint_hardening", "unknown"],
+        "backlash" => &["joint_hardening", "joint_compliance", "unknown"],
         "gear_cyclic" | "joint_table" => &["unknown"],
         "unknown" => &["gear_cyclic", "joint_table"],
         _ => &[],
@@ -223,7 +223,11 @@ fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>
     for (small, own) in &gains {
         let main = gains
             .iter()
-            .filter(|(main, gain)| main.1 == small.1 && *own < REFINEMENT * **gain && leaves(main.0).contains(&small.0))
+            .filter(|(main, gain)| {
+                let finer = main.1 == small.1 && *own < REFINEMENT * **gain && leaves(main.0).contains(&small.0);
+                // Both go with the side of the last move.
+                finer || (main.0 == "joint_log_lag" && small.0 == "backlash" && *own < TRACE * **gain)
+            })
             .max_by(|a, b| a.1.total_cmp(b.1));
         if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
             let members = groups.remove(small).unwrap_or_default();
@@ -270,8 +274,9 @@ fn reversals(last: &Course) -> Vec<Finding> {
 /// A reversed joint's ratio is -1 to this.
 const REVERSED_WITHIN: f64 = 0.1;
 
-/// Less than this share of a finding's gain at its own joint is its finer shape.
+/// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
 const REFINEMENT: f64 = 0.1;
+const TRACE: f64 = 0.05;
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {

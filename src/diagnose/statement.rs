@@ -87,10 +87,19 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
         }
         "coupling_ratio" => format!("{place}: the second moves with the first by {} of its angle", value(first)),
         "joint_log_lag" => match first {
-            Some(n) => format!(
+            Some(n) if numbers.len() == 1 => format!(
                 "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
                 n.value * 100.0
             ),
+            Some(_) => {
+                let shares = numbers.iter().filter(|n| n.name.starts_with("share"));
+                let most = shares.max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
+                format!(
+                    "joints were logged before the arm had settled, each by a share of its own: up to {:.2} % of the last move was \
+                     still to come",
+                    most.map_or(0.0, |n| n.value * 100.0)
+                )
+            }
             None => "joints and points do not belong to the same moment".to_string(),
         },
         _ => {

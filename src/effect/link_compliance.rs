@@ -39,6 +39,8 @@ pub(super) const SHORT: f64 = 1e-6;
 /// The last links are a stubby wrist, and hardly bend: -2 ln of the odds.
 const WRIST: usize = 2;
 const UNLIKELY: f64 = 10.0;
+/// Most of an arm's elasticity is in its gears: -2 ln of the odds that it is a link.
+const RARER: f64 = 4.0;
 
 impl LinkCompliance {
     /// Every link that something hangs on.
@@ -48,7 +50,7 @@ impl LinkCompliance {
         let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
         let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
         let forms = links.flat_map(|link| bendings.map(|bending| Self { link, bending }));
-        let odds = |form: &Self| if form.link + WRIST >= n { UNLIKELY } else { 0.0 };
+        let odds = |form: &Self| if form.link + WRIST >= n { UNLIKELY } else { RARER };
         forms
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().charged(odds))

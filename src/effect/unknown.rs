@@ -3,75 +3,12 @@
 use super::form::{cosines, parameters};
 use super::frame_shift::{MOTION, unit};
 use super::joint_table::PLAUSIBLE;
+use super::signature::Signature;
 use super::thermal_growth::Warmth;
 use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-
-/// What an unknown motion depends on, and how.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Signature {
-    /// A smooth function of a joint position.
-    Angle { by: usize, low: f64, high: f64 },
-    /// A bump around a joint position.
-    Bump { centre_rad: f64, width_rad: f64 },
-    /// A hinge: nothing up to a joint position, then in proportion.
-    Hinge { by: usize, from_rad: f64, upwards: bool },
-    /// A sine of another joint's angle.
-    Periodic { by: usize, order: u32 },
-    /// Products of sines and cosines of two angles.
-    Product { a: usize, b: usize },
-    /// A smooth function of two joint positions.
-    Surface { a: usize, b: usize, a_range: [f64; 2], b_range: [f64; 2] },
-    /// A slow sine in time.
-    Sway { period_s: f64 },
-    /// A smooth function of time.
-    Time { start_s: f64, end_s: f64 },
-    /// One way in time, by a power of it.
-    Creep { start_s: f64, end_s: f64, power: f64 },
-    /// With temperature or warm-up.
-    Warming(Warmth),
-    /// Other on either side: a seat with play, by which side of an axis of the tool (0 to 2, zero pose) hangs down.
-    Side { axis: usize },
-    /// With the direction of gravity as the tool sees it: a mounting that yields.
-    Sag,
-    /// Differs where a payload is carried.
-    Payload { above_kg: f64 },
-}
-
-impl fmt::Display for Signature {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Angle { by, .. } => write!(f, "function of q{}", by + 1),
-            Self::Bump { centre_rad, width_rad } => {
-                write!(f, "local bump at {:.1} deg, width {:.1} deg", centre_rad.to_degrees(), width_rad.to_degrees())
-            }
-            Self::Hinge { by, from_rad, upwards } => {
-                let side = if *upwards { "above" } else { "below" };
-                write!(f, "grows with q{} {side} {:.1} deg, nothing on the other side", by + 1, from_rad.to_degrees())
-            }
-            Self::Periodic { by, order } => write!(f, "periodic in q{}, {order} a turn", by + 1),
-            Self::Product { a, b } => write!(f, "product of functions of q{} and q{}", a + 1, b + 1),
-            Self::Surface { a, b, .. } => write!(f, "function of q{} and q{}", a + 1, b + 1),
-            Self::Sway { period_s } => write!(f, "sways with a period of {period_s:.0} s"),
-            Self::Time { .. } => f.write_str("function of time"),
-            Self::Creep { power, .. } if (power - 1.0).abs() < 0.3 => f.write_str("creeps steadily with time"),
-            Self::Creep { power, .. } => {
-                write!(f, "creeps with time, {} and {0}", if *power > 1.0 { "faster" } else { "slower" })
-            }
-            Self::Warming(_) => f.write_str("goes with the warm-up"),
-            Self::Side { axis } => {
-                let name = ["x", "y", "z"].get(*axis).unwrap_or(&"z");
-                write!(f, "other on either side of its {name}: which one hangs down decides, as where a seat has play")
-            }
-            Self::Sag => f.write_str("goes with the direction in which it hangs, as where a mounting yields"),
-            Self::Payload { .. } => f.write_str("differs with the payload"),
-        }
-    }
-}
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unknown {
@@ -84,6 +21,8 @@ const CURVE: usize = 8;
 const EACH: usize = 3;
 /// Rows within a bump's width: fewer make a bump of any single wrong point.
 const SUPPORT: usize = 5;
+/// The widest bump or step as a share of the joint's travel.
+const LOCAL: f64 = 0.2;
 /// Widths (rad) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 /// Powers of time by which something creeps.
@@ -133,7 +72,11 @@ impl Unknown {
         if end_s > start_s {
             add(Place::Base, Signature::Time { start_s, end_s }, 1, 0.0);
             let periods = SWAYS.map(|share| share * (end_s - start_s));
-            periods.into_iter().for_each(|period_s| add(Place::Base, Signature::Sway { period_s }, SWAYS.len(), 0.0));
+            for period_s in periods {
+                [false, true]
+                    .into_iter()
+                    .for_each(|turns| add(Place::Base, Signature::Sway { period_s, turns }, 2 * SWAYS.len(), 0.0));
+            }
         }
         (0..3).for_each(|axis| add(Place::Tool, Signature::Side { axis }, 3, 0.0));
         add(Place::Tool, Signature::Sag, 1, 0.0);
@@ -153,18 +96,23 @@ impl Unknown {
         };
         let n = survey.joints();
         let [low, high] = survey.range[joint];
-        let bumps = (survey.travel(joint) / 0.1) as usize + 1;
+        let places = (survey.travel(joint) / 0.1) as usize + 1;
+        // Centre and width are fitted, too: as much as two numbers in the criterion.
+        let two_numbers = 3 * survey.rows.len();
         for width_rad in WIDTHS {
             let count = ((high - low - 0.5 * width_rad) / width_rad).ceil().max(0.0) as usize;
             let centres = (0..count).map(|k| low + width_rad * (k as f64 + 0.5));
             for centre_rad in centres.filter(|centre| supported(survey, joint, *centre, width_rad)) {
-                add(Signature::Bump { centre_rad, width_rad }, bumps, 0.0);
+                add(Signature::Bump { centre_rad, width_rad }, two_numbers, 0.0);
+                if width_rad > WIDTHS[0] {
+                    add(Signature::Step { centre_rad, width_rad }, two_numbers, 0.0);
+                }
             }
         }
         for share in [0.25, 0.5, 0.75] {
             for upwards in [true, false] {
                 let from_rad = low + share * (high - low);
-                add(Signature::Hinge { by: joint, from_rad, upwards }, bumps, 0.0);
+                add(Signature::Hinge { by: joint, from_rad, upwards }, places, 0.0);
             }
         }
         for by in 0..n {
@@ -200,6 +148,10 @@ impl Unknown {
                 let distance = (at(joint) - centre_rad) / width_rad;
                 each(0, libm::exp(-distance * distance));
             }
+            Signature::Step { centre_rad, width_rad } => {
+                let Place::Joint(joint) = self.place else { return };
+                each(0, libm::tanh((at(joint) - centre_rad) / width_rad));
+            }
             Signature::Hinge { by, from_rad, upwards } => {
                 let beyond = at(by) - from_rad;
                 each(0, if upwards { beyond.max(0.0) } else { (-beyond).max(0.0) });
@@ -218,7 +170,7 @@ impl Unknown {
                     cosines(at(b), b_range, EACH).enumerate().for_each(|(k, y)| each(EACH * i + k, x * y));
                 }
             }
-            Signature::Sway { period_s } => {
+            Signature::Sway { period_s, .. } => {
                 let (sine, cosine) = libm::sincos(std::f64::consts::TAU * state.time() / period_s);
                 each(0, sine);
                 each(1, cosine);
@@ -266,9 +218,14 @@ impl Unknown {
         }
     }
 
-    /// Directions at a frame: displacement of a tool or a swaying base, all of a base else.
-    fn axes(&self) -> usize {
-        if self.place == Place::Tool || matches!(self.signature, Signature::Sway { .. }) { 3 } else { 6 }
+    /// Directions at a frame, of [`MOTION`]: displacement of a tool, one kind of motion of a swaying base, all of a base else.
+    fn axes(&self) -> std::ops::Range<usize> {
+        match self.signature {
+            Signature::Sway { turns: true, .. } => 3..6,
+            Signature::Sway { .. } => 0..3,
+            _ if self.place == Place::Tool => 0..3,
+            _ => 0..6,
+        }
     }
 }
 
@@ -285,7 +242,7 @@ impl Effect for Unknown {
                 (1..=self.count()).map(|k| (format!("c{k}"), unit, size)).collect()
             }
             _ => (1..=self.count())
-                .flat_map(|k| MOTION.into_iter().take(self.axes()).map(move |m| (format!("{}{k}", m.0), m.1, 0.01)))
+                .flat_map(|k| self.axes().map(move |axis| (format!("{}{k}", MOTION[axis].0), MOTION[axis].1, 0.01)))
                 .collect(),
         };
         parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
@@ -295,7 +252,7 @@ impl Effect for Unknown {
         let (axes, station) = (self.axes(), self.station(state));
         self.values(state, |k, value| match self.place {
             Place::Joint(joint) => out.turn(k, p, joint, value),
-            _ => (0..axes).for_each(|axis| out.shift(axes * k + axis, p, station, unit(axis) * value)),
+            _ => axes.clone().for_each(|axis| out.shift(axes.len() * k + axis - axes.start, p, station, unit(axis) * value)),
         });
     }
 
@@ -304,8 +261,12 @@ impl Effect for Unknown {
     }
 }
 
-/// Whether enough rows lie within a bump.
+/// Whether a bump or step is local, and enough rows lie within it: a wide one stands in for any law of the angle.
 fn supported(survey: &Survey, joint: usize, centre_rad: f64, width_rad: f64) -> bool {
+    let [low, high] = survey.range[joint];
+    if width_rad > LOCAL * (high - low) || !(low..=high).contains(&centre_rad) {
+        return false;
+    }
     let within = |row: &&usize| (survey.data.q(**row)[joint] - centre_rad).abs() < width_rad;
     survey.rows.iter().filter(within).take(SUPPORT).count() == SUPPORT
 }
@@ -318,17 +279,18 @@ impl Placed for Unknown {
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let with = |signature| Form::from(Self { place: self.place, signature });
         match self.signature {
-            Signature::Bump { centre_rad, width_rad } => {
+            Signature::Bump { centre_rad, width_rad } | Signature::Step { centre_rad, width_rad } => {
                 let step = libm::exp2(-f64::from(level));
                 let power = libm::exp2(-0.5 * f64::from(level));
                 let widths = [0.75, 1.0, 1.33].map(|factor| width_rad * libm::pow(factor, power));
                 let centres = [-0.4, 0.0, 0.4].map(|share| centre_rad + share * width_rad * step);
                 let pairs = centres.into_iter().flat_map(|c| widths.map(|w| (c, w)));
                 let Place::Joint(joint) = self.place else { return Vec::new() };
-                pairs
-                    .filter(|(centre, width)| supported(survey, joint, *centre, *width))
-                    .map(|(centre_rad, width_rad)| with(Signature::Bump { centre_rad, width_rad }))
-                    .collect()
+                let shape = |(centre_rad, width_rad)| match self.signature {
+                    Signature::Step { .. } => Signature::Step { centre_rad, width_rad },
+                    _ => Signature::Bump { centre_rad, width_rad },
+                };
+                pairs.filter(|(centre, width)| supported(survey, joint, *centre, *width)).map(|pair| with(shape(pair))).collect()
             }
             Signature::Hinge { by, from_rad, upwards } => {
                 let [low, high] = survey.range[by];
@@ -336,9 +298,9 @@ impl Placed for Unknown {
                 let places = [from_rad - step, from_rad + step].into_iter().filter(|at| *at > low && *at < high);
                 places.map(|from_rad| with(Signature::Hinge { by, from_rad, upwards })).collect()
             }
-            Signature::Sway { period_s } => {
+            Signature::Sway { period_s, turns } => {
                 let step = libm::pow(1.15, libm::exp2(-0.7 * f64::from(level)));
-                [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor })).to_vec()
+                [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor, turns })).to_vec()
             }
             Signature::Creep { start_s, end_s, power } => {
                 let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
@@ -355,8 +317,9 @@ impl Placed for Unknown {
             Signature::Angle { by, .. } | Signature::Periodic { by, .. } => format!("q{}", by + 1),
             Signature::Hinge { .. } => "hinge".into(),
             Signature::Bump { .. } => "bump".into(),
+            Signature::Step { .. } => "step".into(),
             Signature::Product { a, b } | Signature::Surface { a, b, .. } => format!("q{}_q{}", a + 1, b + 1),
-            Signature::Sway { .. } => "sway".into(),
+            Signature::Sway { turns, .. } => if turns { "rock" } else { "sway" }.into(),
             Signature::Time { .. } => "time".into(),
             Signature::Creep { .. } => "creep".into(),
             Signature::Warming(_) => "warm".into(),
