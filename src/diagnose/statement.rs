@@ -34,7 +34,7 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             let side = forms.iter().find_map(|form| if let Form::Backlash(b) = form { Some(b.side()) } else { None });
             let by = match side {
                 Some(Side::Load { .. }) => "to the side that the load pushes it".to_string(),
-                Some(Side::Mixed { threshold_nm }) => {
+                Some(Side::Mixed { threshold_nm, .. }) => {
                     format!("to the side of approach under loads below about {threshold_nm:.0} Nm, above to that of the load")
                 }
                 Some(Side::Approach) => "by the direction from which it came".to_string(),

@@ -14,8 +14,13 @@ pub enum Side {
     Approach,
     /// The sign of the load, blurred over some torque.
     Load { width_nm: f64 },
-    /// The direction of approach under small loads, the sign of the load above.
-    Mixed { threshold_nm: f64 },
+    /// Friction of so many Nm holds the side of approach against smaller loads, larger ones push the joint to theirs; blurred over
+    /// some torque.
+    Mixed {
+        threshold_nm: f64,
+        #[serde(default)]
+        width_nm: f64,
+    },
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,6 +28,9 @@ pub struct Backlash {
     joint: usize,
     side: Side,
 }
+
+/// Widths of the blur as shares of the threshold.
+const BLURS: [f64; 2] = [0.0, 0.5];
 
 impl Backlash {
     pub fn side(&self) -> Side {
@@ -41,8 +49,10 @@ impl Backlash {
                     let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
                     loads.sort_by(f64::total_cmp);
                     let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
-                    let mixed = shares.map(|threshold_nm| Self { joint, side: Side::Mixed { threshold_nm } });
-                    out.extend(mixed.map(|form| Hypothesis::new(form, 5).positive()));
+                    for threshold_nm in shares {
+                        let sides = BLURS.map(|blur| Side::Mixed { threshold_nm, width_nm: blur * threshold_nm });
+                        out.extend(sides.map(|side| Hypothesis::new(Self { joint, side }, 5 * BLURS.len()).positive()));
+                    }
                 }
             }
             if both {
@@ -66,10 +76,10 @@ impl Effect for Backlash {
         let side = match self.side {
             Side::Approach => state.direction(self.joint),
             Side::Load { width_nm } => libm::tanh(state.torque()[self.joint] / width_nm),
-            Side::Mixed { threshold_nm } => match state.torque()[self.joint] {
-                small if small.abs() < threshold_nm => state.direction(self.joint),
-                torque => torque.signum(),
-            },
+            Side::Mixed { threshold_nm, width_nm } => {
+                let push = state.torque()[self.joint] + threshold_nm * state.direction(self.joint);
+                if width_nm > 0.0 { libm::tanh(push / width_nm) } else { push.signum() }
+            }
         };
         out.turn(0, p, self.joint, side);
     }
@@ -85,11 +95,11 @@ impl Placed for Backlash {
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        let Side::Mixed { threshold_nm } = self.side else { return Vec::new() };
+        let Side::Mixed { threshold_nm, width_nm } = self.side else { return Vec::new() };
         let power = libm::exp2(-0.5 * f64::from(level));
         let factors = [1.6, 1.25, 0.8, 0.625].map(|factor| libm::pow(factor, power));
-        factors
-            .map(|factor| Self { joint: self.joint, side: Side::Mixed { threshold_nm: threshold_nm * factor } }.into())
-            .to_vec()
+        let with = |threshold_nm, width_nm| Self { joint: self.joint, side: Side::Mixed { threshold_nm, width_nm } }.into();
+        let wider = factors.into_iter().filter(|_| width_nm > 0.0).map(|factor| with(threshold_nm, width_nm * factor));
+        factors.into_iter().map(|factor| with(threshold_nm * factor, width_nm)).chain(wider).collect()
     }
 }

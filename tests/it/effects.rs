@@ -121,7 +121,7 @@ fn the_order_of_effects_is_irrelevant() {
 #[test]
 fn every_effect_is_registered_under_its_own_name_and_its_parameters_are_named_after_it() {
     let files = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/effect")).expect("the effects' folder");
-    let machinery = ["mod", "catalogue", "deflection", "stack", "form", "place", "survey"];
+    let machinery = ["mod", "catalogue", "deflection", "stack", "form", "place", "signature", "survey"];
     // One mounting steps like another: base and tool share a file.
     let file = |name: &str| if ["base_shift", "tool_shift"].contains(&name) { "frame_shift".into() } else { name.to_string() };
     let mut names: Vec<String> = files
