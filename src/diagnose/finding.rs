@@ -124,7 +124,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         let gain = whole.gain - without.gain;
         let rank = whole.rank.saturating_sub(without.rank).max(1);
         let freedom = pool.lines.saturating_sub(pool.rank() + whole.rank).max(1) as f64;
-        let f_statistic = gain / rank as f64 / ((pool.square - whole.gain) / freedom);
+        let f_statistic = gain / rank as f64 / ((pool.square - whole.gain) / freedom) * pool.count / pool.lines as f64;
         let mut numbers = Vec::new();
         for i in &members {
             let range = &ranges[*i];
@@ -167,7 +167,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     }
     let data = looked.survey.data;
     let by_the_way_there = |form: &Form| match form {
-        Form::JointLogLag(_) => true,
+        Form::JointLogLag(lag) => !lag.is_time(),
         Form::Backlash(_) => data.direction.is_none(),
         _ => false,
     };
@@ -318,6 +318,8 @@ fn of_the_recording(effect: &'static str, statement: String) -> Finding {
 fn people(unit: Unit) -> (Unit, &'static str) {
     match unit {
         Unit::Radian => (Unit::Arcsecond, "arcsec"),
+        Unit::Second => (Unit::Millisecond, "ms"),
+        Unit::RadianPerRadianPerSecond => (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)"),
         other => (other, other.symbol()),
     }
 }

@@ -68,7 +68,7 @@ fn matching(pool: &Pool, state: &State, hypotheses: &[usize], seen: f64, drawn: 
                 let columns = pool.all().subcols(first, end - first);
                 matmul(gradients.as_mut(), Accum::Replace, columns.transpose(), drawn, 1.0, Par::Seq);
                 // The gain that would lower the criterion by as much as what was seen.
-                let n = lines as f64;
+                let n = pool.count;
                 let rank = state.gain(pool, *h).1;
                 let needed = 1.0 - (-(seen + n.ln() * rank as f64 + pool.charge[*h]) / n).exp();
                 state.gains(pool, *h, &gradients, |draw, gain, rank| {

@@ -3,6 +3,7 @@
 use super::pool::Pool;
 use super::{ALIKE, Chosen, Course, Question, fitted, held_down, start_of};
 use crate::effect::{Effect, Form, Placed};
+use crate::estimate::rows_alike;
 use crate::robot::Measurements;
 use std::collections::BTreeMap;
 
@@ -20,8 +21,8 @@ const CLEARLY: f64 = 2.0;
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
 
-/// Squared errors (m2) of held-out rows that belong, by row.
-struct HeldOut(BTreeMap<usize, f64>);
+/// Squared errors (m2) of held-out rows that belong, by row, and whether they lie along a path.
+struct HeldOut(BTreeMap<usize, f64>, bool);
 
 impl HeldOut {
     /// `None` where no row is held out.
@@ -31,7 +32,7 @@ impl HeldOut {
         let rows = question.validate.iter().filter(|row| !aside(row));
         let squares: BTreeMap<usize, f64> =
             rows.map(|row| (*row, (data.position[*row] - predicted[*row]).norm_squared())).collect();
-        (!squares.is_empty()).then_some(Self(squares))
+        (!squares.is_empty()).then(|| Self(squares, data.in_motion(question.validate)))
     }
 
     fn rms(&self) -> f64 {
@@ -49,6 +50,9 @@ impl HeldOut {
         let count = falls.len() as f64;
         let mean = falls.iter().sum::<f64>() / count;
         let variance = falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        // Rows along a path are not as many opinions as there are rows.
+        let off: Vec<f64> = falls.iter().map(|fall| fall - mean).collect();
+        let count = if self.1 { count / rows_alike(&off, 1) } else { count };
         self.rms() < other.rms() * (1.0 - WORSE) && mean > CLEARLY * (variance / count).sqrt()
     }
 }

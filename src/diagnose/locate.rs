@@ -104,7 +104,9 @@ fn variables(form: &Form) -> impl Iterator<Item = String> {
             _ => vec!["time".into()],
         },
         Form::PayloadError(_) => vec!["payload".into()],
+        Form::JointLogLag(lag) if lag.is_time() => vec!["speed".into()],
         Form::JointLogLag(_) => vec!["last move".into()],
+        Form::ViscousWindup(_) => own("speed of joint"),
         Form::LinkCompliance(_) | Form::BaseCompliance(_) | Form::LinkMass(_) => vec!["load of the arm".into()],
         Form::CouplingRatio(_) => Vec::new(),
         Form::Unknown(unknown) => match unknown.signature() {

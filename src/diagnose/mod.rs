@@ -18,6 +18,7 @@ mod sense;
 mod separate;
 mod state;
 mod statement;
+mod unseen;
 mod verdict;
 
 pub use finding::{Evidence, Finding, Number, Rival};
@@ -31,7 +32,7 @@ use crate::effect::{
     BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, Place, Placed, ReductionRatio, Setting,
     Survey,
 };
-use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened};
+use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened, rows_alike};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
 use nalgebra::Matrix3;
@@ -72,6 +73,9 @@ const TYPICAL: f64 = 2.0 * 1.4826;
 /// held down to this share.
 const SLOW: usize = 3;
 const GEOMETRY: f64 = 0.2;
+/// Rows that count as fewer than this are independent; with fewer stretches than this signs by stretch say nothing.
+const ALONE: f64 = 1.2;
+const STRETCHES: usize = 40;
 /// A repeatability that changes by less than this share is settled.
 const SETTLED: f64 = 0.25;
 
@@ -115,12 +119,13 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     loop {
         round += 1;
         let looked_at = thinned(&now.screening.kept);
-        let pose = poses(&data, &looked_at);
         let yielding = yielding(&now.model);
         let lens = Lens::new(&now.model, &data, &looked_at, yielding.iter().any(|compliance| *compliance > 0.0));
+        let alike = alike(&data, &looked_at, &lens);
+        let pose = poses(&data, &looked_at, alike);
         let torque = lens.torques();
         let survey = Survey::new(robot, &data, &looked_at, &torque, &yielding);
-        let mut pool = pool_of(&lens, &now, &free, &survey);
+        let mut pool = pool_of(&lens, &now, &free, &survey).with_alike(alike);
         located.get_or_insert_with(|| locate::locate(&pool, &pool.state(&[]), &survey));
         let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
         let mut search = Search::new(&mut pool, &survey, &pose, options);
@@ -334,8 +339,18 @@ fn thinned(rows: &[usize]) -> Vec<usize> {
     (0..rows.len()).filter(chosen).map(|i| rows[i]).collect()
 }
 
-/// Poses of rows, numbered in order: repeats share one.
-fn poses(data: &Measurements, rows: &[usize]) -> Vec<usize> {
+/// How many rows of a moving arm count as one, by what is left; of standing points each is one.
+fn alike(data: &Measurements, rows: &[usize], lens: &Lens) -> f64 {
+    let alike = if data.in_motion(rows) { rows_alike(&lens.residual[..3 * rows.len()], 3) } else { 1.0 };
+    if alike < ALONE { 1.0 } else { alike.min(rows.len() as f64 / STRETCHES as f64).max(1.0) }
+}
+
+/// Poses of rows, numbered in order: repeats share one. Where some rows are alike, stretches beyond which what is left is forgotten.
+fn poses(data: &Measurements, rows: &[usize], alike: f64) -> Vec<usize> {
+    if alike > 1.0 {
+        let stretch = ((2.0 * alike).ceil() as usize).min(rows.len() / STRETCHES).max(1);
+        return (0..rows.len()).map(|i| i / stretch).collect();
+    }
     let mut out = Vec::with_capacity(rows.len());
     let mut number = 0;
     for (i, row) in rows.iter().enumerate() {

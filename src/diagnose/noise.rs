@@ -27,6 +27,10 @@ pub(crate) fn by_all(by_joint: &[Vector3<f64>]) -> Matrix3<f64> {
 
 /// From immediate repeats among `rows`: row i measured the pose of the row before again. `spread[row]` is [`by_all`] of that row.
 pub(crate) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> Repeatability {
+    if data.in_motion(rows) {
+        // Rows of a halt tell nothing of what the joints do on the way.
+        return Repeatability { sigma: 0.0, repeats: 0 };
+    }
     let pairs: Vec<(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)> = rows
         .windows(2)
         .filter(|pair| pair[1] == pair[0] + 1 && data.same_pose(pair[0], pair[1]))

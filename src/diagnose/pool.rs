@@ -20,6 +20,8 @@ pub(crate) struct Pool<'a> {
     pub keys: Vec<String>,
     /// Lines of the problem.
     pub lines: usize,
+    /// Lines that say something new: fewer where what is left lasts from row to row.
+    pub count: f64,
     /// Orthonormal basis of what the base model absorbs.
     pub base: Mat<f64>,
     /// Projected residual and its square.
@@ -61,6 +63,7 @@ impl<'a> Pool<'a> {
             hypotheses: Vec::new(),
             keys: Vec::new(),
             lines,
+            count: lines as f64,
             base,
             residual,
             square,
@@ -76,6 +79,11 @@ impl<'a> Pool<'a> {
         };
         pool.add(hypotheses);
         pool
+    }
+
+    /// The same where so many rows in a row count as one.
+    pub fn with_alike(self, rows: f64) -> Self {
+        Self { count: self.lines as f64 / rows, ..self }
     }
 
     /// Takes more hypotheses; returns the position of the first.
@@ -167,7 +175,7 @@ impl<'a> Pool<'a> {
         }
         let score = if self.is_sound(set) {
             let solution = super::state::solve(self, set);
-            let n = self.lines as f64;
+            let n = self.count;
             let rest = (self.square - solution.gain).max(1e-300);
             let charges: f64 = set.iter().map(|k| self.charge[*k]).sum();
             n * (rest / n).ln() + n.ln() * solution.rank as f64 + charges + self.sign_charge(set, &solution)

@@ -120,7 +120,7 @@ pub(crate) fn solve(pool: &Pool, set: &[usize]) -> Solution {
     let solved = factor.backward(&forward);
     let rank = factor.rank();
     let freedom = pool.lines.saturating_sub(pool.rank() + rank).max(1) as f64;
-    let scatter = (pool.square - gain).max(0.0) / freedom;
+    let scatter = (pool.square - gain).max(0.0) / freedom * pool.lines as f64 / pool.count;
     let (mut coefficients, mut errors) = (vec![0.0; q], vec![0.0; q]);
     for (a, k) in factor.order.iter().enumerate() {
         let scale = pool.scale[columns[*k]];
@@ -240,13 +240,12 @@ impl State {
             return f64::NEG_INFINITY;
         }
         let (gain, rank) = self.gain(pool, h);
-        if rank == 0 { f64::NEG_INFINITY } else { fall(pool.lines, self.square, gain, rank, pool.charge[h]) }
+        if rank == 0 { f64::NEG_INFINITY } else { fall(pool.count, self.square, gain, rank, pool.charge[h]) }
     }
 }
 
 /// Fall of the criterion by `rank` more numbers that lower the squared residual by `gain`.
-pub(crate) fn fall(lines: usize, square: f64, gain: f64, rank: usize, charge: f64) -> f64 {
-    let n = lines as f64;
+pub(crate) fn fall(n: f64, square: f64, gain: f64, rank: usize, charge: f64) -> f64 {
     n * (square / (square - gain).max(1e-300)).ln() - n.ln() * rank as f64 - charge
 }
 

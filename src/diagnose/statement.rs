@@ -86,6 +86,15 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             format!("the tracker's frame drifts {how}")
         }
         "coupling_ratio" => format!("{place}: the second moves with the first by {} of its angle", value(first)),
+        "joint_log_lag" if forms.iter().any(|form| matches!(form, Form::JointLogLag(lag) if lag.is_time())) => {
+            let ms = first.map_or(0.0, |n| n.value);
+            let (how, when) = if ms < 0.0 { ("early", "before") } else { ("late", "after") };
+            format!(
+                "the tracker's clock is {:.2} ms {how} against the controller's: points were measured that much {when} the joints beside them",
+                ms.abs()
+            )
+        }
+        "viscous_windup" => format!("{place} trails behind in proportion to its speed, by {}", value_short(first)),
         "joint_log_lag" => match first {
             Some(n) if numbers.len() == 1 => format!(
                 "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
@@ -109,6 +118,10 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
         }
     };
     format!("{text} ({:.0} um rms at the tool).", rms * 1e6)
+}
+
+fn value_short(number: Option<&Number>) -> String {
+    number.map_or_else(String::new, |n| format!("{:.2} {}", n.value, n.unit))
 }
 
 fn when(forms: &[Form]) -> String {

@@ -6,6 +6,7 @@ use super::locate::{Located, locate};
 use super::noise::Repeatability;
 use super::pool::Pool;
 use super::statement::{next, not_observable};
+use super::unseen::by_speed;
 use super::{Course, Question, REPEATS, SIGNIFICANT};
 use crate::effect::{Effect, Placed, Survey};
 use crate::estimate::{Fitted, Model, Screening, Weight};
@@ -182,6 +183,8 @@ pub(crate) fn conclude(
     let next_measurements = next(&findings);
     let mut set = looked.set.clone();
     set.sort_unstable();
+    let mut not_observable = not_observable(looked.survey, &looked.pool.lens.reach());
+    not_observable.extend(by_speed(&looked));
     let located_after = locate(looked.pool, &looked.pool.state(&set), looked.survey);
     Diagnosis {
         verdict,
@@ -191,7 +194,7 @@ pub(crate) fn conclude(
         held_out,
         findings,
         screening: last.screening.clone(),
-        not_observable: not_observable(looked.survey, &looked.pool.lens.reach()),
+        not_observable,
         signature,
         next_measurements,
         leftover_rms: square(kept, &|row| (data.position[row] - predicted[row]).norm()),

@@ -9,7 +9,7 @@ pub struct About {
     pub name: &'static str,
     /// Where it sits.
     pub place: &'static str,
-    /// q: joint position, t: load torque of a joint, s: direction of approach, T: temperature; d: turn of the joint.
+    /// q: joint position, dq/dt: its velocity, t: load torque of a joint, s: direction of approach, T: temperature; d: turn of the joint.
     pub formula: &'static str,
     /// On industrial arms.
     pub size: &'static str,
@@ -54,12 +54,13 @@ pub const CATALOGUE: &[About] = &[
     about("payload_error", "tool", "mass and centre of the payload in the torque model", "3 to 30 %", "joint_hardening", "rows with and without the payload"),
     about("cable_drag", "joint", "t by the angles of the joint and its neighbour", "1 to 10 % of the joint's torque", "unknown, gear_cyclic of order 1", "motor currents"),
     about("axis_wobble", "joint", "the axis tilts by sin(n q), cos(n q), n = 1, 2", "5 to 100 arcsec", "gear_cyclic of a neighbour, coupling_ratio", "points far off the axis"),
+    about("viscous_windup", "joint", "d = -c dq/dt: the joint trails in proportion to its speed", "0.2 to 10 arcsec for each deg/s", "joint_log_lag where one joint moves alone", "joint velocities, of a moving arm"),
     about("zero_shift", "joint", "d = c after some time", "10 to 500 arcsec", "base_shift (joint 1), tool_shift (last joint)", "rows in the order of measurement"),
     about("tool_shift", "tool", "the target moves at some time", "20 to 500 um", "zero_shift of the last joints", "rows in the order of measurement"),
     about("base_shift", "base", "the base moves at some time", "20 to 500 um", "zero_shift of joint 1, tracker_drift", "rows in the order of measurement"),
     about("tracker_drift", "tracker", "the tracker's frame moves steadily, with the warm-up, or slowly", "10 to 200 um", "thermal_growth, base_shift", "time"),
     about("tracker_scale", "tracker", "all distances are longer by a share", "1 to 20 um/m", "link_geometry, which absorbs it", "a scale bar: points of the arm never show it"),
-    about("joint_log_lag", "recording", "joints were logged a share of the last move too early", "0.1 to 5 % of the move", "backlash", "rows in the order of measurement"),
+    about("joint_log_lag", "recording", "joints were logged a share of the last move too early; of a moving arm d = c dq/dt of every joint, its clock and the tracker's c apart", "0.1 to 5 % of the move; 0.5 to 20 ms", "backlash; viscous_windup where one joint moves alone", "rows in the order of measurement; joint velocities"),
     about("outlier", "recording", "single wrong points", "any", "-", "-"),
     about("mislabelled_point", "recording", "points that carry each other's name", "any", "-", "-"),
     about("unknown", "joint, base or tool", "a form-free function of joints, time or payload", "any", "whatever is in no list", "-"),

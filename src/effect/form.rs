@@ -57,6 +57,7 @@ forms! {
     TrackerDrift(super::tracker_drift::TrackerDrift),
     CouplingRatio(super::coupling_ratio::PairRatio),
     JointLogLag(super::joint_log_lag::JointLogLag),
+    ViscousWindup(super::viscous_windup::ViscousWindup),
     Unknown(super::unknown::Unknown),
 }
 

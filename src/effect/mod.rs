@@ -34,6 +34,7 @@ mod thermal_growth;
 mod tool_offset;
 mod tracker_drift;
 mod unknown;
+mod viscous_windup;
 mod zero_shift;
 
 pub use anchor::Anchor;
@@ -46,6 +47,7 @@ pub use form::{Form, Placed, is_of_the_measurement};
 pub use gear_cyclic::GearCyclic;
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::{JointHardening, Law};
+pub use joint_log_lag::JointLogLag;
 pub use joint_table::JointTable;
 pub use link_mass::LinkMass;
 pub use payload_error::PayloadError;
@@ -139,6 +141,11 @@ impl<'a> ArmState<'a> {
     /// What a joint moved from the row before, rad or m.
     pub fn last_move(&self, joint: usize) -> f64 {
         self.data.last_move(self.row, joint)
+    }
+
+    /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
+    pub fn velocity(&self, joint: usize) -> f64 {
+        self.data.velocity(self.row, joint)
     }
 }
 
@@ -240,6 +247,7 @@ pub const CAUSES: &[Cause] = &[
     Cause { name: "base_shift", propose: frame_shift::FrameShift::propose },
     Cause { name: "tracker_drift", propose: TrackerDrift::propose },
     Cause { name: "coupling_ratio", propose: coupling_ratio::PairRatio::propose },
-    Cause { name: "joint_log_lag", propose: joint_log_lag::JointLogLag::propose },
+    Cause { name: "joint_log_lag", propose: JointLogLag::propose },
+    Cause { name: "viscous_windup", propose: viscous_windup::ViscousWindup::propose },
     Cause { name: "unknown", propose: Unknown::propose },
 ];

@@ -53,6 +53,11 @@ impl<'a> Survey<'a> {
         (0..self.joints()).filter(|joint| self.robot.is_revolute(*joint))
     }
 
+    /// Whether the arm moved while it was measured.
+    pub fn moves(&self) -> bool {
+        self.data.in_motion(self.rows)
+    }
+
     /// How far a joint moves, rad or m.
     pub fn travel(&self, joint: usize) -> f64 {
         (self.range[joint][1] - self.range[joint][0]).max(0.0)

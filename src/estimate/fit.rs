@@ -1,5 +1,6 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
+use super::alike::rows_alike;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::Factor;
@@ -11,6 +12,7 @@ use super::piece::{Rest, Unmodelled, Weight, as_of_three, bound};
 use super::problem::{Evaluation, Problem};
 use super::repeats::{Poses, Repeated};
 use crate::robot::Measurements;
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
@@ -117,7 +119,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let free: Vec<usize> = free.into_iter().zip(pinned).filter(|(_, pinned)| !pinned).map(|(k, _)| k).collect();
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     // The noise is known up to a factor, what was known beforehand is not.
-    let scale = reduced(&errors, free.len()).sqrt();
+    let scale = reduced(&errors, free.len()).sqrt() * lasting(&problem, &all.residuals).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
     let poses = Poses::of(problem.data, options.rows);
     let clusters = clusters(&poses, options.rows.len(), free.len());
@@ -240,6 +242,22 @@ impl Search {
             sight = problem.evaluate(model, &candidates);
         }
     }
+}
+
+/// How many rows of a moving arm count as one: what is left on the way lasts from row to row.
+fn lasting(problem: &Problem, residuals: &[Vector3<f64>]) -> f64 {
+    if !problem.data.in_motion(problem.rows) {
+        return 1.0;
+    }
+    let whole = problem.rows.iter().zip(residuals).filter(|(row, _)| problem.data.whole(**row));
+    let whitened: Vec<f64> = whole
+        .flat_map(|(row, residual)| {
+            let error = Weight::of(problem.data, *row, problem.unmodelled.point).apply(residual);
+            // Gross errors last for one row and would hide that others last longer.
+            (error * (bound(3) / error.norm().max(bound(3)))).data.0[0]
+        })
+        .collect();
+    rows_alike(&whitened, 3)
 }
 
 /// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.

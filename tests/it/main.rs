@@ -20,6 +20,7 @@ mod ingest;
 mod init;
 mod layers;
 mod learn;
+mod motion;
 mod network;
 mod parameter_sets;
 mod pipelines;

@@ -41,12 +41,14 @@ const LONG_RUN: usize = 6;
 /// A shorter run is an event only if its rows stand out alike: largest over smallest residual.
 const ALIKE: f64 = 5.0;
 
-/// Names every row in `flagged` (ascending), with its partner. Points are matched within `limit` standard deviations.
+/// Names every row in `flagged` (ascending), with its partner. Points are matched within `limit` standard deviations, but not where
+/// the arm moves: there the rows beside one are always near.
 pub(super) fn name(
     data: &Measurements,
     standings: &[Standing],
     flagged: &[usize],
     limit: f64,
+    moving: bool,
 ) -> Vec<(usize, Kind, Option<usize>)> {
     let mut kinds: BTreeMap<usize, (Kind, Option<usize>)> = BTreeMap::new();
     for &row in flagged {
@@ -55,7 +57,7 @@ pub(super) fn name(
         }
     }
     let index = Index::new(standings);
-    let moved: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
+    let moved: Vec<usize> = flagged.iter().copied().filter(|row| !moving && !kinds.contains_key(row)).collect();
     let fits: BTreeMap<usize, Vec<(usize, f64)>> =
         moved.iter().map(|row| (*row, index.fits(data, standings, *row, limit))).collect();
     exchange(&fits, &mut kinds);

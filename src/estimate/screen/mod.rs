@@ -79,7 +79,9 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
     let start = model.x.clone();
     // Whole blocks may be in metres, zero, or beside other joints: more than a robust loss can bear, and plain to see even from the nominal robot.
     let predicted = model.predict(data);
-    let apart = apart::apart(data, &predicted);
+    // A stretch of a path looks like itself a little further on: there only the velocities tell.
+    let moving = data.in_motion(options.rows);
+    let apart = if moving { vec![0; data.rows()] } else { apart::apart(data, &predicted) };
     let plain = |row: &usize| {
         let misread = || kind::misread(&data.position[*row], &predicted[*row], NOMINAL_TOLERANCE).is_some();
         apart[*row] == 0 && !(data.whole(*row) && misread())
@@ -146,7 +148,7 @@ fn screen(
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);
     let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();
-    let named = kind::name(data, &standings, &flagged, limit);
+    let named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
     let crowded = crowded(&named, set);
     let mut crowd = 0;
     let mut suspects = Vec::new();
