@@ -13,6 +13,7 @@ mod locate;
 mod noise;
 mod outside;
 mod pool;
+mod rivals;
 mod search;
 mod sense;
 mod separate;

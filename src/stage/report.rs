@@ -19,9 +19,9 @@ use std::collections::BTreeMap;
 pub struct Report {
     /// Heading of the report; without it, the robot's name.
     pub title: Option<String>,
-    /// The held-out set that the first sentence speaks of; without it, the one with most points after the last step.
+    /// The held-out set that the first sentence speaks of; without it, the one with most points after the step that stands for the run.
     pub set: Option<String>,
-    /// What is accepted: of the held-out points after the last step.
+    /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step.
     pub limits: Accepted,
     /// Who, with what, where and when, e.g. {operator: A. Meier, tracker: AT960 no. 123, date: 2026-11-21}; shown as given.
     pub identity: BTreeMap<String, String>,
