@@ -101,10 +101,10 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
                 n.value * 100.0
             ),
             Some(_) => {
-                let shares = numbers.iter().filter(|n| n.name.starts_with("share"));
+                let shares = numbers.iter().filter(|n| n.name.contains("share"));
                 let most = shares.max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
                 format!(
-                    "joints were logged before the arm had settled, each by a share of its own: up to {:.2} % of the last move was \
+                    "joints were logged before the arm had settled, each by a share of its own: up to {:.3} % of the last move was \
                      still to come",
                     most.map_or(0.0, |n| n.value * 100.0)
                 )
