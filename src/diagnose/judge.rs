@@ -21,8 +21,13 @@ const CLEARLY: f64 = 2.0;
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
 
-/// Squared errors (m2) of held-out rows that belong, by row, and whether they lie along a path.
-struct HeldOut(BTreeMap<usize, f64>, bool);
+/// Held-out rows that belong.
+struct HeldOut {
+    /// Squared errors, m2, by row.
+    squares: BTreeMap<usize, f64>,
+    /// Whether they lie along a path.
+    moving: bool,
+}
 
 impl HeldOut {
     /// `None` where no row is held out.
@@ -32,27 +37,27 @@ impl HeldOut {
         let rows = question.validate.iter().filter(|row| !aside(row));
         let squares: BTreeMap<usize, f64> =
             rows.map(|row| (*row, (data.position[*row] - predicted[*row]).norm_squared())).collect();
-        (!squares.is_empty()).then(|| Self(squares, data.in_motion(question.validate)))
+        (!squares.is_empty()).then(|| Self { squares, moving: data.in_motion(question.validate) })
     }
 
     fn rms(&self) -> f64 {
-        (self.0.values().sum::<f64>() / self.0.len() as f64).sqrt()
+        (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
     }
 
     /// -2 ln of the odds of `other` against this, by these rows.
     fn evidence_against(&self, other: &Self) -> f64 {
-        2.0 * 3.0 * self.0.len() as f64 * (other.rms() / self.rms()).ln()
+        2.0 * 3.0 * self.squares.len() as f64 * (other.rms() / self.rms()).ln()
     }
 
     /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
     fn is_better_than(&self, other: &Self) -> bool {
-        let falls: Vec<f64> = self.0.iter().filter_map(|(row, own)| Some(other.0.get(row)? - own)).collect();
+        let falls: Vec<f64> = self.squares.iter().filter_map(|(row, own)| Some(other.squares.get(row)? - own)).collect();
         let count = falls.len() as f64;
         let mean = falls.iter().sum::<f64>() / count;
         let variance = falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count - 1.0);
         // Rows along a path are not as many opinions as there are rows.
         let off: Vec<f64> = falls.iter().map(|fall| fall - mean).collect();
-        let count = if self.1 { count / rows_alike(&off, 1) } else { count };
+        let count = if self.moving { count / rows_alike(&off, 1) } else { count };
         self.rms() < other.rms() * (1.0 - WORSE) && mean > CLEARLY * (variance / count).sqrt()
     }
 }
