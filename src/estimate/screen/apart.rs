@@ -9,6 +9,8 @@ use nalgebra::Vector3;
 
 /// Rows of a stretch, enough for six numbers and a judgement.
 const STRETCH: usize = 20;
+/// Stretches begin so many rows apart: they overlap, so that few rows beside the place where the logs slip go unseen.
+const STEP: usize = 4;
 /// Most rows that are tried either way.
 const MOST: i64 = 64;
 /// A nominal robot leaves less than this share of the size of a stretch.
@@ -19,7 +21,7 @@ const BETTER: f64 = 5.0;
 /// For every row how many rows further on its joints are, where that is plain; zero elsewhere.
 pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64> {
     let mut out = vec![0; predicted.len()];
-    for first in (0..predicted.len()).step_by(STRETCH) {
+    for first in (0..predicted.len()).step_by(STEP) {
         let last = (first + STRETCH).min(predicted.len());
         let rows = last.saturating_sub(STRETCH)..last;
         let own = left(data, predicted, rows.clone(), 0);

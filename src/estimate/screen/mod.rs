@@ -15,7 +15,7 @@ use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
 use distance::{Standing, leave_one_out};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A row that does not belong to the rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,15 +87,18 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
         apart[*row] == 0 && !(data.whole(*row) && misread())
     };
     let mut kept: Vec<usize> = options.rows.iter().copied().filter(plain).collect();
+    // Where the whole log slipped there is nothing else to fit.
+    let mut slipped: BTreeMap<usize, i64> = (0..apart.len()).zip(apart.iter().copied()).filter(|(_, off)| *off != 0).collect();
     if 2 * kept.len() < options.rows.len() {
         kept = options.rows.to_vec();
+        slipped.clear();
     }
     let throughout = throughout(&apart);
     let mut fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
     let mut aside = BTreeSet::new();
     for round in 0.. {
         let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
-        let Screened { suspects, crowd, reach } = screen(model, data, &kept, &fitted, set, &held);
+        let Screened { suspects, crowd, reach } = screen(model, data, &kept, &fitted, set, &held, &slipped);
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
         let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
         if next == kept {
@@ -141,6 +144,7 @@ fn screen(
     fitted: &Fitted,
     set: &[usize],
     held: &BTreeSet<usize>,
+    slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
     let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
     let problem = Problem { data, rows: kept, unmodelled: fitted.beyond() };
@@ -152,7 +156,7 @@ fn screen(
     let crowded = crowded(&named, set);
     let mut crowd = 0;
     let mut suspects = Vec::new();
-    for (row, kind, partner) in named {
+    for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let Standing { residual, distance, .. } = &standings[row];
         let kind = if kind == Kind::Event && held.contains(&row) { Kind::Outlier } else { kind };
         if kind == Kind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row) {
@@ -161,6 +165,15 @@ fn screen(
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
         }
     }
+    // Plain from the nominal robot, whatever the model makes of them.
+    suspects.extend(slipped.iter().map(|(row, offset)| Suspect {
+        row: *row,
+        kind: Kind::ShiftedBlock(*offset),
+        partner: row.checked_add_signed(*offset as isize),
+        size: standings[*row].residual.norm(),
+        statistic: standings[*row].distance,
+    }));
+    suspects.sort_by_key(|suspect| suspect.row);
     Screened { suspects, crowd, reach: tail::reach(&bulk(&standings), standings.len()) }
 }
 
