@@ -5,7 +5,10 @@
 
 use crate::estimate::align::kabsch;
 use crate::robot::Measurements;
+use crate::spatial::Pose;
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// Rows of a stretch, enough for six numbers and a judgement.
 const STRETCH: usize = 20;
@@ -24,38 +27,71 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
     for first in (0..predicted.len()).step_by(STEP) {
         let last = (first + STRETCH).min(predicted.len());
         let rows = last.saturating_sub(STRETCH)..last;
-        let own = left(data, predicted, rows.clone(), 0);
-        let Some(own) = own.filter(|own| *own > NOMINAL) else { continue };
+        let Some(own) = Stretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > NOMINAL) else { continue };
         let tried = (1..=MOST).flat_map(|k| [k, -k]);
-        let tried = tried.filter_map(|k| left(data, predicted, rows.clone(), k).map(|left| (left, k)));
-        if let Some((left, offset)) = tried.min_by(|a, b| a.0.total_cmp(&b.0))
-            && left < NOMINAL
-            && BETTER * left < own
+        let tried = tried.filter_map(|k| Stretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k)));
+        if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
+            && stretch.left < NOMINAL
+            && BETTER * stretch.left < own.left
         {
-            out[first..last].fill(offset);
+            // Rows beside the slip may fit either way, since their joints stand in both places: those are right.
+            let nearer = |row: &usize| stretch.nearer(data, predicted, *row, offset);
+            rows.filter(nearer).for_each(|row| out[row] = offset);
         }
     }
+    beyond_the_log(&mut out);
     out
 }
 
-/// Rms distance after the best rigid motion as a share of the stretch's size; `None` where too few rows have both.
-fn left(data: &Measurements, predicted: &[Vector3<f64>], rows: std::ops::Range<usize>, offset: i64) -> Option<f64> {
-    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = rows
-        .filter(|row| data.whole(*row))
-        .filter_map(|row| {
-            let there = usize::try_from(row as i64 + offset).ok()?;
-            Some((*predicted.get(there)?, data.position[row]))
-        })
-        .collect();
-    if 2 * pairs.len() < STRETCH {
-        return None;
+/// Where a slip reaches an end of the log, the joints of the rows past it were never logged.
+fn beyond_the_log(apart: &mut [i64]) {
+    let rows = apart.len();
+    for offset in apart.iter().copied().filter(|offset| *offset != 0).collect::<BTreeSet<i64>>() {
+        let lost = offset.unsigned_abs() as usize;
+        let (past, beside) = if offset > 0 {
+            let edge = rows.saturating_sub(lost);
+            (edge..rows, edge.saturating_sub(STEP)..edge)
+        } else {
+            let edge = lost.min(rows);
+            (0..edge, edge..(edge + STEP).min(rows))
+        };
+        if apart[beside].contains(&offset) {
+            apart[past].fill(offset);
+        }
     }
-    let (from, to): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    let all: Vec<usize> = (0..from.len()).collect();
-    let motion = kabsch(&from, &to, &all);
-    let count = from.len() as f64;
-    let centre = to.iter().sum::<Vector3<f64>>() / count;
-    let size = to.iter().map(|point| (point - centre).norm_squared()).sum::<f64>();
-    let rest = from.iter().zip(&to).map(|(a, b)| (motion.point(a) - b).norm_squared()).sum::<f64>();
-    (size > 0.0).then(|| (rest / size).sqrt())
+}
+
+/// Points of some rows brought onto the measured ones.
+struct Stretch {
+    motion: Pose,
+    /// Rms distance that remains, as a share of the stretch's size.
+    left: f64,
+}
+
+impl Stretch {
+    /// With the joints `offset` rows further on; `None` where too few rows have both.
+    fn fit(data: &Measurements, predicted: &[Vector3<f64>], rows: Range<usize>, offset: i64) -> Option<Self> {
+        let whole = rows.filter(|row| data.whole(*row));
+        let (from, to): (Vec<_>, Vec<_>) =
+            whole.filter_map(|row| Some((*other(predicted, row, offset)?, data.position[row]))).unzip();
+        if 2 * from.len() < STRETCH {
+            return None;
+        }
+        let all: Vec<usize> = (0..from.len()).collect();
+        let motion = kabsch(&from, &to, &all);
+        let centre = to.iter().sum::<Vector3<f64>>() / to.len() as f64;
+        let size = to.iter().map(|point| (point - centre).norm_squared()).sum::<f64>();
+        let rest = from.iter().zip(&to).map(|(a, b)| (motion.point(a) - b).norm_squared()).sum::<f64>();
+        (size > 0.0).then(|| Self { motion, left: (rest / size).sqrt() })
+    }
+
+    /// Whether the measured point of a row is far nearer with the joints `offset` rows further on than with its own.
+    fn nearer(&self, data: &Measurements, predicted: &[Vector3<f64>], row: usize, offset: i64) -> bool {
+        let off = |point: &Vector3<f64>| (self.motion.point(point) - data.position[row]).norm();
+        data.whole(row) && other(predicted, row, offset).is_some_and(|there| BETTER * off(there) < off(&predicted[row]))
+    }
+}
+
+fn other(predicted: &[Vector3<f64>], row: usize, offset: i64) -> Option<&Vector3<f64>> {
+    predicted.get(row.checked_add_signed(offset as isize)?)
 }

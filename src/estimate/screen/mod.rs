@@ -169,7 +169,7 @@ fn screen(
     suspects.extend(slipped.iter().map(|(row, offset)| Suspect {
         row: *row,
         kind: Kind::ShiftedBlock(*offset),
-        partner: row.checked_add_signed(*offset as isize),
+        partner: row.checked_add_signed(*offset as isize).filter(|row| *row < data.rows()),
         size: standings[*row].residual.norm(),
         statistic: standings[*row].distance,
     }));
