@@ -41,6 +41,7 @@ pub(crate) struct Pool<'a> {
     pub charge: Vec<f64>,
     /// Numbers of the torque model, seen only through a compliance in the same set.
     pub borrowed: Vec<bool>,
+    products: Mutex<HashMap<(usize, usize), Arc<Mat<f64>>>>,
     scores: Mutex<HashMap<Vec<usize>, f64>>,
     states: Mutex<HashMap<Vec<usize>, Arc<State>>>,
 }
@@ -74,6 +75,7 @@ impl<'a> Pool<'a> {
             gram: Vec::new(),
             charge: Vec::new(),
             borrowed: Vec::new(),
+            products: Mutex::default(),
             scores: Mutex::default(),
             states: Mutex::default(),
         };
@@ -118,7 +120,7 @@ impl<'a> Pool<'a> {
             let own: Vec<&[f64]> =
                 (self.first[k]..self.first[k + 1]).map(|c| &self.columns[c * lines..(c + 1) * lines]).collect();
             self.gradient.extend(own.iter().map(|column| dot(column, &self.residual)));
-            self.gram.push(own.iter().flat_map(|a| own.iter().map(|b| dot(a, b))).collect());
+            self.gram.push(gram(&own));
             let places = hypothesis.form.place().count(joints) as f64;
             self.charge.push(2.0 * hypothesis.tried.ln() + hypothesis.charge + 2.0 * places.ln());
             self.borrowed.push(super::is_torque_model(&hypothesis.form));
@@ -140,6 +142,47 @@ impl<'a> Pool<'a> {
 
     pub fn all(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.columns, self.lines, self.scale.len())
+    }
+
+    fn columns_from(&self, h: usize) -> MatRef<'_, f64> {
+        self.all().subcols(self.first[h], self.first[h + 1] - self.first[h])
+    }
+
+    /// Products of the columns of two hypotheses: those of `a` down, those of `b` across. Sets share most of their pairs.
+    fn products(&self, a: usize, b: usize) -> Arc<Mat<f64>> {
+        if let Some(products) = lock(&self.products).get(&(a, b)) {
+            return products.clone();
+        }
+        let (down, across) = (self.columns_from(a), self.columns_from(b));
+        let mut products = Mat::zeros(down.ncols(), across.ncols());
+        matmul(products.as_mut(), Accum::Replace, down.transpose(), across, 1.0, Par::Seq);
+        let products = Arc::new(products);
+        lock(&self.products).insert((a, b), products.clone());
+        products
+    }
+
+    /// Gram matrix of all columns of a set, row by row; the upper triangle of it is empty but for that of single hypotheses.
+    pub fn gram_of(&self, set: &[usize]) -> Vec<f64> {
+        let q: usize = set.iter().map(|h| self.first[h + 1] - self.first[*h]).sum();
+        let mut gram = vec![0.0; q * q];
+        let mut down = 0;
+        for (n, a) in set.iter().enumerate() {
+            let (rows, mut across) = (self.first[a + 1] - self.first[*a], 0);
+            for b in &set[..n] {
+                let products = self.products(*a, *b);
+                for i in 0..rows {
+                    for j in 0..products.ncols() {
+                        gram[(down + i) * q + across + j] = products[(i, j)];
+                    }
+                }
+                across += products.ncols();
+            }
+            for (i, own) in self.gram[*a].chunks(rows).enumerate() {
+                gram[(down + i) * q + across..][..rows].copy_from_slice(own);
+            }
+            down += rows;
+        }
+        gram
     }
 
     /// Columns of all hypotheses of a set.
@@ -224,6 +267,19 @@ pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     let mut columns = MatMut::from_column_major_slice_mut(columns, lines, count);
     matmul(share.as_mut(), Accum::Replace, basis.transpose(), columns.as_ref(), 1.0, Par::Seq);
     matmul(columns.as_mut(), Accum::Add, basis, share.as_ref(), -1.0, Par::Seq);
+}
+
+/// Gram matrix of some columns, row by row.
+pub(crate) fn gram(columns: &[&[f64]]) -> Vec<f64> {
+    let q = columns.len();
+    let mut gram = vec![0.0; q * q];
+    for i in 0..q {
+        for j in 0..=i {
+            gram[i * q + j] = dot(columns[i], columns[j]);
+            gram[j * q + i] = gram[i * q + j];
+        }
+    }
+    gram
 }
 
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {

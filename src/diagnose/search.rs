@@ -168,7 +168,8 @@ impl<'a, 'b> Search<'a, 'b> {
     }
 
     fn ordered(&self, sets: BTreeSet<Vec<usize>>) -> Vec<Vec<usize>> {
-        let mut order: Vec<(f64, Vec<usize>)> = sets.into_iter().map(|set| (self.pool.bic(&set), set)).collect();
+        let sets: Vec<Vec<usize>> = sets.into_iter().collect();
+        let mut order: Vec<(f64, Vec<usize>)> = sets.into_par_iter().map(|set| (self.pool.bic(&set), set)).collect();
         order.retain(|(score, _)| score.is_finite());
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(&b.1)));
         order.into_iter().map(|(_, set)| set).collect()

@@ -1,6 +1,6 @@
 //! The problem with some hypotheses estimated: what each of the others would still gain.
 
-use super::pool::{LINES_EACH, Pool, dot, project};
+use super::pool::{LINES_EACH, Pool, dot, gram, project};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -107,14 +107,7 @@ impl Pivoted {
 pub(crate) fn solve(pool: &Pool, set: &[usize]) -> Solution {
     let columns = pool.columns_of(set);
     let q = columns.len();
-    let mut gram = vec![0.0; q * q];
-    for (i, a) in columns.iter().enumerate() {
-        for (j, b) in columns.iter().enumerate().take(i + 1) {
-            gram[i * q + j] = dot(pool.column(*a), pool.column(*b));
-            gram[j * q + i] = gram[i * q + j];
-        }
-    }
-    let factor = Pivoted::of(gram, q);
+    let factor = Pivoted::of(pool.gram_of(set), q);
     let forward = factor.forward(|k| pool.gradient[columns[k]]);
     let gain: f64 = forward.iter().map(|value| value * value).sum();
     let solved = factor.backward(&forward);
@@ -288,7 +281,6 @@ pub(crate) fn span(pool: &Pool, columns: &[usize]) -> Mat<f64> {
 /// By how much columns (one after another, unit raw length, projected) lower a squared residual.
 pub(crate) fn gain(columns: &[f64], lines: usize, residual: &[f64]) -> f64 {
     let own: Vec<&[f64]> = columns.chunks(lines).collect();
-    let gram = own.iter().flat_map(|a| own.iter().map(|b| dot(a, b))).collect();
-    let factor = Pivoted::of(gram, own.len());
+    let factor = Pivoted::of(gram(&own), own.len());
     factor.forward(|k| dot(own[k], residual)).iter().map(|value| value * value).sum()
 }
