@@ -103,6 +103,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
         groups.entry((name, form.place().to_string())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
+    both_angles(pool, &mut groups, set);
     wobbles(pool, &mut groups, set);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
     let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
@@ -237,6 +238,30 @@ fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>
         }
     }
 }
+
+/// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
+fn both_angles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
+    let form = |i: &usize| &pool.hypotheses[set[*i]].form;
+    let main = groups.iter().find_map(|(key, members)| {
+        let angles =
+            members.iter().find_map(|i| if let Form::Unknown(unknown) = form(i) { unknown.two_angles() } else { None })?;
+        let Place::Joint(joint) = form(&members[0]).place() else { return None };
+        Some((key.clone(), joint, angles))
+    });
+    let Some((main, joint, angles)) = main else { return };
+    let is_part = |i: &usize| match form(i) {
+        Form::GearCyclic(gear) => gear.joint() == joint && angles.contains(&joint) && gear.order() <= SLOW,
+        other => matches!(other.place(), Place::Coupled(by, moved) if moved == joint && angles.contains(&by)),
+    };
+    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| key.clone()).collect();
+    for part in parts {
+        let members = groups.remove(&part).unwrap_or_default();
+        groups.entry(main.clone()).or_default().extend(members);
+    }
+}
+
+/// Orders that a smooth function of an angle may have, too.
+const SLOW: u32 = 2;
 
 /// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
 fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {

@@ -35,7 +35,10 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             let by = match side {
                 Some(Side::Load { .. }) => "to the side that the load pushes it".to_string(),
                 Some(Side::Mixed { threshold_nm, .. }) => {
-                    format!("to the side of approach under loads below about {threshold_nm:.0} Nm, above to that of the load")
+                    let friction = threshold_nm.abs();
+                    format!(
+                        "by the direction from which it came under loads below about {friction:.0} Nm, above to the side of the load"
+                    )
                 }
                 Some(Side::Approach) => "by the direction from which it came".to_string(),
                 None => {

@@ -14,8 +14,8 @@ pub enum Side {
     Approach,
     /// The sign of the load, blurred over some torque.
     Load { width_nm: f64 },
-    /// Friction of so many Nm holds the side of approach against smaller loads, larger ones push the joint to theirs; blurred over
-    /// some torque.
+    /// Friction of so many Nm decides under smaller loads, larger ones push the joint to their side; blurred over some torque.
+    /// Positive: friction leaves the joint on the side to which it came; negative: it trails on the other one.
     Mixed {
         threshold_nm: f64,
         #[serde(default)]
@@ -49,9 +49,9 @@ impl Backlash {
                     let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
                     loads.sort_by(f64::total_cmp);
                     let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
-                    for threshold_nm in shares {
-                        let sides = BLURS.map(|blur| Side::Mixed { threshold_nm, width_nm: blur * threshold_nm });
-                        out.extend(sides.map(|side| Hypothesis::new(Self { joint, side }, 5 * BLURS.len()).positive()));
+                    for threshold_nm in shares.into_iter().flat_map(|friction| [friction, -friction]) {
+                        let sides = BLURS.map(|blur| Side::Mixed { threshold_nm, width_nm: blur * threshold_nm.abs() });
+                        out.extend(sides.map(|side| Hypothesis::new(Self { joint, side }, 10 * BLURS.len()).positive()));
                     }
                 }
             }

@@ -45,11 +45,15 @@ impl Unknown {
 
     /// Whether a joint follows a function of its own angle and a neighbour's, as where a hose runs along both and pulls.
     pub fn is_hose(&self) -> bool {
-        match (self.signature, self.place) {
-            (Signature::Product { a, b } | Signature::Surface { a, b, .. }, Place::Joint(joint)) => {
-                (a == joint || b == joint) && a.abs_diff(b) == 1
-            }
-            _ => false,
+        let Place::Joint(joint) = self.place else { return false };
+        self.two_angles().is_some_and(|[a, b]| (a == joint || b == joint) && a.abs_diff(b) == 1)
+    }
+
+    /// The angles of which a joint follows a function, where there are two.
+    pub fn two_angles(&self) -> Option<[usize; 2]> {
+        match self.signature {
+            Signature::Product { a, b } | Signature::Surface { a, b, .. } => Some([a, b]),
+            _ => None,
         }
     }
 
