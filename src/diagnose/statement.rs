@@ -37,7 +37,7 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
                 Some(Side::Mixed { threshold_nm, .. }) => {
                     let friction = threshold_nm.abs();
                     format!(
-                        "by the direction from which it came under loads below about {friction:.0} Nm, above to the side of the load"
+                        "by the direction from which it came, above about {friction:.0} Nm to the side that the load pushes it"
                     )
                 }
                 Some(Side::Approach) => "by the direction from which it came".to_string(),

@@ -49,7 +49,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 5;
+    const IMPLEMENTATION: u32 = 6;
     type Reads = IdentifyReads;
     type Writes = Identified;
 

@@ -105,6 +105,40 @@ fn effects_of_the_twin_are_named_and_placed() {
     }
 }
 
+const LOST_MOTION: &str = "
+calib: 1
+name: lost_motion
+seed: 3
+stages:
+  - uses: robot
+    with: {file: sealed/recordings/c0001/robot.json, format: case}
+  - uses: simulate
+    with:
+      truth: {offset_deg: [0.02, -0.01, 0.03, 0, 0.01, 0]}
+      effects: [{backlash: {joint: 3, gap_arcsec: 60, closing_nm: 12}}]
+      poses: {range_deg: [[-90, 90], [-140, -40], [-55, 95], [-120, 120], [-75, 75], [-160, 160]]}
+      blocks: [{usage: fit, points: 120}, {usage: validate, points: 40}]
+  - uses: split
+    with: {by: usage}
+  - uses: diagnose
+";
+
+#[test]
+fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque() {
+    let folder = concealed("backlash", "31", "40");
+    std::fs::write(folder.path().join("p.yaml"), LOST_MOTION).expect("written");
+    let said: Value = serde_json::from_str(&calib(&["diagnose", "p.yaml", "--json", "--quiet"], folder.path())).expect("JSON");
+    let findings = said["findings"].as_array().expect("a list");
+    assert_eq!(wanted(&said["findings"]), Named::from([("backlash".into(), "joint 3".into())]), "{said:#}");
+    let gap = &findings[0]["parameters"][0];
+    let (value, sigma) = (gap["value"].as_f64().expect("a number"), gap["sigma"].as_f64().expect("a number"));
+    assert!((value - 30.0).abs() < 3.0 * sigma && sigma < 3.0, "{gap}");
+    let statement = findings[0]["statement"].as_str().expect("a sentence");
+    let torque: f64 =
+        statement.split(" Nm").next().and_then(|text| text.rsplit(' ').next()).expect("Nm").parse().expect("a number");
+    assert!((9.0..=15.0).contains(&torque), "{statement}");
+}
+
 #[test]
 fn a_joint_of_the_wrong_sign_is_named_and_the_rest_is_fitted_all_the_same() {
     let folder = tempfile::tempdir().expect("a folder");
