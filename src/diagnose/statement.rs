@@ -82,6 +82,8 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
         "tracker_drift" => {
             let course = forms.iter().find_map(|form| if let Form::TrackerDrift(d) = form { Some(d.course()) } else { None });
             let how = match course {
+                Some(Course::Steady { power, .. }) if power < 0.7 => "slower and slower",
+                Some(Course::Steady { power, .. }) if power > 1.4 => "faster and faster",
                 Some(Course::Steady { .. }) => "steadily",
                 Some(Course::Warming(_)) => "with the warm-up",
                 _ => "slowly",

@@ -18,17 +18,20 @@ pub enum Warmth {
     Time { start_s: f64, constant_s: f64 },
 }
 
+/// Time constants as shares of the recording.
+const WARM_UPS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.5];
+
 impl Warmth {
-    /// What the recording offers: its temperature, else warm-ups of several time constants.
-    pub fn all(survey: &Survey) -> Vec<Self> {
-        let [start_s, end] = survey.time;
-        match survey.reference_c {
-            Some(reference_c) => vec![Self::Temperature { reference_c }],
-            None if end > start_s => {
-                [0.1, 0.25, 0.5, 1.0, 2.5].map(|share| Self::Time { start_s, constant_s: share * (end - start_s) }).to_vec()
-            }
-            None => Vec::new(),
-        }
+    /// What the recording offers, and of how many of its kind each is one: its temperature, and warm-ups of several time
+    /// constants, since what was measured need not be the temperature of what grows.
+    pub fn all(survey: &Survey) -> Vec<(Self, usize)> {
+        let [start_s, end_s] = survey.time;
+        let measured = survey.reference_c.map(|reference_c| Self::Temperature { reference_c });
+        let kinds = 1 + usize::from(measured.is_some());
+        let times = WARM_UPS.iter().filter(|_| end_s > start_s);
+        let times = times.map(|share| Self::Time { start_s, constant_s: share * (end_s - start_s) });
+        let times = times.map(|time| (time, kinds * WARM_UPS.len()));
+        measured.map(|measured| (measured, kinds)).into_iter().chain(times).collect()
     }
 
     pub fn at(&self, state: &ArmState) -> f64 {
@@ -63,13 +66,12 @@ impl ThermalGrowth {
     pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
         let links = survey.joints() - 1;
         let long = |link: &usize| extent(survey.robot, *link).norm() > SHORT;
-        let all = Warmth::all(survey);
         let mut out = Vec::new();
-        for by in &all {
+        for (by, tried) in Warmth::all(survey) {
             for (first, last) in (0..links).flat_map(|first| (first..links).map(move |last| (first, last))) {
                 // A run begins and ends with a link that can grow, else it is the same as a shorter one.
                 if long(&first) && long(&last) {
-                    out.push(Hypothesis::new(Self { first, last, by: *by }, all.len()).positive());
+                    out.push(Hypothesis::new(Self { first, last, by }, tried).positive());
                 }
             }
         }

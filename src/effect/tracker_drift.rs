@@ -11,8 +11,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Course {
-    /// In proportion to time; 1 at the end of the fitted rows.
-    Steady { start_s: f64, end_s: f64 },
+    /// In proportion to time or to a power of it; 1 at the end of the fitted rows.
+    Steady {
+        start_s: f64,
+        end_s: f64,
+        #[serde(default = "one")]
+        power: f64,
+    },
     /// With temperature or warm-up.
     Warming(Warmth),
     /// Three cosines over the fitted rows, held at their value beyond.
@@ -26,6 +31,12 @@ pub struct TrackerDrift {
     turns: bool,
 }
 
+fn one() -> f64 {
+    1.0
+}
+
+/// Powers of time that a drift may go with: what settles and what begins slowly.
+const POWERS: std::ops::RangeInclusive<f64> = 0.25..=3.0;
 /// Cosines of a slow course.
 const SLOW: usize = 3;
 
@@ -41,10 +52,9 @@ impl TrackerDrift {
         }
         let mut out = Vec::new();
         for turns in [false, true] {
-            out.push(Hypothesis::new(Self { course: Course::Steady { start_s, end_s }, turns }, 3));
-            let warm = Warmth::all(survey);
-            for by in &warm {
-                out.push(Hypothesis::new(Self { course: Course::Warming(*by), turns }, 3 * warm.len()).charged(4.0));
+            out.push(Hypothesis::new(Self { course: Course::Steady { start_s, end_s, power: 1.0 }, turns }, 3));
+            for (by, tried) in Warmth::all(survey) {
+                out.push(Hypothesis::new(Self { course: Course::Warming(by), turns }, 3 * tried).charged(4.0));
             }
         }
         out.push(Hypothesis::new(Self { course: Course::Slow { start_s, end_s }, turns: false }, 1).charged(4.0));
@@ -72,7 +82,7 @@ impl Effect for TrackerDrift {
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let rate = match self.course {
-            Course::Steady { start_s, end_s } => (state.time() - start_s) / (end_s - start_s),
+            Course::Steady { start_s, end_s, power } => libm::pow(((state.time() - start_s) / (end_s - start_s)).max(0.0), power),
             Course::Warming(by) => by.at(state),
             Course::Slow { start_s, end_s } => {
                 for (k, value) in cosines(state.time(), [start_s, end_s], SLOW).enumerate() {
@@ -95,7 +105,15 @@ impl Placed for TrackerDrift {
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        let Course::Warming(by) = self.course else { return Vec::new() };
-        by.near(level).into_iter().map(|by| Self { course: Course::Warming(by), ..self.clone() }.into()).collect()
+        let courses: Vec<Course> = match self.course {
+            Course::Steady { start_s, end_s, power } => {
+                let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
+                let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
+                powers.map(|power| Course::Steady { start_s, end_s, power }).collect()
+            }
+            Course::Warming(by) => by.near(level).into_iter().map(Course::Warming).collect(),
+            Course::Slow { .. } => Vec::new(),
+        };
+        courses.into_iter().map(|course| Self { course, ..self.clone() }.into()).collect()
     }
 }

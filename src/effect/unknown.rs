@@ -135,8 +135,7 @@ impl Unknown {
             add(Signature::Time { start_s, end_s }, 1, 0.0);
             add(Signature::Creep { start_s, end_s, power: 1.0 }, 1, 4.0);
         }
-        let warm = Warmth::all(survey);
-        warm.iter().for_each(|by| add(Signature::Warming(*by), warm.len(), 4.0));
+        Warmth::all(survey).into_iter().for_each(|(by, tried)| add(Signature::Warming(by), tried, 4.0));
         out
     }
 
