@@ -195,7 +195,7 @@ mod tests {
             "point                        x_mm  kept\nP1                        1954.25  true\na point with a long name           false\n"
         );
         let narrow = draw(columns(), 2, Some(30));
-        assert!(narrow.lines().all(|line| line.width() <= 30) && narrow.contains("a point wi…"), "{narrow}");
+        assert!(narrow.lines().all(|line| line.width() <= 30) && narrow.contains("a point with …"), "{narrow}");
         let narrower = draw(columns(), 2, Some(24));
         assert!(narrower.ends_with("too narrow for: kept\n"), "{narrower}");
     }
