@@ -24,7 +24,7 @@
 //! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
-//! | [`audit`] | runs told, explained, compared, traced, swept | diff, pipeline, store |
+//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants

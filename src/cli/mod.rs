@@ -17,6 +17,7 @@ mod log;
 mod means;
 mod pipeline_arguments;
 mod poses;
+mod query;
 mod run;
 mod run_diff;
 mod schema;
@@ -59,6 +60,7 @@ enum Verb {
     Lineage(lineage::LineageArguments),
     Log(log::LogArguments),
     Poses(poses::PosesArguments),
+    Query(query::QueryArguments),
     Schema(schema::SchemaArguments),
     Show(show::ShowArguments),
     Simulate(simulate::SimulateArguments),
@@ -97,6 +99,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Lineage(verb) => lineage::main(&verb),
         Verb::Log(verb) => log::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
+        Verb::Query(verb) => query::main(&verb),
         Verb::Completions(verb) => shell::completions(&verb),
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),

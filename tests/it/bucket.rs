@@ -87,6 +87,23 @@ impl Bucket for Memory {
     }
 }
 
+/// A bucket that holds what a folder holds, and a store before it that has fetched nothing yet.
+pub fn bucket_of(folder: &Path, cache: &Path) -> Store {
+    fn put(bucket: &Memory, root: &Path, folder: &Path) {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                put(bucket, root, &path);
+            } else {
+                let key = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
+                bucket.files.lock().unwrap().insert(key, fs::read(&path).unwrap());
+            }
+        }
+    }
+    let bucket = Memory::new();
+    put(&bucket, folder, folder);
+    Store::open_before(cache, bucket).unwrap()
+}
+
 /// A store of one machine, with a cache of its own.
 fn machine(bucket: &Arc<Memory>) -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();

@@ -25,6 +25,7 @@ mod network;
 mod parameter_sets;
 mod pipelines;
 mod poses;
+mod query;
 mod readme;
 mod remedies;
 mod repeats;

@@ -1,0 +1,66 @@
+//! What a query gave: columns of values.
+
+use polars::prelude::{AnyValue, Column, DataFrame};
+use std::borrow::Cow;
+
+/// The rows that a query gave.
+#[derive(Debug)]
+pub struct Answer(DataFrame);
+
+/// One value of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value<'a> {
+    Null,
+    Boolean(bool),
+    Integer(i128),
+    Number(f64),
+    Text(Cow<'a, str>),
+}
+
+impl Answer {
+    pub(super) fn new(frame: DataFrame) -> Self {
+        Self(frame)
+    }
+
+    pub fn rows(&self) -> usize {
+        self.0.height()
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.columns().iter().map(|column| column.name().as_str())
+    }
+
+    /// The values of a row, counted from 0, in the order of the names.
+    pub fn row(&self, row: usize) -> impl Iterator<Item = Value<'_>> {
+        self.0.columns().iter().map(move |column| value(column, row))
+    }
+
+    /// The first `rows` values of every column.
+    pub fn columns(&self, rows: usize) -> impl Iterator<Item = Vec<Value<'_>>> {
+        let rows = rows.min(self.rows());
+        self.0.columns().iter().map(move |column| (0..rows).map(|row| value(column, row)).collect())
+    }
+}
+
+fn value(column: &Column, row: usize) -> Value<'_> {
+    let Ok(value) = column.get(row) else { return Value::Null };
+    match value {
+        AnyValue::Null => Value::Null,
+        AnyValue::Boolean(truth) => Value::Boolean(truth),
+        AnyValue::String(text) => Value::Text(text.into()),
+        AnyValue::StringOwned(text) => Value::Text(text.to_string().into()),
+        AnyValue::Float64(number) => Value::Number(number),
+        AnyValue::Float32(number) => Value::Number(number.into()),
+        AnyValue::Int8(number) => Value::Integer(number.into()),
+        AnyValue::Int16(number) => Value::Integer(number.into()),
+        AnyValue::Int32(number) => Value::Integer(number.into()),
+        AnyValue::Int64(number) => Value::Integer(number.into()),
+        AnyValue::Int128(number) => Value::Integer(number),
+        AnyValue::UInt8(number) => Value::Integer(number.into()),
+        AnyValue::UInt16(number) => Value::Integer(number.into()),
+        AnyValue::UInt32(number) => Value::Integer(number.into()),
+        AnyValue::UInt64(number) => Value::Integer(number.into()),
+        // Dates, lists and what else a query may make: as polars writes them.
+        other => Value::Text(other.to_string().into()),
+    }
+}

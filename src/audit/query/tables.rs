@@ -1,0 +1,119 @@
+//! The tables of a run, by the names that SQL knows them by, with their columns.
+
+use serde::Serialize;
+
+use crate::error::{Error, Result, nearest};
+use crate::pipeline::Manifest;
+use crate::store::schema::{self, ColumnType, TableSchema};
+use crate::store::{Store, TableRef};
+
+/// The tables of one run, in the order of its pipeline.
+#[derive(Debug, Clone)]
+pub struct QueryTables {
+    run: String,
+    tables: Vec<QueryTable>,
+}
+
+/// A table that can be asked.
+#[derive(Debug, Clone)]
+pub struct QueryTable {
+    /// `stage_port`, a dash written as an underscore.
+    pub name: String,
+    /// Its kind, where no other stage of the run writes such a table.
+    pub short: Option<String>,
+    pub stage: String,
+    pub port: String,
+    pub kind: String,
+    pub table: TableRef,
+}
+
+/// A column that can be asked, as the table's file has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct QueryColumn {
+    pub name: String,
+    #[serde(rename = "type")]
+    pub column_type: String,
+    pub unit: Option<String>,
+    pub description: String,
+}
+
+impl QueryTables {
+    pub fn of(manifest: &Manifest) -> Self {
+        let outputs = || manifest.stages.iter().flat_map(|stage| stage.outputs.iter().map(move |output| (&stage.id, output)));
+        let alone = |kind: &str| outputs().filter(|(_, output)| output.kind == kind).count() == 1;
+        let table = |(stage, output): (&String, &crate::pipeline::OutputRecord)| QueryTable {
+            name: format!("{stage}_{}", output.port).replace('-', "_"),
+            short: alone(&output.kind).then(|| output.kind.clone()),
+            stage: stage.clone(),
+            port: output.port.clone(),
+            kind: output.kind.clone(),
+            table: output.table.clone(),
+        };
+        Self { run: manifest.run_id.clone(), tables: outputs().map(table).collect() }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &QueryTable> {
+        self.tables.iter()
+    }
+
+    /// The table of a name: `stage_port`, `stage/port`, `stage.port`, or the kind where one stage alone writes it.
+    pub fn find(&self, name: &str) -> Result<&QueryTable> {
+        let exact: Vec<&QueryTable> = self.iter().filter(|table| table.is_called(name)).collect();
+        let (found, what) = match exact.is_empty() {
+            false => (exact, "is the name of several tables"),
+            true => (self.iter().filter(|table| table.kind == name).collect(), "is written by several stages"),
+        };
+        match found[..] {
+            [table] => Ok(table),
+            [] => Err(self.unknown(name)),
+            _ => {
+                let names: Vec<String> = found.iter().map(|table| format!("{}.{}", table.stage, table.port)).collect();
+                Err(Error::spec("SQL", format!("`{name}` {what}; say which: {}", names.join(", "))))
+            }
+        }
+    }
+
+    fn unknown(&self, name: &str) -> Error {
+        let spelled = name.replace(['.', '/', '-'], "_");
+        let names: Vec<&str> =
+            self.iter().flat_map(|table| [Some(table.name.as_str()), table.short.as_deref()]).flatten().collect();
+        let hint = nearest(&spelled, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
+        let known: Vec<&str> = self.iter().map(|table| table.name.as_str()).collect();
+        let hint = hint.unwrap_or_else(|| ".".into());
+        Error::spec("SQL", format!("run {} has no table `{name}`{hint} Its tables: {}", self.run, known.join(", ")))
+    }
+}
+
+impl QueryTable {
+    fn is_called(&self, name: &str) -> bool {
+        let separated = |separator: char| name.split_once(separator) == Some((self.stage.as_str(), self.port.as_str()));
+        name == self.name || ['.', '/', '_'].into_iter().any(separated)
+    }
+
+    /// What the kind of table is for; nothing of a kind that this calib does not know.
+    pub fn schema(&self) -> Option<&'static TableSchema> {
+        schema::all().find(|schema| schema.name == self.kind)
+    }
+
+    /// The columns that its file has.
+    pub fn columns(&self, store: &Store) -> Result<Vec<QueryColumn>> {
+        let mut frame = super::scan(store, self)?;
+        let names = super::names(&mut frame).map_err(|error| Error::store(&self.name, error.to_string()))?;
+        Ok(names.into_iter().map(|name| self.column(name)).collect())
+    }
+
+    fn column(&self, name: String) -> QueryColumn {
+        let Some((field, joint)) = self.schema().and_then(|schema| schema.field_of(&name)) else {
+            return QueryColumn { name, column_type: String::new(), unit: None, description: String::new() };
+        };
+        let joint = joint.map_or_else(String::new, |joint| joint.to_string());
+        let column_type = match field.column_type {
+            ColumnType::Utf8 => "utf8",
+            ColumnType::Int64 => "int64",
+            ColumnType::Float64 => "float64",
+            ColumnType::Boolean => "boolean",
+        };
+        let description = field.description.replace("{j}", &joint);
+        QueryColumn { name, column_type: column_type.into(), unit: field.unit.clone(), description }
+    }
+}

@@ -1,0 +1,233 @@
+//! `calib query`: SQL over the tables of a run gives what the tables hold.
+
+use calib::audit::{self, QueryTables};
+use calib::pipeline::Manifest;
+use calib::store::Store;
+use calib::table::{Prediction, PredictionRow, Recording, Table};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+use crate::bucket::bucket_of;
+
+/// One run that all tests ask.
+static STORE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml");
+    let output = calib(folder.path(), &["run", pipeline.to_str().unwrap(), "--quiet"]);
+    assert!(output.status.success(), "{}", text(&output));
+    folder
+});
+
+fn calib(store: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).arg("--store").arg(store).output().unwrap()
+}
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+fn ask(arguments: &[&str]) -> String {
+    let output = calib(STORE.path(), &[&["query", "HEAD"], arguments].concat());
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+fn refused(sql: &str) -> String {
+    let output = calib(STORE.path(), &["query", "HEAD", sql]);
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{sql}: {}", text(&output));
+    String::from_utf8(output.stderr).unwrap()
+}
+/// The objects of `--json`.
+fn rows(sql: &str) -> Vec<Value> {
+    serde_json::from_str::<Vec<Value>>(&ask(&[sql, "--json"])).unwrap()
+}
+fn table<T: Table>(name: &str) -> T {
+    let store = Store::open(STORE.path()).unwrap();
+    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    T::from_frame(&store.load(&tables.find(name).unwrap().table).unwrap()).unwrap()
+}
+fn objects(store: &Path) -> Vec<PathBuf> {
+    let folders = std::fs::read_dir(store.join("objects")).into_iter().flatten();
+    folders.flat_map(|folder| std::fs::read_dir(folder.unwrap().path()).unwrap()).map(|file| file.unwrap().path()).collect()
+}
+fn prediction(stage: &str) -> Vec<PredictionRow> {
+    table::<Prediction>(&format!("{stage}_prediction")).0
+}
+
+#[test]
+fn without_sql_tables_are_listed_with_rows_columns_and_units() {
+    let told = ask(&[]);
+    for line in [
+        "  geometry_prediction  80 rows\n",
+        "  nominal_prediction   80 rows\n",
+        "  simulate_recording  80 rows, also `recording`\n",
+        "  mm     Measured minus predicted, x in the tracker frame.\n",
+    ] {
+        assert!(told.contains(line), "{line}: {told}");
+    }
+    assert!(!told.contains("also `prediction`"), "{told}");
+    let one = ask(&["geometry.prediction"]);
+    assert!(
+        one.starts_with("prediction: ") && one.contains("geometry_prediction") && !one.contains("nominal_prediction"),
+        "{one}"
+    );
+    let listed: Vec<Value> = serde_json::from_str(&ask(&["--json"])).unwrap();
+    let recording = listed.iter().find(|table| table["table"] == "simulate_recording").unwrap();
+    assert_eq!((&recording["rows"], &recording["short"]), (&80.into(), &"recording".into()));
+    let columns = recording["columns"].as_array().unwrap();
+    let q6 = columns.iter().find(|column| column["name"] == "q6_rad").unwrap();
+    assert_eq!((&q6["unit"], &q6["type"]), (&"rad".into(), &"float64".into()));
+}
+
+#[test]
+fn groups_hold_what_the_table_holds_in_the_order_of_its_rows() {
+    let own = prediction("geometry");
+    let mut order: Vec<&str> = Vec::new();
+    let mut groups: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for row in &own {
+        if !order.contains(&row.set.as_str()) {
+            order.push(&row.set);
+        }
+        groups.entry(&row.set).or_default().push(row.error_mm);
+    }
+    assert!(groups.len() > 1, "{groups:?}");
+    let sql = "SELECT step, \"set\", count(*) AS points, avg(error_mm) AS mean_mm, max(error_mm) AS max_mm \
+               FROM geometry.prediction GROUP BY step, \"set\"";
+    let told = rows(sql);
+    assert_eq!(told.iter().map(|row| row["set"].as_str().unwrap()).collect::<Vec<_>>(), order);
+    for row in &told {
+        let errors = &groups[row["set"].as_str().unwrap()];
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        assert_eq!((&row["step"], &row["points"]), (&"geometry".into(), &errors.len().into()));
+        assert!((row["mean_mm"].as_f64().unwrap() - mean).abs() < 1e-12);
+        assert_eq!(row["max_mm"].as_f64().unwrap(), errors.iter().copied().fold(0.0, f64::max));
+    }
+    // As many groups as rows, which threads would give in any order; the same of what is joined, distinct or left over.
+    let errors: Vec<f64> = own.iter().map(|row| row.error_mm).collect();
+    for sql in [
+        "SELECT error_mm FROM geometry_prediction GROUP BY error_mm",
+        "SELECT DISTINCT error_mm FROM geometry_prediction",
+        "SELECT g.error_mm FROM geometry_prediction g JOIN recording r ON r.sequence = g.sequence",
+        "SELECT error_mm FROM geometry_prediction EXCEPT SELECT error_mm FROM geometry_prediction WHERE error_mm < 0",
+        "SELECT error_mm FROM geometry_prediction WHERE sequence IN (SELECT sequence FROM recording)",
+    ] {
+        let told: Vec<f64> = rows(sql).iter().map(|row| row["error_mm"].as_f64().unwrap()).collect();
+        assert_eq!(told, errors, "{sql}");
+    }
+    let grid = ask(&[sql]);
+    assert!(grid.starts_with("step ") && grid.lines().count() == 1 + told.len(), "{grid}");
+}
+
+#[test]
+fn tables_are_joined_by_their_points_in_the_order_of_the_first() {
+    let (nominal, geometry) = (prediction("nominal"), prediction("geometry"));
+    let after: BTreeMap<i64, f64> = geometry.iter().map(|row| (row.sequence, row.error_mm)).collect();
+    let told = rows(
+        "SELECT n.sequence, n.error_mm - g.error_mm AS gain_mm FROM nominal.prediction n \
+         JOIN \"geometry/prediction\" AS g ON n.sequence = g.sequence",
+    );
+    assert_eq!(told.len(), nominal.len());
+    for (row, own) in told.iter().zip(&nominal) {
+        assert_eq!(row["sequence"], own.sequence);
+        assert_eq!(row["gain_mm"].as_f64().unwrap(), own.error_mm - after[&own.sequence]);
+    }
+    // Another kind of table, by its short name, and what has no pair.
+    let recording: Recording = table("recording");
+    let told = rows(
+        "SELECT recording.sequence FROM recording WHERE sequence NOT IN \
+         (SELECT sequence FROM geometry_prediction WHERE error_mm >= 0)",
+    );
+    assert_eq!((told.len(), recording.to_frame().unwrap().rows()), (0, 80));
+    let own = rows("SELECT geometry.prediction.step AS s FROM geometry.prediction JOIN recording USING (sequence) LIMIT 3");
+    assert_eq!(own.iter().map(|row| row["s"].as_str().unwrap()).collect::<Vec<_>>(), ["geometry"; 3]);
+}
+
+#[test]
+fn with_window_and_order_are_answered() {
+    let mut own = prediction("geometry");
+    own.sort_by(|a, b| b.error_mm.total_cmp(&a.error_mm));
+    let told = rows(
+        "WITH worst AS (SELECT sequence, error_mm, ROW_NUMBER() OVER (PARTITION BY step ORDER BY error_mm DESC) AS place \
+         FROM geometry_prediction) SELECT sequence FROM worst WHERE place <= 3 ORDER BY place",
+    );
+    let worst: Vec<i64> = told.iter().map(|row| row["sequence"].as_i64().unwrap()).collect();
+    assert_eq!(worst, own[..3].iter().map(|row| row.sequence).collect::<Vec<_>>());
+}
+
+#[test]
+fn csv_and_json_hold_every_row_to_the_last_digit() {
+    let own = prediction("geometry");
+    let sql = "SELECT sequence, point_id, error_mm, turn_rad FROM (SELECT *, NULL AS turn_rad FROM geometry_prediction)";
+    let text = ask(&[sql, "--csv"]);
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    assert_eq!(reader.headers().unwrap(), vec!["sequence", "point_id", "error_mm", "turn_rad"]);
+    let records: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(records.len(), own.len());
+    let objects = rows(sql);
+    for ((record, object), row) in records.iter().zip(&objects).zip(&own) {
+        assert_eq!((record[2].parse::<f64>().unwrap(), &record[3]), (row.error_mm, ""));
+        assert_eq!((&record[0], &record[1]), (row.sequence.to_string().as_str(), row.point_id.as_str()));
+        assert_eq!((object["error_mm"].as_f64().unwrap(), &object["turn_rad"]), (row.error_mm, &Value::Null));
+    }
+    assert_eq!(objects.len(), own.len());
+}
+
+#[test]
+fn fifty_rows_are_shown_and_the_others_counted() {
+    let sql = "SELECT sequence, error_mm FROM geometry_prediction";
+    let told = ask(&[sql]);
+    assert_eq!(told.lines().count(), 52);
+    assert!(told.ends_with("\n30 more rows: --rows N shows N of them, --csv and --json all\n"), "{told}");
+    assert_eq!(ask(&[sql, "--rows", "0"]).lines().count(), 81);
+    assert_eq!(ask(&[sql, "--rows", "3"]).lines().count(), 5);
+    assert!(ask(&["SELECT sequence FROM geometry_prediction WHERE error_mm < 0"]).ends_with("no rows\n"));
+}
+
+#[test]
+fn what_is_not_there_is_named_with_what_is() {
+    let told = refused("SELECT * FROM geometry_predicton");
+    assert!(told.contains("no table `geometry_predicton`; did you mean `geometry_prediction`? Its tables: "), "{told}");
+    assert!(told.contains("simulate_recording") && told.contains("nominal_parameters"), "{told}");
+    let told = refused("SELECT eror_mm FROM geometry_prediction");
+    assert!(told.contains("no column `eror_mm`; did you mean `error_mm`? Columns of geometry_prediction: sequence, "), "{told}");
+    let told = refused("SELECT g.eror_mm FROM geometry_prediction g JOIN recording USING (sequence)");
+    assert!(told.contains("no column `eror_mm`; did you mean `error_mm`?") && told.contains("of recording: "), "{told}");
+    let told = refused("SELECT sequence FROM prediction");
+    assert!(
+        told.contains("`prediction` is written by several stages; say which: nominal.prediction, geometry.prediction"),
+        "{told}"
+    );
+    let told = refused("SELECT step, sum(error_mm FROM geometry_prediction");
+    assert!(told.contains("SQL: Expected: ") && told.contains("Line: 1, Column: "), "{told}");
+    let told = refused("SELECT step FROM geometry_prediction ORDER BY 0");
+    assert!(told.starts_with("error: SQL: ") && told.lines().count() == 1, "{told}");
+    assert!(refused("recordin").contains("did you mean `recording`?"));
+}
+
+#[test]
+fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
+    let before = objects(STORE.path());
+    for sql in [
+        "DROP TABLE recording",
+        "DELETE FROM recording WHERE sequence = 1",
+        "CREATE TABLE mine AS SELECT * FROM recording",
+        "SELECT 1; SELECT 2",
+    ] {
+        assert!(refused(sql).contains("expected one SELECT"), "{sql}");
+    }
+    let told = refused("SELECT * FROM read_parquet('other.parquet')");
+    assert!(told.contains("no table `read_parquet`"), "{told}");
+    assert_eq!(objects(STORE.path()), before);
+    let output = calib(STORE.path(), &["query", "SELECT * FROM recording"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output).contains("the run comes before the SQL"), "{}", text(&output));
+}
+
+#[test]
+fn of_a_store_in_a_bucket_the_tables_that_are_asked_are_fetched() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = bucket_of(STORE.path(), &folder.path().join("cache"));
+    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    let answer = audit::query(&store, &tables, "SELECT r.sequence FROM recording r JOIN split USING (sequence)").unwrap();
+    assert_eq!((answer.rows(), objects(store.root()).len()), (80, 2));
+}
