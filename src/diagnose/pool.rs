@@ -41,10 +41,13 @@ pub(crate) struct Pool<'a> {
     pub charge: Vec<f64>,
     /// Numbers of the torque model, seen only through a compliance in the same set.
     pub borrowed: Vec<bool>,
-    products: Mutex<HashMap<(usize, usize), Arc<Mat<f64>>>>,
+    products: Mutex<Products>,
     scores: Mutex<HashMap<Vec<usize>, f64>>,
     states: Mutex<HashMap<Vec<usize>, Arc<State>>>,
 }
+
+/// Products of the columns of pairs of hypotheses.
+type Products = HashMap<(usize, usize), Arc<Mat<f64>>>;
 
 /// Columns that one thread projects at once.
 const CHUNK: usize = 64;
