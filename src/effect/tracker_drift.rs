@@ -82,7 +82,11 @@ impl Effect for TrackerDrift {
 
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let rate = match self.course {
-            Course::Steady { start_s, end_s, power } => libm::pow(((state.time() - start_s) / (end_s - start_s)).max(0.0), power),
+            Course::Steady { start_s, end_s, power } => {
+                let share = (state.time() - start_s) / (end_s - start_s);
+                // Rows before the fitted ones lie on the other side.
+                libm::copysign(libm::pow(share.abs(), power), share)
+            }
             Course::Warming(by) => by.at(state),
             Course::Slow { start_s, end_s } => {
                 for (k, value) in cosines(state.time(), [start_s, end_s], SLOW).enumerate() {
