@@ -1,7 +1,7 @@
 //! `calib effects`: the library of effects, in words.
 
 use super::{emit, emit_json};
-use crate::effect::{About, CATALOGUE};
+use crate::effect::{About, CAUSES, cause};
 use crate::error::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -23,8 +23,8 @@ pub(super) struct EffectsArguments {
 
 pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
     let chosen: Vec<&About> = match &arguments.name {
-        None => CATALOGUE.iter().collect(),
-        Some(name) => vec![CATALOGUE.iter().find(|about| about.name == name).ok_or_else(|| unknown(name))?],
+        None => CAUSES.iter().map(|cause| cause.about()).collect(),
+        Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?.about()],
     };
     if arguments.json {
         let one = |about: &&About| {
@@ -47,6 +47,6 @@ fn entry(about: &About) -> String {
 }
 
 fn unknown(name: &str) -> Error {
-    let names: Vec<&str> = CATALOGUE.iter().map(|about| about.name).collect();
+    let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name()).collect();
     Error::spec("EFFECT", format!("no effect `{name}`; allowed: {}", names.join(", ")))
 }

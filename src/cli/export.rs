@@ -170,7 +170,7 @@ impl Export {
             "parameters": parameters.collect::<Vec<_>>(),
             "rigid_residual_mm": { "rms": self.residual.0 * 1e3, "max": self.residual.1 * 1e3, "poses": self.poses },
             "not_in_geometry": self.left_out.iter().map(|out| json!({
-                "effect": out.effect, "where": out.place, "rms_mm": out.rms * 1e3, "max_mm": out.most * 1e3 })).collect::<Vec<_>>(),
+                "effect": out.effect, "where": out.place.to_string(), "rms_mm": out.rms * 1e3, "max_mm": out.most * 1e3 })).collect::<Vec<_>>(),
             "learned_correction": self.identified.correction.is_some(),
         });
         serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))

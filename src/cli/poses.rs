@@ -6,7 +6,7 @@ mod output;
 mod show;
 
 use super::{emit, emit_json};
-use crate::effect::{EFFECTS, EffectStack, Load, Setting, entry};
+use crate::effect::{EffectStack, Load, Setting, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, Wish, propose};
@@ -173,8 +173,8 @@ fn check(arguments: &PosesArguments) -> Result<()> {
     let none = Vec::new();
     let separate = arguments.separate.as_ref().filter(|_| arguments.run.is_none());
     for (option, names) in [("--effects", &arguments.effects), ("--separate", separate.unwrap_or(&none))] {
-        for name in names.iter().filter(|name| entry(name).is_none()) {
-            let known: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+        for name in names.iter().filter(|name| whole(name, &setting()).is_none()) {
+            let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
             let hint = nearest(name, known.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
             faults.push(Fault::new(option, format!("unknown effect `{name}`; {hint}allowed: {}", known.join(", "))));
         }
@@ -269,11 +269,11 @@ fn effects(arguments: &PosesArguments, robot: &RobotModel, site: &Site) -> Named
     };
     let setting = setting();
     let (mut kept, mut left) = (Vec::new(), Vec::new());
-    for entry in EFFECTS {
-        if arguments.effects.is_empty() || arguments.effects.iter().any(|name| name == entry.name) {
-            match (entry.make)(&setting).missing(robot, &data) {
-                Some(reason) => left.push((entry.name, reason)),
-                None => kept.push(entry.name),
+    for effect in identified().filter_map(|cause| cause.whole(&setting)) {
+        if arguments.effects.is_empty() || arguments.effects.iter().any(|name| name == effect.name()) {
+            match effect.missing(robot, &data) {
+                Some(reason) => left.push((effect.name(), reason)),
+                None => kept.push(effect.name()),
             }
         }
     }
@@ -286,6 +286,6 @@ fn setting() -> Setting {
 
 fn model(robot: &RobotModel, effects: &[&str]) -> Model {
     let setting = setting();
-    let made = effects.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting)).collect();
+    let made = effects.iter().filter_map(|name| whole(name, &setting)).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
 }

@@ -1,7 +1,7 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::{LONG_AFTER, Scratch, is_of_the_measurement};
+use crate::effect::{Form, LONG_AFTER, Scratch};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::Measurements;
@@ -40,13 +40,9 @@ pub struct Arm {
 impl Arm {
     /// The arm of a model; effects of the measurement itself are taken out.
     pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
-        let specs = model.stack.specs();
-        let quiet: Vec<usize> = (model.stack.effects())
-            .flat_map(|(effect, range)| {
-                let quiet = |k: &usize| is_of_the_measurement(effect.name(), &specs[*k].place, effect.form());
-                range.filter(quiet).collect::<Vec<_>>()
-            })
-            .collect();
+        let of_it = |form: &Form| form.is_of_the_measurement();
+        let effects = model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(of_it));
+        let quiet: Vec<usize> = effects.flat_map(|(_, range)| range).collect();
         for parameter in quiet {
             model.x[parameter] = 0.0;
         }

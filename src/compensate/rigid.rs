@@ -4,6 +4,7 @@
 
 use super::arm::Arm;
 use super::solve::Chain;
+use crate::effect::Place;
 use crate::estimate::Model;
 use crate::robot::description::RobotDescription;
 use crate::robot::{Measurements, RobotModel};
@@ -18,7 +19,7 @@ const RIGID: [&str; 4] = ["base_frame", "tool_offset", "link_geometry", "joint_o
 pub struct LeftOut {
     /// Canonical name of the effect.
     pub effect: String,
-    pub place: String,
+    pub place: Place,
     /// What the point moves without it, m, rms and at most, over the poses.
     pub rms: f64,
     pub most: f64,
@@ -54,11 +55,11 @@ fn parts(twist: &Twist) -> (Vector3<f64>, Vector3<f64>) {
 }
 
 /// The model with the parameters that `keep` refuses (by effect and place) at zero.
-fn only(model: &Model, keep: impl Fn(&str, &str) -> bool) -> Model {
+fn only(model: &Model, keep: impl Fn(&str, Place) -> bool) -> Model {
     let mut out = model.clone();
     let specs = model.stack.specs();
     for (effect, range) in model.stack.effects() {
-        for k in range.filter(|k| !keep(effect.name(), &specs[*k].place)) {
+        for k in range.filter(|k| !keep(effect.name(), specs[*k].place)) {
             out.x[k] = 0.0;
         }
     }
@@ -69,10 +70,10 @@ fn only(model: &Model, keep: impl Fn(&str, &str) -> bool) -> Model {
 pub fn left_out(model: &Model, data: &Measurements) -> Vec<LeftOut> {
     let whole = model.predict(data);
     let specs = model.stack.specs();
-    let mut places: Vec<(String, String)> = Vec::new();
+    let mut places: Vec<(String, Place)> = Vec::new();
     for (effect, range) in model.stack.effects().filter(|(effect, _)| !RIGID.contains(&effect.name())) {
         for k in range.filter(|k| model.x[*k] != 0.0) {
-            let key = (effect.name().to_string(), specs[k].place.clone());
+            let key = (effect.name().to_string(), specs[k].place);
             if !places.contains(&key) {
                 places.push(key);
             }

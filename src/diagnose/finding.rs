@@ -7,19 +7,12 @@ use super::rivals::{exact, rivals};
 use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
-use crate::effect::{Effect, Form, ParameterSpec, Place, Placed, ReductionRatio, Signature};
+use crate::effect::{
+    AxisWobble, Backlash, Basis, Effect, Form, GearCyclic, JointCompliance, JointHardening, JointLogLag, Number, ParameterSpec, Place,
+    ReductionRatio, Term, Told, Unknown, Variable, cause, people,
+};
 use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
-use crate::units::Unit;
 use std::collections::BTreeMap;
-
-/// A number of a finding.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Number {
-    pub name: String,
-    pub value: f64,
-    pub unit: &'static str,
-    pub sigma: Option<f64>,
-}
 
 /// How well a finding stands.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,7 +33,7 @@ pub struct Evidence {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rival {
     pub effect: &'static str,
-    pub place: String,
+    pub place: Place,
     pub delta_bic: f64,
 }
 
@@ -48,7 +41,7 @@ pub struct Rival {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     pub effect: &'static str,
-    pub place: String,
+    pub place: Place,
     pub statement: String,
     pub numbers: Vec<Number>,
     /// None for faults of single rows.
@@ -69,9 +62,13 @@ impl Finding {
 
     /// Whether nothing but a shape stands behind it.
     pub fn has_no_law(&self) -> bool {
-        !self.forms.is_empty() && self.forms.iter().all(|form| matches!(form, Form::Unknown(_)))
+        !self.forms.is_empty() && self.forms.iter().all(|form| form.cause().is_nameless())
     }
 }
+
+/// Chosen causes by the name that they are called and their place: positions among the chosen.
+type Key = (&'static str, Place);
+type Groups = BTreeMap<Key, Vec<usize>>;
 
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
@@ -90,26 +87,20 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     sorted.sort_unstable();
     let ranges = last.model.stack.effects().count() - last.chosen.len();
     let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
-    let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
+    let mut groups: Groups = BTreeMap::new();
     for (i, k) in set.iter().enumerate() {
         let form = &pool.hypotheses[*k].form;
         let values = &last.model.x[ranges[i].clone()];
-        let name = match form {
-            Form::JointTable(_) if is_wavy(values) => "gear_cyclic",
-            Form::JointHardening(law) if law.is_lost_motion(values, looked.survey.load(law.joint())) => "backlash",
-            Form::Unknown(unknown) if unknown.is_hose() => "cable_drag",
-            _ => form.name(),
-        };
-        groups.entry((name, form.place().to_string())).or_default().push(i);
+        groups.entry((form.called(values, looked.survey), form.place())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
     both_angles(pool, &mut groups, set);
     wobbles(pool, &mut groups, set);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
-    let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
+    let hard: Vec<Place> = groups.keys().filter(|key| key.0 == JointHardening::NAME).map(|key| key.1).collect();
     for place in hard {
-        if let Some(more) = groups.remove(&("joint_compliance", place.clone())) {
-            groups.entry(("joint_hardening", place)).or_default().extend(more);
+        if let Some(more) = groups.remove(&(JointCompliance::NAME, place)) {
+            groups.entry((JointHardening::NAME, place)).or_default().extend(more);
         }
     }
     let whole = solve(pool, &sorted);
@@ -147,31 +138,34 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             }
         }
         let forms: Vec<Form> = members.iter().map(|i| last.chosen[*i].form.clone()).collect();
-        let mut rivals = rivals(pool, &rest, &own, bic, (effect, &place));
-        exact(effect, &forms, &place, &mut rivals);
+        let mut rivals = rivals(pool, &rest, &own, bic, (effect, place));
+        exact(effect, &forms, &mut rivals);
         rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
         let effect_rms = size(pool, members.iter().map(|i| (set[*i], &last.model.x[ranges[*i].clone()])));
         let evidence = Evidence {
             f_statistic,
             p_value: tail(f_statistic, rank as f64, freedom),
             delta_bic: pool.bic(&rest) - bic,
-            heldout_gain: worth_of(&forms, &place, &looked.worths),
+            heldout_gain: worth_of(&forms, place, &looked.worths),
             effect_rms,
             gain,
         };
-        let table = forms.iter().find_map(|form| if let Form::JointTable(table) = form { Some(table.range()) } else { None });
+        let table = forms.iter().find_map(|form| match form.term()?.basis() {
+            Basis::Fading { low, high, .. } => Some([low, high]),
+            _ => None,
+        });
         let valid = match forms[0].place() {
             Place::Joint(joint) => Some((joint, table.unwrap_or(looked.survey.range[joint]))),
             _ => None,
         };
-        let statement = sentence(effect, &place, &forms, &numbers, effect_rms);
+        let statement = sentence(effect, &Told { place, forms: &forms, numbers: &numbers }, effect_rms);
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
     let data = looked.survey.data;
-    let by_the_way_there = |form: &Form| match form {
-        Form::JointLogLag(lag) => !lag.is_time(),
-        Form::Backlash(_) => data.direction.is_none(),
-        _ => false,
+    let by_the_way_there = |form: &Form| match form.variables().first() {
+        Some(Variable::LastMove) => true,
+        Some(of) => of.follows_the_way() && data.direction.is_none(),
+        None => false,
     };
     // Nobody knows from where the arm came to the first row.
     let unknown = last.chosen.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
@@ -183,53 +177,31 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
 }
 
 /// What held-out rows say of forms of one effect at a place.
-fn worth_of(forms: &[Form], place: &str, worths: &[Worth]) -> Option<f64> {
+fn worth_of(forms: &[Form], place: Place, worths: &[Worth]) -> Option<f64> {
     let name = forms.first()?.name();
     let own = worths.iter().find(|worth| worth.effect == name && worth.place == place);
     own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|worth| worth.gain)
 }
 
-/// Cosines of a curve up to this one make at most two periods over its range.
-const SMOOTH: usize = 4;
-
-/// Whether a curve has most of its variance in waves of more than two periods over its range: a gear or an encoder.
-fn is_wavy(coefficients: &[f64]) -> bool {
-    let square = |some: &[f64]| some.iter().map(|c| c * c).sum::<f64>();
-    2.0 * square(&coefficients[SMOOTH.min(coefficients.len())..]) > square(coefficients)
-}
-
-/// What else an effect's own shape may leave at the same joint where it is not quite that of the library.
-fn leaves(main: &str) -> &'static [&'static str] {
-    match main {
-        "counterbalance" | "cable_drag" => &["gear_cyclic", "unknown", "joint_table", "backlash"],
-        "joint_hardening" => &["backlash", "unknown"],
-        "joint_compliance" => &["unknown"],
-        "backlash" => &["joint_hardening", "joint_compliance", "unknown"],
-        "viscous_windup" => &["backlash", "gear_cyclic", "unknown"],
-        "gear_cyclic" | "joint_table" => &["unknown"],
-        "unknown" => &["gear_cyclic", "joint_table"],
-        _ => &[],
-    }
-}
-
 /// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
-fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
+fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
     let mut sorted = set.to_vec();
     sorted.sort_unstable();
     let whole = solve(pool, &sorted).gain;
+    let finer = |name| cause(name).map_or(&[] as &[&str], |cause| cause.finer());
     let gain = |members: &[usize]| {
         let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
         let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
         whole - solve(pool, &rest).gain
     };
-    let gains: BTreeMap<(&'static str, String), f64> = groups.iter().map(|(key, members)| (key.clone(), gain(members))).collect();
+    let gains: BTreeMap<Key, f64> = groups.iter().map(|(key, members)| (key.clone(), gain(members))).collect();
     for (small, own) in &gains {
         let main = gains
             .iter()
             .filter(|(main, gain)| {
-                let finer = main.1 == small.1 && *own < REFINEMENT * **gain && leaves(main.0).contains(&small.0);
+                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer(main.0).contains(&small.0);
                 // Both go with the side of the last move.
-                finer || (main.0 == "joint_log_lag" && small.0 == "backlash" && *own < TRACE * **gain)
+                joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < TRACE * **gain)
             })
             .max_by(|a, b| a.1.total_cmp(b.1));
         if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
@@ -240,18 +212,20 @@ fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>
 }
 
 /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
-fn both_angles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
+fn both_angles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
     let form = |i: &usize| &pool.hypotheses[set[*i]].form;
     let main = groups.iter().find_map(|(key, members)| {
-        let angles =
-            members.iter().find_map(|i| if let Form::Unknown(unknown) = form(i) { unknown.two_angles() } else { None })?;
+        let angles = members.iter().find_map(|i| form(i).term()?.two_angles())?;
         let Place::Joint(joint) = form(&members[0]).place() else { return None };
-        Some((key.clone(), joint, angles))
+        Some((*key, joint, angles))
     });
     let Some((main, joint, angles)) = main else { return };
-    let is_part = |i: &usize| match form(i) {
-        Form::GearCyclic(gear) => gear.joint() == joint && angles.contains(&joint) && gear.order() <= SLOW,
-        other => matches!(other.place(), Place::Coupled(by, moved) if moved == joint && angles.contains(&by)),
+    let is_part = |i: &usize| match (form(i).place(), form(i).term().map(Term::basis)) {
+        (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
+        (at, Some(Basis::Wave { order, .. })) if form(i).is(&GearCyclic) => {
+            at == Place::Joint(joint) && angles.contains(&joint) && order <= SLOW
+        }
+        _ => false,
     };
     let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| key.clone()).collect();
     for part in parts {
@@ -264,15 +238,18 @@ fn both_angles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<us
 const SLOW: u32 = 2;
 
 /// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
-fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
-    let by = |i: &usize| match &pool.hypotheses[set[*i]].form {
-        Form::Unknown(unknown) => match unknown.signature() {
-            Signature::Periodic { by, .. } => Some(("axis_wobble", Place::Joint(by).to_string())),
+fn wobbles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
+    // Of a joint that follows a sine of another joint's angle, that other joint.
+    let by = |i: &usize| {
+        let term = pool.hypotheses[set[*i]].form.term()?;
+        match (term.basis(), term.of_one()) {
+            (Basis::Wave { .. }, Some((joint, Variable::Angle { joint: by }))) if by != joint => {
+                Some((AxisWobble::NAME, Place::Joint(by)))
+            }
             _ => None,
-        },
-        _ => None,
+        }
     };
-    let unknown: Vec<(&'static str, String)> = groups.keys().filter(|key| key.0 == "unknown").cloned().collect();
+    let unknown: Vec<Key> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
     for key in unknown {
         let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
         if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {
@@ -289,7 +266,7 @@ fn reversals(last: &Course) -> Vec<Finding> {
         .filter(|((spec, x), _)| spec.name.starts_with(ReductionRatio::NAME) && (*x - super::REVERSED).abs() < REVERSED_WITHIN);
     let one = |((spec, x), fate): ((&ParameterSpec, &f64), &Fate)| {
         let sigma = if let Fate::Free(sigma) = fate { Some(*sigma) } else { None };
-        let place = spec.place.clone();
+        let place = spec.place;
         let statement =
             format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
         let numbers = vec![Number { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
@@ -337,18 +314,8 @@ fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
 
 /// A fault of the recording.
 fn of_the_recording(effect: &'static str, statement: String) -> Finding {
-    let place = Place::Recording.to_string();
+    let place = Place::Recording;
     Finding { effect, place, statement, numbers: Vec::new(), evidence: None, rivals: Vec::new(), valid: None, forms: Vec::new() }
-}
-
-/// The unit in which people read a number of this unit.
-fn people(unit: Unit) -> (Unit, &'static str) {
-    match unit {
-        Unit::Radian => (Unit::Arcsecond, "arcsec"),
-        Unit::Second => (Unit::Millisecond, "ms"),
-        Unit::RadianPerRadianPerSecond => (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)"),
-        other => (other, other.symbol()),
-    }
 }
 
 /// Rms length (m) of the whole effect over the fitted rows, the absorbed part included, of hypotheses with their fitted coefficients.

@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::{ALIKE, Chosen, Course, Question, fitted, held_down, start_of};
-use crate::effect::{Effect, Form, Placed};
+use crate::effect::{Effect, Form, Place, Unknown};
 use crate::estimate::rows_alike;
 use crate::robot::Measurements;
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub(crate) struct Worth {
     pub effect: &'static str,
-    pub place: String,
+    pub place: Place,
     pub gain: f64,
 }
 
@@ -76,19 +76,19 @@ pub(crate) fn judge(
     let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(free), chosen, data, question);
     let mut worths = Vec::new();
     let mut at = 0;
-    let mut done: Vec<(&'static str, String)> = Vec::new();
+    let mut done: Vec<(&'static str, Place)> = Vec::new();
     while at < set.len() {
         let form = &pool.hypotheses[set[at]].form;
-        let group = (form.name(), form.place().to_string());
+        let group = (form.name(), form.place());
         if done.contains(&group) {
             at += 1;
             continue;
         }
-        done.push(group.clone());
+        done.push(group);
         let all = start_of(&now);
         let is_own = |k: &usize| {
             let form = &pool.hypotheses[*k].form;
-            form.name() == group.0 && form.place().to_string() == group.1
+            form.name() == group.0 && form.place() == group.1
         };
         let rest: Vec<usize> = set.iter().copied().filter(|k| !is_own(k)).collect();
         let others: Vec<Chosen> = set.iter().zip(&all).filter(|(k, _)| !is_own(k)).map(|(_, cause)| cause.clone()).collect();
@@ -132,7 +132,7 @@ pub(crate) fn judge(
                 at = 0;
             }
             // What has no name must prove itself: it has no physics to carry it to other points.
-            None if harmful || group.0 == "unknown" && bare.rms() < seen.rms() => {
+            None if harmful || group.0 == Unknown::NAME && bare.rms() < seen.rms() => {
                 *set = rest;
                 (now, seen) = (without, bare);
                 at = 0;
@@ -147,7 +147,7 @@ pub(crate) fn judge(
 }
 
 fn worth(form: &Form, gain: f64) -> Worth {
-    Worth { effect: form.name(), place: form.place().to_string(), gain }
+    Worth { effect: form.name(), place: form.place(), gain }
 }
 
 /// A hypothesis with its coefficients in a set.

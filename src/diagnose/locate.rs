@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::state::State;
-use crate::effect::{Course, Effect, Form, Placed, Side, Signature, Survey, Warmth};
+use crate::effect::{Basis, Effect, Form, Survey, Variable};
 use std::collections::BTreeMap;
 
 /// The best of all hypotheses at a place, or of a variable.
@@ -62,15 +62,7 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
                 effect: form.name(),
             });
         }
-        match (form, form.place()) {
-            (Form::GearCyclic(gear), _) if !gear.has_overtone() => {
-                spectrum.push(Line { joint: gear.joint(), motor: false, order: gear.order(), share })
-            }
-            (Form::GearMotorCyclic(gear), crate::effect::Place::Joint(joint)) => {
-                spectrum.push(Line { joint, motor: true, order: gear.order(), share });
-            }
-            _ => (),
-        }
+        spectrum.extend(line(form).map(|(joint, motor, order)| Line { joint, motor, order, share }));
     }
     let mut shares: Vec<Share> = best.into_values().collect();
     shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
@@ -79,45 +71,17 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
     Located { shares, spectrum }
 }
 
-/// What a form goes with.
-fn variables(form: &Form) -> impl Iterator<Item = String> {
-    let warmth = |by: Warmth| match by {
-        Warmth::Temperature { .. } => "temperature",
-        Warmth::Time { .. } => "time",
-    };
-    let number = match form.place() {
-        crate::effect::Place::Joint(joint) => joint + 1,
-        _ => 0,
-    };
-    let own = |what: &str| vec![format!("{what} {number}")];
-    let angle = |joint: usize| format!("q{}", joint + 1);
-    let all = match form {
-        Form::JointCompliance(_) | Form::JointHardening(_) => own("load of joint"),
-        Form::Backlash(gap) if matches!(gap.side(), Side::Load { .. }) => own("load of joint"),
-        Form::Backlash(_) => own("approach of joint"),
-        Form::GearMotorCyclic(_) => own("motor"),
-        Form::GearCyclic(_) | Form::JointTable(_) | Form::AxisWobble(_) | Form::Counterbalance(_) => vec![format!("q{number}")],
-        Form::ZeroShift(_) | Form::FrameShift(_) => vec!["time".into()],
-        Form::ThermalGrowth(growth) => vec![warmth(growth.by()).into()],
-        Form::TrackerDrift(drift) => match drift.course() {
-            Course::Warming(by) => vec![warmth(by).into()],
-            _ => vec!["time".into()],
-        },
-        Form::PayloadError(_) => vec!["payload".into()],
-        Form::JointLogLag(lag) if lag.is_time() => vec!["speed".into()],
-        Form::JointLogLag(_) => vec!["last move".into()],
-        Form::ViscousWindup(_) => own("speed of joint"),
-        Form::LinkCompliance(_) | Form::BaseCompliance(_) | Form::LinkMass(_) => vec!["load of the arm".into()],
-        Form::CouplingRatio(_) => Vec::new(),
-        Form::Unknown(unknown) => match unknown.signature() {
-            Signature::Angle { by, .. } | Signature::Hinge { by, .. } | Signature::Periodic { by, .. } => vec![angle(by)],
-            Signature::Bump { .. } | Signature::Step { .. } => vec![format!("q{number}")],
-            Signature::Product { a, b } | Signature::Surface { a, b, .. } => vec![format!("{} and {}", angle(a), angle(b))],
-            Signature::Sway { .. } | Signature::Time { .. } | Signature::Creep { .. } => vec!["time".into()],
-            Signature::Side { .. } | Signature::Sag => vec!["direction of gravity".into()],
-            Signature::Warming(by) => vec![warmth(by).into()],
-            Signature::Payload { .. } => vec!["payload".into()],
-        },
-    };
-    all.into_iter()
+/// What a form depends on, in words.
+fn variables(form: &Form) -> Option<String> {
+    let names: Vec<String> = form.variables().iter().map(Variable::to_string).collect();
+    (!names.is_empty()).then(|| names.join(" and "))
+}
+
+/// The order of a pure sine and cosine of a joint's or its motor's angle at that joint.
+fn line(form: &Form) -> Option<(usize, bool, u32)> {
+    let term = form.term()?;
+    let (joint, of) = term.of_one()?;
+    let Basis::Wave { order, overtone: false } = term.basis() else { return None };
+    let motor = of == Variable::Motor { joint };
+    (motor || of == Variable::Angle { joint }).then_some((joint, motor, order))
 }

@@ -22,17 +22,15 @@ mod statement;
 mod unseen;
 mod verdict;
 
-pub use finding::{Evidence, Finding, Number, Rival};
+pub use crate::effect::Number;
+pub use finding::{Evidence, Finding, Rival};
 pub use locate::{Line, Located, Share};
 pub use noise::Repeatability;
 pub use outside::beside;
 pub use separate::{Standing, contest, other_means};
 pub use verdict::{Diagnosis, Errors, Verdict};
 
-use crate::effect::{
-    BaseFrame, EFFECTS, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, Place, Placed, ReductionRatio, Setting,
-    Survey,
-};
+use crate::effect::{BaseFrame, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey, Term, identified, whole};
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened, rows_alike};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -187,16 +185,17 @@ fn same_forms(a: &[Form], b: &[Chosen]) -> bool {
 
 /// Causes with their coefficients; what belongs to the torque model also with what the motor currents say of it.
 fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Chosen> {
-    let borrowed: Vec<usize> = (0..forms.len()).filter(|i| is_torque_model(&forms[*i])).collect();
+    let borrowed: Vec<usize> = (0..forms.len()).filter(|i| forms[*i].is_of_torque_model()).collect();
     let own: Vec<&Form> = borrowed.iter().map(|i| &forms[*i]).collect();
     // The residual is that of the present model; what is asked is the whole number, hence at zero where it is new.
     let opinion = if own.is_empty() { None } else { lens.opinion(&own, &lens.present(&own)) };
     let mut opinion = opinion.unwrap_or_default().into_iter();
     let mut out = Vec::with_capacity(forms.len());
     for (i, (form, coefficients)) in forms.iter().zip(coefficients).enumerate() {
-        let known: Vec<Prior> = match form {
-            _ if borrowed.contains(&i) => opinion.by_ref().take(coefficients.len()).collect(),
-            _ => held_down(form, lens.robot, &coefficients),
+        let known: Vec<Prior> = if borrowed.contains(&i) {
+            opinion.by_ref().take(coefficients.len()).collect()
+        } else {
+            held_down(form, lens.robot, &coefficients)
         };
         out.push(Chosen { form: form.clone(), coefficients, known });
     }
@@ -206,7 +205,7 @@ fn chosen(lens: &Lens, forms: Vec<Form>, coefficients: Vec<Vec<f64>>) -> Vec<Cho
 /// What keeps the numbers of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or between
 /// sparse points: most of its numbers are of one size (empirical Bayes), and none is larger than is plausible.
 fn held_down(form: &Form, robot: &RobotModel, coefficients: &[f64]) -> Vec<Prior> {
-    if !matches!(form, Form::JointTable(_)) && !matches!(form, Form::Unknown(unknown) if unknown.is_curve()) {
+    if !form.term().is_some_and(Term::is_own_curve) {
         return Vec::new();
     }
     let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
@@ -217,11 +216,6 @@ fn held_down(form: &Form, robot: &RobotModel, coefficients: &[f64]) -> Vec<Prior
         |k: usize, spec: ParameterSpec| (share(k) * spec.prior_sigma.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
     let specs = form.parameters(robot).into_iter().enumerate();
     specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect()
-}
-
-/// Whether a form is a number of the torque model, seen only through what yields.
-fn is_torque_model(form: &Form) -> bool {
-    matches!(form, Form::Counterbalance(_) | Form::LinkMass(_) | Form::PayloadError(_))
 }
 
 /// Causes of a model with their fitted coefficients.
@@ -239,10 +233,9 @@ fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Model 
     let mut turned = data.clone();
     reversed.iter().for_each(|joint| sense::reverse(&mut turned, *joint));
     let setting = Setting { base: align(robot, &turned, rows), load: Load::GravityTorque };
-    let effects: Vec<Box<dyn Effect>> = EFFECTS
-        .iter()
-        .filter(|entry| BASE.contains(&entry.name))
-        .map(|entry| (entry.make)(&setting))
+    let effects: Vec<Box<dyn Effect>> = identified()
+        .filter(|cause| BASE.contains(&cause.name()))
+        .filter_map(|cause| cause.whole(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();
     let mut model = Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects));
@@ -272,8 +265,7 @@ fn fitted(
         .stack
         .effects()
         .take(base)
-        .filter_map(|(effect, _)| crate::effect::entry(effect.name()))
-        .map(|entry| (entry.make)(&setting))
+        .filter_map(|(effect, _)| whole(effect.name(), &setting))
         .collect();
     let count = rigid.iter().map(|effect| effect.parameters(robot).len()).sum::<usize>();
     let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
@@ -310,18 +302,15 @@ fn pool_of<'a>(lens: &'a Lens<'a>, now: &Course, free: &[usize], survey: &Survey
             residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
         }
     }
-    let hypotheses = crate::effect::CAUSES.iter().flat_map(|cause| (cause.propose)(survey)).collect();
-    Pool::new(lens, &jacobian, &residual, hypotheses)
+    Pool::new(lens, &jacobian, &residual, crate::effect::hypotheses(survey))
 }
 
 /// How far each joint yields in a model, rad/Nm.
 fn yielding(model: &Model) -> Vec<f64> {
     let mut out = vec![0.0; model.robot.joints()];
     for (effect, range) in model.stack.effects() {
-        if let Some(form @ (Form::JointCompliance(_) | Form::JointHardening(_))) = effect.form()
-            && let Place::Joint(joint) = form.place()
-        {
-            out[joint] += model.x[range].first().copied().unwrap_or(0.0).max(0.0);
+        if let Some((joint, compliance)) = effect.form().and_then(|form| form.compliance(&model.x[range])) {
+            out[joint] += compliance.max(0.0);
         }
     }
     out

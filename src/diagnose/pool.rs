@@ -5,7 +5,7 @@
 
 use super::lens::Lens;
 use super::state::State;
-use crate::effect::{Effect, Hypothesis, Placed};
+use crate::effect::{Effect, Hypothesis};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
@@ -126,7 +126,7 @@ impl<'a> Pool<'a> {
             self.gram.push(gram(&own));
             let places = hypothesis.form.place().count(joints) as f64;
             self.charge.push(2.0 * hypothesis.tried.ln() + hypothesis.charge + 2.0 * places.ln());
-            self.borrowed.push(super::is_torque_model(&hypothesis.form));
+            self.borrowed.push(hypothesis.form.is_of_torque_model());
             self.keys.push(hypothesis.form.key());
             self.hypotheses.push(hypothesis);
         }

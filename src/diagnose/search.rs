@@ -3,7 +3,7 @@
 use super::gate::gate;
 use super::pool::{Pool, dot, project};
 use super::state::{State, solve, span};
-use crate::effect::{Effect, Form, Hypothesis, Placed, Survey};
+use crate::effect::{Effect, Form, Hypothesis, JointCompliance, JointHardening, JointTable, LinkCompliance, Survey};
 use faer::Mat;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -93,7 +93,7 @@ impl<'a, 'b> Search<'a, 'b> {
     fn all_yielding(&self) -> Vec<usize> {
         let state = self.pool.state(&[]);
         let seen = state.falls(self.pool).iter().map(|(_, h)| *h);
-        let mut set: Vec<usize> = seen.filter(|h| matches!(self.pool.hypotheses[*h].form, Form::JointCompliance(_))).collect();
+        let mut set: Vec<usize> = seen.filter(|h| self.pool.hypotheses[*h].form.is(&JointCompliance)).collect();
         set.sort_unstable();
         set
     }
@@ -135,9 +135,11 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Of two laws of one wind-up that explain alike the simpler stands: proportional to the load.
     fn simplest(&self, mut set: Vec<usize>) -> Vec<usize> {
         for h in set.clone() {
-            let Form::JointHardening(law) = &self.pool.hypotheses[h].form else { continue };
-            let place = law.place();
-            let linear = |other: &Hypothesis| matches!(&other.form, Form::JointCompliance(form) if form.place() == place);
+            let bent = &self.pool.hypotheses[h].form;
+            if !bent.is(&JointHardening) {
+                continue;
+            }
+            let linear = |other: &Hypothesis| other.form.is(&JointCompliance) && other.form.place() == bent.place();
             let Some(simple) = self.pool.hypotheses.iter().position(linear).filter(|simple| !set.contains(simple)) else {
                 continue;
             };
@@ -183,7 +185,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let kind = |h: usize| {
             let form = &self.pool.hypotheses[h].form;
             // Bumps, hinges and warm-ups of the unknown are shapes of their own.
-            if form.name() == "unknown" { form.variant() } else { form.name().to_string() }
+            if form.cause().is_nameless() { form.variant() } else { form.name().to_string() }
         };
         let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
         firsts.into_iter().map(|h| with(set, h)).collect()
@@ -191,7 +193,8 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Whether a hypothesis may stand in for two others: a free curve, or the bending of a link for two joints' wind-up.
     fn stands_in(&self, h: usize) -> bool {
-        matches!(self.pool.hypotheses[h].form, Form::Unknown(_) | Form::JointTable(_) | Form::LinkCompliance(_))
+        let form = &self.pool.hypotheses[h].form;
+        form.cause().is_nameless() || form.is(&JointTable) || form.is(&LinkCompliance)
     }
 
     fn can_refine(&self, h: usize) -> bool {

@@ -4,7 +4,7 @@ use super::lens::Lens;
 use super::pool::Pool;
 use super::state::solve;
 use super::{statement, yielding};
-use crate::effect::{CAUSES, Effect, EffectStack, Form, Hypothesis, Load, Placed, Setting, Survey, entry};
+use crate::effect::{Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey, Unknown, hypotheses, whole};
 use crate::estimate::Model;
 use crate::estimate::choose::{Contest, Side};
 use crate::robot::Measurements;
@@ -83,11 +83,9 @@ pub fn other_means(effect: &str, rival: &str) -> Option<&'static str> {
 
 /// All that diagnosis would try under this name at this place.
 fn rivals(survey: &Survey, effect: &str, place: &str, finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
-    let named = |form: &Form| match form {
-        Form::Unknown(unknown) if unknown.is_hose() => matches!(effect, "cable_drag" | "unknown"),
-        _ => form.name() == effect,
-    };
-    let all = CAUSES.iter().flat_map(|cause| (cause.propose)(survey)).filter(|hypothesis| named(&hypothesis.form));
+    // What is called by its shape alone.
+    let named = |form: &Form| form.name() == effect || form.is(&Unknown) && form.called(&[], survey) == effect;
+    let all = hypotheses(survey).into_iter().filter(|hypothesis| named(&hypothesis.form));
     let all: Vec<Hypothesis> = all.filter(|hypothesis| finding != std::slice::from_ref(&hypothesis.form)).collect();
     let here = |form: &Form| form.place().to_string() == place || form.place().tag() == place;
     let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| here(&hypothesis.form)).cloned().collect();
@@ -110,7 +108,7 @@ fn with(model: &Model, form: &Form) -> Model {
     let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
         match effect.form() {
             Some(form) => Some(Box::new(form.clone())),
-            None => entry(effect.name()).map(|entry| (entry.make)(&setting)),
+            None => whole(effect.name(), &setting),
         }
     };
     let mut effects: Vec<Box<dyn Effect>> = model.stack.effects().filter_map(|(effect, _)| again(effect)).collect();

@@ -2,7 +2,7 @@
 
 use super::state::solve;
 use super::verdict::Looked;
-use crate::effect::{Effect, Form, Place, Placed};
+use crate::effect::{Effect, JointLogLag, Place, Variable, ViscousWindup};
 use crate::units::Unit;
 
 /// Standard deviations from which on a cause is found.
@@ -18,9 +18,9 @@ pub(crate) fn by_speed(looked: &Looked) -> Vec<String> {
     let (mut joints, mut largest): (Vec<String>, f64) = (Vec::new(), 0.0);
     for (h, hypothesis) in pool.hypotheses.iter().enumerate().filter(|(h, _)| !looked.set.contains(h)) {
         let form = &hypothesis.form;
-        let clocks = matches!(form, Form::JointLogLag(lag) if lag.is_time());
+        let clocks = form.is(&JointLogLag) && form.variables() == [Variable::Speed];
         let turns = |place| matches!(place, Place::Joint(joint) if looked.survey.robot.is_revolute(joint));
-        if !(clocks || matches!(form, Form::ViscousWindup(_)) && turns(form.place())) {
+        if !(clocks || form.is(&ViscousWindup) && turns(form.place())) {
             continue;
         }
         let mut set = looked.set.clone();

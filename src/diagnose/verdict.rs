@@ -8,7 +8,7 @@ use super::pool::Pool;
 use super::statement::{next, not_observable};
 use super::unseen::by_speed;
 use super::{Course, Question, REPEATS, SIGNIFICANT};
-use crate::effect::{Effect, Placed, Survey};
+use crate::effect::{Effect, Survey};
 use crate::estimate::{Fitted, Model, Screening, Weight};
 use crate::robot::Measurements;
 use nalgebra::Vector3;

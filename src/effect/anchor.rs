@@ -1,6 +1,6 @@
 //! `anchor`: the far end of a draw-wire or ballbar is elsewhere; three parameters each, tracker axes. It moves no point.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -19,6 +19,23 @@ impl Anchor {
     }
 }
 
+impl Cause for Anchor {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "anchor",
+            place: "anchor",
+            formula: "the far end of a draw-wire or ballbar is elsewhere; it moves no point",
+            size: "any",
+            confounded: "base_frame",
+            needs: "distances",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Self))
+    }
+}
+
 impl Effect for Anchor {
     fn name(&self) -> &'static str {
         Self::NAME
@@ -29,7 +46,7 @@ impl Effect for Anchor {
         let all = anchors.flat_map(|anchor| {
             AXES.iter().map(move |axis| ParameterSpec {
                 name: format!("{}{axis}", Self::prefix(&anchor.name)),
-                place: "anchor".into(),
+                place: Place::Anchor,
                 unit: Unit::Millimetre,
                 prior_sigma: 1.0,
             })

@@ -1,68 +1,65 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
-use crate::spatial::screw;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct AxisWobble {
-    joint: usize,
-    order: u32,
-    /// The direction across the axis (0 or 1) about which it tilts; both if none.
-    about: Option<usize>,
-    /// Whether the plane turns with the joint.
-    turning: bool,
-}
+pub struct AxisWobble;
 
 /// No bearing lets an axis tilt further, rad (100 arcsec).
 const LARGEST: f64 = 5e-4;
 
 impl AxisWobble {
-    /// Every joint but the last, whose tilt one measured point cannot tell from its angle.
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    pub const NAME: &'static str = "axis_wobble";
+}
+
+impl Cause for AxisWobble {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint",
+            formula: "the axis tilts by sin(n q), cos(n q), n = 1, 2",
+            size: "5 to 100 arcsec",
+            confounded: "gear_cyclic of a neighbour, coupling_ratio",
+            needs: "points far off the axis",
+        }
+    }
+
+    /// Every joint but the last, whose tilt one measured point cannot separate from its angle.
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let last = survey.joints() - 1;
         let forms = survey.revolute().filter(|joint| *joint != last).flat_map(|joint| {
             let orders = [1, 2].into_iter().flat_map(|order| [(order, true), (order, false)]);
-            orders.flat_map(move |(order, turning)| [None, Some(0), Some(1)].map(|about| Self { joint, order, about, turning }))
+            orders.flat_map(move |(order, turning)| {
+                let law = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
+                [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
+            })
         });
         forms.map(|form| Hypothesis::new(form, 12).charged(4.0).within(LARGEST)).collect()
     }
-}
 
-impl Effect for AxisWobble {
-    fn name(&self) -> &'static str {
-        "axis_wobble"
-    }
-
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let Motion::Axis { about, .. } = term.motion() else { return Vec::new() };
         let names = [["a_sin", "a_cos"], ["b_sin", "b_cos"]];
-        let chosen = (0..2).filter(|k| self.about.is_none_or(|about| about == *k)).flat_map(|k| names[k]);
-        parameters(self, chosen.map(|name| (name, Unit::Radian, 0.01)))
+        let chosen = (0..2).filter(|k| about.is_none_or(|about| about == *k)).flat_map(|k| names[k]);
+        chosen.map(|name| (name.to_string(), Unit::Radian, 0.01)).collect()
     }
 
-    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let (sine, cosine) = libm::sincos(f64::from(self.order) * state.q[self.joint]);
-        let normals = robot.normals(self.joint).iter().enumerate();
-        let station = if self.turning { self.joint + 1 } else { self.joint };
-        let chosen = normals.filter(|(k, _)| self.about.is_none_or(|about| about == *k)).map(|(_, normal)| normal);
-        for (k, (_, normal)) in chosen.enumerate() {
-            let tilt = screw(normal, robot.point(self.joint));
-            out.shift(2 * k, p, station, tilt * sine);
-            out.shift(2 * k + 1, p, station, tilt * cosine);
+    fn variant(&self, term: &Term) -> String {
+        match (term.basis(), term.motion()) {
+            (Basis::Wave { order, .. }, Motion::Axis { turning, .. }) => {
+                format!("order{order}{}", if turning { "" } else { "_fixed" })
+            }
+            _ => String::new(),
         }
     }
-}
 
-impl Placed for AxisWobble {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
+    fn sentence(&self, told: &Told) -> String {
+        format!("the axis of {} tilts as the joint turns", told.place)
     }
 
-    fn variant(&self) -> String {
-        format!("order{}{}", self.order, if self.turning { "" } else { "_fixed" })
+    fn measure(&self) -> Option<Measure> {
+        Some(Measure { rank: 6, advice: "measure a second target off the first" })
     }
 }

@@ -1,105 +1,103 @@
 //! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::basis::around;
+use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-/// What decides on the side.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// The direction of approach.
-    Approach,
-    /// The sign of the load, blurred over some torque.
-    Load { width_nm: f64 },
-    /// Friction of so many Nm decides under smaller loads, larger ones push the joint to their side; blurred over some torque.
-    /// Positive: friction leaves the joint on the side to which it came; negative: it trails on the other one.
-    Mixed {
-        threshold_nm: f64,
-        #[serde(default)]
-        width_nm: f64,
-    },
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Backlash {
-    joint: usize,
-    side: Side,
-}
+pub struct Backlash;
 
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
 
+/// The side that the load pushes the joint to, blurred over some torque.
+fn by_load(joint: usize, width: f64) -> Law {
+    Law::new(Variable::Load { joint }, Basis::Rise { centre: 0.0, width })
+}
+
+/// Friction of so many Nm decides under smaller loads, larger ones push the joint to their side; blurred over some torque.
+/// Positive: friction leaves the joint on the side to which it came; negative: it trails on the other one.
+fn mixed(joint: usize, friction_nm: f64, width: f64) -> Law {
+    let basis = if width > 0.0 { Basis::Rise { centre: 0.0, width } } else { Basis::Sign };
+    Law::new(Variable::Push { joint, friction_nm }, basis)
+}
+
 impl Backlash {
-    pub fn side(&self) -> Side {
-        self.side
+    pub const NAME: &'static str = "backlash";
+}
+
+impl Cause for Backlash {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint",
+            formula: "d = g s, or g sign(t), or the one at small and the other at large loads",
+            size: "5 to 100 arcsec",
+            confounded: "joint_hardening, joint_log_lag",
+            needs: "both directions of approach",
+        }
     }
 
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         for joint in survey.revolute() {
+            let form = |law| Term::new(&Self, Motion::Joint { joint }, law);
             let both = survey.both_directions(joint);
             if survey.is_loaded(joint) {
                 let most = survey.load(joint);
-                let widths = [1e-9, 0.03, 0.08].map(|share| Side::Load { width_nm: share * most });
-                out.extend(widths.map(|side| Hypothesis::new(Self { joint, side }, 3).positive()));
+                let widths = [1e-9, 0.03, 0.08].map(|share| by_load(joint, share * most));
+                out.extend(widths.map(|law| Hypothesis::new(form(law), 3).positive()));
                 if both {
                     let mut loads: Vec<f64> = survey.torques(joint).map(f64::abs).collect();
                     loads.sort_by(f64::total_cmp);
                     let shares = [0.05, 0.15, 0.3, 0.5].map(|share| loads[((loads.len() - 1) as f64 * share) as usize]);
-                    for threshold_nm in shares.into_iter().flat_map(|friction| [friction, -friction]) {
-                        let sides = BLURS.map(|blur| Side::Mixed { threshold_nm, width_nm: blur * threshold_nm.abs() });
-                        out.extend(sides.map(|side| Hypothesis::new(Self { joint, side }, 10 * BLURS.len()).positive()));
+                    for friction_nm in shares.into_iter().flat_map(|friction| [friction, -friction]) {
+                        let laws = BLURS.map(|blur| mixed(joint, friction_nm, blur * friction_nm.abs()));
+                        out.extend(laws.map(|law| Hypothesis::new(form(law), 10 * BLURS.len()).positive()));
                     }
                 }
             }
             if both {
-                out.push(Hypothesis::new(Self { joint, side: Side::Approach }, 1));
+                out.push(Hypothesis::new(form(Law::of(Variable::Approach { joint })), 1));
             }
         }
         out
     }
-}
 
-impl Effect for Backlash {
-    fn name(&self) -> &'static str {
-        "backlash"
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        vec![("half_gap".into(), Unit::Radian, 0.01)]
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        parameters(self, [("half_gap", Unit::Radian, 0.01)])
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let side = match self.side {
-            Side::Approach => state.direction(self.joint),
-            Side::Load { width_nm } => libm::tanh(state.torque()[self.joint] / width_nm),
-            Side::Mixed { threshold_nm, width_nm } => {
-                let push = state.torque()[self.joint] + threshold_nm * state.direction(self.joint);
-                if width_nm > 0.0 { libm::tanh(push / width_nm) } else { push.signum() }
-            }
+    fn near(&self, term: &Term, _survey: &Survey, level: i32) -> Vec<Term> {
+        let Variable::Push { joint, friction_nm } = term.law().first.of else { return Vec::new() };
+        let width = if let Basis::Rise { width, .. } = term.basis() { width } else { 0.0 };
+        let scaled = |value: f64| {
+            let wide = around(value, 1.6, 0.5, level, [f64::NEG_INFINITY, f64::INFINITY]);
+            wide.chain(around(value, 1.25, 0.5, level, [f64::NEG_INFINITY, f64::INFINITY]))
         };
-        out.turn(0, p, self.joint, side);
+        let wider = scaled(width).filter(|_| width > 0.0).map(|width| mixed(joint, friction_nm, width));
+        scaled(friction_nm).map(|friction_nm| mixed(joint, friction_nm, width)).chain(wider).map(|law| term.with(law)).collect()
     }
 
-    fn needs_torque(&self) -> bool {
-        self.side != Side::Approach
+    fn sentence(&self, told: &Told) -> String {
+        let place = told.place;
+        let by = match told.terms(Self::NAME).next().map(|term| term.law().first.of) {
+            Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
+            Some(Variable::Push { friction_nm, .. }) => {
+                let friction = friction_nm.abs();
+                format!("by the direction from which it came, above about {friction:.0} Nm to the side that the load pushes it")
+            }
+            Some(_) => "by the direction from which it came".to_string(),
+            None => return format!("{place} has lost motion to the side that its load pushes it"),
+        };
+        format!("{place} has lost motion: half a gap of {} {by}", told.size())
     }
-}
 
-impl Placed for Backlash {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
+    fn finer(&self) -> &'static [&'static str] {
+        &["joint_hardening", "joint_compliance", "unknown"]
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        let Side::Mixed { threshold_nm, width_nm } = self.side else { return Vec::new() };
-        let power = libm::exp2(-0.5 * f64::from(level));
-        let factors = [1.6, 1.25, 0.8, 0.625].map(|factor| libm::pow(factor, power));
-        let with = |threshold_nm, width_nm| Self { joint: self.joint, side: Side::Mixed { threshold_nm, width_nm } }.into();
-        let wider = factors.into_iter().filter(|_| width_nm > 0.0).map(|factor| with(threshold_nm, width_nm * factor));
-        factors.into_iter().map(|factor| with(threshold_nm * factor, width_nm)).chain(wider).collect()
+    fn measure(&self) -> Option<Measure> {
+        Some(Measure { rank: 5, advice: "repeat poses from both sides under loads of both signs" })
     }
 }

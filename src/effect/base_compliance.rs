@@ -1,15 +1,17 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+pub struct BaseCompliance;
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BaseCompliance {
+pub struct TiltingBase {
     /// Two stiffnesses instead of one.
     two: bool,
     /// How far the point about which it tilts is below the base origin, m: pedestals and floors yield underneath.
@@ -22,17 +24,36 @@ const DEPTHS: [f64; 2] = [0.0, 0.6];
 const STEP: f64 = 0.3;
 const DEEPEST: f64 = 3.0;
 
-impl BaseCompliance {
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+impl Cause for BaseCompliance {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "base_compliance",
+            place: "base",
+            formula: "the base tilts about its origin, or a point below, by the moment on it",
+            size: "0.01 to 1 urad/Nm",
+            confounded: "joint_compliance of joint 2, link_compliance of link 1",
+            needs: "link masses",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let loaded = (0..survey.joints()).any(|joint| survey.is_loaded(joint));
-        let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| Self { two, below }));
+        let forms = DEPTHS.into_iter().filter(|_| loaded).flat_map(|below| [false, true].map(|two| TiltingBase { two, below }));
         forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("the base tilts under the arm's weight by {}", told.value())
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(TiltingBase::deserialize(body).map(Form::from))
     }
 }
 
-impl Effect for BaseCompliance {
+impl Effect for TiltingBase {
     fn name(&self) -> &'static str {
-        "base_compliance"
+        BaseCompliance.about().name
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -59,9 +80,21 @@ impl Effect for BaseCompliance {
     }
 }
 
-impl Placed for BaseCompliance {
+impl Placed for TiltingBase {
     fn place(&self) -> Place {
         Place::Base
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &BaseCompliance
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {

@@ -1,14 +1,16 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
 use nalgebra::Vector3;
 
+pub struct BaseFrame;
+
 /// Corrections to a starting pose: exp of the twist, given in tracker axes, applied in the base frame.
 #[derive(Debug, Clone, Copy)]
-pub struct BaseFrame {
+pub struct BasePlacement {
     start: Pose,
 }
 
@@ -16,7 +18,9 @@ const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 impl BaseFrame {
     pub const NAME: &'static str = "base_frame";
+}
 
+impl BasePlacement {
     pub fn new(start: Pose) -> Self {
         Self { start }
     }
@@ -38,9 +42,26 @@ impl BaseFrame {
     }
 }
 
-impl Effect for BaseFrame {
+impl Cause for BaseFrame {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "base_frame",
+            place: "base",
+            formula: "a rigid motion of the base",
+            size: "any",
+            confounded: "tool_offset, joint_offset of the first joint",
+            needs: "-",
+        }
+    }
+
+    fn whole(&self, setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(BasePlacement { start: setting.base }))
+    }
+}
+
+impl Effect for BasePlacement {
     fn name(&self) -> &'static str {
-        Self::NAME
+        BaseFrame::NAME
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -48,7 +69,7 @@ impl Effect for BaseFrame {
             .enumerate()
             .map(|(k, axis)| ParameterSpec {
                 name: format!("base_frame.{axis}"),
-                place: "base".into(),
+                place: Place::Base,
                 unit: if k < 3 { Unit::Millimetre } else { Unit::Radian },
                 prior_sigma: if k < 3 { 10.0 } else { 1.0 },
             })

@@ -1,32 +1,75 @@
 //! `coupling_ratio`: joint B moves with joint A by more than the controller believes; the parameter is h of Eq. 14, times k_A.
 //!
-//! One parameter for each coupling that the robot file declares.
+//! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Survey,
+    Term, Told, Variable,
+};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, Copy)]
 pub struct CouplingRatio;
 
-impl Effect for CouplingRatio {
+/// Joints further apart than neighbours hardly drive each other: -2 ln of the odds.
+const DISTANT: f64 = 6.0;
+
+impl Cause for CouplingRatio {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "coupling_ratio",
+            place: "joint A->B",
+            formula: "d of B = c q of A",
+            size: "1e-5 to 1e-2",
+            confounded: "axis_wobble, link_geometry",
+            needs: "a wide travel of joint A",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(DeclaredCouplings))
+    }
+
+    /// Every pair that the robot file does not declare.
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let declared = |by, moved| survey.robot.description().couplings.iter().any(|c| c.by == by && c.moved == moved);
+        let n = survey.joints();
+        let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
+        let pairs = pairs.filter(|(by, moved)| by != moved && !declared(*by, *moved));
+        let pair = |(by, moved): (usize, usize)| {
+            let charge = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
+            let term = Term::new(&Self, Motion::Coupled { by, moved }, Law::of(Variable::Angle { joint: by }));
+            Hypothesis::new(term, 1).charged(charge)
+        };
+        pairs.map(pair).collect()
+    }
+
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        vec![(String::new(), Unit::One, 0.01)]
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("{}: the second moves with the first by {} of its angle", told.place, told.value())
+    }
+}
+
+/// The couplings of the robot file.
+struct DeclaredCouplings;
+
+impl Effect for DeclaredCouplings {
     fn name(&self) -> &'static str {
-        "coupling_ratio"
+        CouplingRatio.name()
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        robot
-            .description()
-            .couplings
-            .iter()
-            .map(|c| ParameterSpec {
-                name: format!("coupling_ratio.j{}_j{}", c.by + 1, c.moved + 1),
-                place: format!("joint {}->{}", c.by + 1, c.moved + 1),
-                unit: Unit::One,
-                prior_sigma: 0.01,
-            })
-            .collect()
+        let couplings = robot.description().couplings.iter();
+        let spec = |place: Place| ParameterSpec {
+            name: format!("coupling_ratio.{}", place.tag()),
+            place,
+            unit: Unit::One,
+            prior_sigma: 0.01,
+        };
+        couplings.map(|coupling| spec(Place::Coupled(coupling.by, coupling.moved))).collect()
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
@@ -37,50 +80,5 @@ impl Effect for CouplingRatio {
 
     fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
         robot.description().couplings.is_empty().then(|| "the robot file declares no couplings".to_string())
-    }
-}
-
-/// One coupling that the robot file does not declare.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PairRatio {
-    by: usize,
-    moved: usize,
-}
-
-/// Joints further apart than neighbours hardly drive each other: -2 ln of the odds.
-const DISTANT: f64 = 6.0;
-
-impl PairRatio {
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let declared = |by, moved| survey.robot.description().couplings.iter().any(|c| c.by == by && c.moved == moved);
-        let n = survey.joints();
-        let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
-        pairs
-            .filter(|(by, moved)| by != moved && !declared(*by, *moved))
-            .map(|(by, moved)| {
-                let charge = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
-                Hypothesis::new(Self { by, moved }, 1).charged(charge)
-            })
-            .collect()
-    }
-}
-
-impl Effect for PairRatio {
-    fn name(&self) -> &'static str {
-        "coupling_ratio"
-    }
-
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        super::form::parameters(self, [("", Unit::One, 0.01)])
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        out.turn(0, p, self.moved, state.q[self.by]);
-    }
-}
-
-impl Placed for PairRatio {
-    fn place(&self) -> Place {
-        Place::Coupled(self.by, self.moved)
     }
 }

@@ -1,15 +1,26 @@
-//! Forms: effects at a place and in a shape, linear in their coefficients. One line each in [`Form`].
+//! Forms: effects at a place and in a shape, linear in their coefficients.
 //!
-//! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON.
+//! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec, Place, Survey};
+use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
 use crate::robot::{Burden, Measurements, RobotModel};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// An effect with a place.
-pub trait Placed: Effect {
+/// An effect with a place. Most are a [`Term`]; what is no product of laws at a place implements this by hand.
+pub trait Placed: Effect + Any {
+    /// The cause that proposed it.
+    fn cause(&self) -> &'static dyn Cause;
     fn place(&self) -> Place;
-    /// Forms like this one with other shapes around its own, closer with every level; empty where there is nothing to refine.
+    /// What it depends on.
+    fn variables(&self) -> Vec<Variable>;
+    /// Its place and shape as JSON, as [`Cause::read`] reads it.
+    fn body(&self) -> serde_json::Value;
+    /// Forms like this one with other shapes around its own, closer with every level and within bounds; empty where there is nothing
+    /// to refine.
     fn near(&self, _survey: &Survey, _level: i32) -> Vec<Form> {
         Vec::new()
     }
@@ -17,48 +28,60 @@ pub trait Placed: Effect {
     fn variant(&self) -> String {
         String::new()
     }
+    /// What it is called with fitted coefficients `p` (SI): another cause's name where they are that cause's in another form.
+    fn called(&self, _p: &[f64], _survey: &Survey) -> &'static str {
+        self.name()
+    }
+    /// The law, where it is one at a place.
+    fn term(&self) -> Option<&Term> {
+        None
+    }
+    /// Whether it is a number of the torque model, seen only through what yields.
+    fn is_of_torque_model(&self) -> bool {
+        false
+    }
+    /// The joint that winds up under its load, and by how much (rad/Nm) with coefficients `p`.
+    fn compliance(&self, _p: &[f64]) -> Option<(usize, f64)> {
+        None
+    }
 }
 
-macro_rules! forms {
-    ($( $name:ident($form:path), )+) => {
-        /// An effect at a place and in a shape.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        #[serde(rename_all = "snake_case")]
-        pub enum Form { $( $name($form), )+ }
-        impl Form {
-            fn inner(&self) -> &dyn Placed {
-                match self { $( Form::$name(form) => form, )+ }
-            }
-        }
-        $( impl From<$form> for Form {
-            fn from(form: $form) -> Self {
-                Form::$name(form)
-            }
-        } )+
-    };
+/// A form of any cause.
+#[derive(Clone)]
+pub struct Form {
+    inner: Arc<dyn Placed>,
+    same: fn(&dyn Placed, &dyn Placed) -> bool,
 }
 
-forms! {
-    JointCompliance(super::joint_compliance::JointCompliance),
-    JointHardening(super::joint_hardening::JointHardening),
-    LinkCompliance(super::link_compliance::LinkCompliance),
-    BaseCompliance(super::base_compliance::BaseCompliance),
-    GearCyclic(super::gear_cyclic::GearCyclic),
-    GearMotorCyclic(super::gear_motor_cyclic::GearMotorCyclic),
-    JointTable(super::joint_table::JointTable),
-    Backlash(super::backlash::Backlash),
-    ThermalGrowth(super::thermal_growth::ThermalGrowth),
-    Counterbalance(super::counterbalance::Counterbalance),
-    LinkMass(super::link_mass::LinkMass),
-    PayloadError(super::payload_error::PayloadError),
-    AxisWobble(super::axis_wobble::AxisWobble),
-    ZeroShift(super::zero_shift::ZeroShift),
-    FrameShift(super::frame_shift::FrameShift),
-    TrackerDrift(super::tracker_drift::TrackerDrift),
-    CouplingRatio(super::coupling_ratio::PairRatio),
-    JointLogLag(super::joint_log_lag::JointLogLag),
-    ViscousWindup(super::viscous_windup::ViscousWindup),
-    Unknown(super::unknown::Unknown),
+fn same<T: Placed + PartialEq>(a: &dyn Placed, b: &dyn Placed) -> bool {
+    let (a, b): (&dyn Any, &dyn Any) = (a, b);
+    a.downcast_ref::<T>().is_some_and(|a| b.downcast_ref::<T>() == Some(a))
+}
+
+impl<T: Placed + PartialEq> From<T> for Form {
+    fn from(form: T) -> Self {
+        Self { inner: Arc::new(form), same: same::<T> }
+    }
+}
+
+impl PartialEq for Form {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.inner, &other.inner) || (self.same)(&*self.inner, &*other.inner)
+    }
+}
+
+impl std::fmt::Debug for Form {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.key(), self.body())
+    }
+}
+
+impl std::ops::Deref for Form {
+    type Target = dyn Placed;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.inner
+    }
 }
 
 impl Form {
@@ -66,49 +89,62 @@ impl Form {
     pub fn key(&self) -> String {
         format!("{}@{}#{}", self.name(), self.place(), self.variant())
     }
+
+    /// As a form of one type.
+    pub fn as_a<T: Placed>(&self) -> Option<&T> {
+        let inner: &dyn Any = &*self.inner;
+        inner.downcast_ref()
+    }
+
+    /// Whether it is of a cause.
+    pub fn is(&self, cause: &dyn Cause) -> bool {
+        self.cause().name() == cause.name()
+    }
+
+    /// Whether it belongs to one measurement and not to the arm: it says nothing of another recording, and a command need not
+    /// make up for it.
+    pub fn is_of_the_measurement(&self) -> bool {
+        let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
+        self.cause().is_of_the_measurement() || (self.cause().is_nameless() && passing())
+    }
 }
 
-/// Whether an effect belongs to one measurement and not to the arm: it says nothing of another recording, and a command need not
-/// make up for it.
-pub fn is_of_the_measurement(effect: &str, place: &str, form: Option<&Form>) -> bool {
-    matches!(effect, "tracker_drift" | "tracker_scale" | "joint_log_lag" | "base_shift" | "outlier" | "mislabelled_point")
-        || matches!(place, "tracker" | "recording")
-        || matches!(form, Some(Form::Unknown(unknown)) if unknown.is_passing())
+impl Serialize for Form {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        BTreeMap::from([(self.cause().name(), self.body())]).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Form {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
+        let [(name, body)] = <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
+        let cause = cause(&name).ok_or_else(|| D::Error::custom(format!("no cause `{name}`")))?;
+        cause.read(&body).unwrap_or_else(|| Term::read(cause, body)).map_err(D::Error::custom)
+    }
 }
 
 impl Effect for Form {
     fn name(&self) -> &'static str {
-        self.inner().name()
+        self.inner.name()
     }
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        self.inner().parameters(robot)
+        self.inner.parameters(robot)
     }
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        self.inner().deflect(robot, state, p, out);
+        self.inner.deflect(robot, state, p, out);
     }
     fn needs_torque(&self) -> bool {
-        self.inner().needs_torque()
+        self.inner.needs_torque()
     }
     fn burden(&self, q: &[f64], payload: f64, p: &[f64], out: &mut Burden) {
-        self.inner().burden(q, payload, p, out);
+        self.inner.burden(q, payload, p, out);
     }
     fn form(&self) -> Option<&Form> {
         Some(self)
     }
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
-        self.inner().missing(robot, data)
-    }
-}
-
-impl Placed for Form {
-    fn place(&self) -> Place {
-        self.inner().place()
-    }
-    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
-        self.inner().near(survey, level)
-    }
-    fn variant(&self) -> String {
-        self.inner().variant()
+        self.inner.missing(robot, data)
     }
 }
 
@@ -124,15 +160,9 @@ pub(super) fn parameters<'a>(
         .into_iter()
         .map(|(number, unit, prior_sigma)| ParameterSpec {
             name: if number.is_empty() { format!("{name}.{middle}") } else { format!("{name}.{middle}.{number}") },
-            place: place.to_string(),
+            place,
             unit,
             prior_sigma,
         })
         .collect()
-}
-
-/// Functions cos(k pi (u - low) / (high - low)), k = 1..=count, of `u` held within the range: a curve without its mean.
-pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
-    let phase = std::f64::consts::PI * ((u - low) / (high - low).max(1e-12)).clamp(0.0, 1.0);
-    (1..=count).map(move |k| libm::cos(k as f64 * phase))
 }

@@ -1,19 +1,12 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::told::amplitude;
+use super::joint_table::{JointTable, strongest_orders};
+use super::{About, Basis, Cause, Form, Hypothesis, Law, Motion, Number, NumberSpec, Place, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GearCyclic {
-    joint: usize,
-    order: u32,
-    /// With twice the order, as an eccentric wheel or disc has it.
-    #[serde(default)]
-    overtone: bool,
-}
+pub struct GearCyclic;
 
 /// Orders per joint turn that are tried: strain wave gears and absolute encoders show some twenty, worm wheels more.
 const ORDERS: u32 = 48;
@@ -25,62 +18,73 @@ const LOW: u32 = 4;
 const OVERTONE: f64 = 2.0;
 
 impl GearCyclic {
-    pub fn new(joint: usize, order: u32) -> Self {
-        Self { joint, order, overtone: false }
+    pub const NAME: &'static str = "gear_cyclic";
+
+    /// The error of one order per turn of a joint; with its overtone, twice the order, as an eccentric wheel or disc has it.
+    pub fn term(joint: usize, order: u32, overtone: bool) -> Term {
+        Term::new(&Self, Motion::Joint { joint }, Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone }))
+    }
+}
+
+impl Cause for GearCyclic {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint",
+            formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",
+            size: "5 to 100 arcsec",
+            confounded: "counterbalance at n = 1, axis_wobble",
+            needs: "enough points a period",
+        }
     }
 
-    pub fn joint(&self) -> usize {
-        self.joint
-    }
-
-    pub fn order(&self) -> u32 {
-        self.order
-    }
-
-    /// Whether twice the order belongs to it.
-    pub fn has_overtone(&self) -> bool {
-        self.overtone
-    }
-
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute();
         let forms = joints.flat_map(|joint| {
             let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
             orders.flat_map(move |order| {
-                let pure = Hypothesis::new(Self::new(joint, order), if order > LOW { ORDERS as usize } else { 6 });
-                let wheel = (order <= LOW).then(|| Hypothesis::new(Self { joint, order, overtone: true }, 6).charged(OVERTONE));
+                let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
+                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).charged(OVERTONE));
                 [Some(pure), wheel].into_iter().flatten()
             })
         });
         forms.collect()
     }
-}
 
-impl Effect for GearCyclic {
-    fn name(&self) -> &'static str {
-        "gear_cyclic"
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let names = ["sin", "cos", "sin_overtone", "cos_overtone"].into_iter().take(term.law().count());
+        names.map(|name| (name.to_string(), Unit::Radian, 0.01)).collect()
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let numbers = ["sin", "cos", "sin_overtone", "cos_overtone"].map(|name| (name, Unit::Radian, 0.01));
-        parameters(self, numbers.into_iter().take(if self.overtone { 4 } else { 2 }))
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        for k in 0..=usize::from(self.overtone) {
-            let (sine, cosine) = libm::sincos((k + 1) as f64 * f64::from(self.order) * state.q[self.joint]);
-            out.turn(2 * k, p, self.joint, sine);
-            out.turn(2 * k + 1, p, self.joint, cosine);
+    fn variant(&self, term: &Term) -> String {
+        match term.basis() {
+            Basis::Wave { order, overtone: true } => format!("order{order}_{}", 2 * order),
+            Basis::Wave { order, .. } => format!("order{order}"),
+            _ => String::new(),
         }
     }
+
+    fn sentence(&self, told: &Told) -> String {
+        let mut orders: Vec<String> = told.terms(Self::NAME).map(|term| order(term, &self.variant(term), told.numbers)).collect();
+        orders.extend(told.terms(JointTable::NAME).map(|table| strongest_orders(table, told.numbers)));
+        format!("the transmission or encoder of {} errs periodically with its angle: {}", told.place, orders.join(", "))
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["unknown"]
+    }
+
+    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        let first = form.term().is_some_and(|term| matches!(term.basis(), Basis::Wave { order: 1, .. }));
+        if first { vec![("counterbalance", form.place())] } else { Vec::new() }
+    }
 }
 
-impl Placed for GearCyclic {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
-
-    fn variant(&self) -> String {
-        if self.overtone { format!("order{}_{}", self.order, 2 * self.order) } else { format!("order{}", self.order) }
-    }
+/// An order and its amplitude in words.
+fn order(term: &Term, variant: &str, numbers: &[Number]) -> String {
+    let Basis::Wave { order, .. } = term.basis() else { return String::new() };
+    let tag = format!("{variant}.");
+    let own: Vec<Number> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
+    let overtone = own.get(2..4).map(|pair| format!(" and {} times by {}", 2 * order, amplitude(Some(pair))));
+    format!("{order} times a turn by {}{}", amplitude(own.get(0..2)), overtone.unwrap_or_default())
 }

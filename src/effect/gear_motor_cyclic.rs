@@ -1,56 +1,45 @@
 //! `gear_motor_cyclic`: error periodic in the motor angle (joint angle times reduction ratio), e.g. of the input stage.
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::told::amplitude;
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GearMotorCyclic {
-    joint: usize,
-    /// Per turn of the motor.
-    order: u32,
-}
+pub struct GearMotorCyclic;
 
 /// Orders per motor turn that are tried: shaft, and two teeth or poles.
 const ORDERS: u32 = 2;
 
-impl GearMotorCyclic {
-    pub fn order(&self) -> u32 {
-        self.order
+impl Cause for GearMotorCyclic {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "gear_motor_cyclic",
+            place: "joint",
+            formula: "d = a sin(n i q) + b cos(n i q), i the reduction ratio, n = 1, 2",
+            size: "2 to 30 arcsec",
+            confounded: "noise: nothing else is as fast",
+            needs: "reduction ratios in the robot file",
+        }
     }
 
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let known = |joint: &usize| survey.robot.description().joints[*joint].reduction_ratio.is_some();
-        let forms = survey.revolute().filter(known).flat_map(|joint| (1..=ORDERS).map(move |order| Self { joint, order }));
-        forms.map(|form| Hypothesis::new(form, ORDERS as usize)).collect()
-    }
-}
-
-impl Effect for GearMotorCyclic {
-    fn name(&self) -> &'static str {
-        "gear_motor_cyclic"
+        let pairs = survey.revolute().filter(known).flat_map(|joint| (1..=ORDERS).map(move |order| (joint, order)));
+        let law = |joint, order| Law::new(Variable::Motor { joint }, Basis::Wave { order, overtone: false });
+        let terms = pairs.map(|(joint, order)| Term::new(&Self, Motion::Joint { joint }, law(joint, order)));
+        terms.map(|term| Hypothesis::new(term, ORDERS as usize)).collect()
     }
 
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        parameters(self, [("sin", Unit::Radian, 0.01), ("cos", Unit::Radian, 0.01)])
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 0.01)).to_vec()
     }
 
-    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let ratio = robot.description().joints[self.joint].reduction_ratio.unwrap_or(0.0);
-        let (sine, cosine) = libm::sincos(f64::from(self.order) * ratio * state.q[self.joint]);
-        out.turn(0, p, self.joint, sine);
-        out.turn(1, p, self.joint, cosine);
-    }
-}
-
-impl Placed for GearMotorCyclic {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
+    fn variant(&self, term: &Term) -> String {
+        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
     }
 
-    fn variant(&self) -> String {
-        format!("order{}", self.order)
+    fn sentence(&self, told: &Told) -> String {
+        let amplitude = amplitude(told.numbers.get(0..2));
+        format!("{} errs periodically with its motor's angle, amplitude {amplitude}", told.place)
     }
 }

@@ -2,19 +2,67 @@
 //!
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
-use super::{ArmState, Deflection, Effect, Hypothesis, Load, ParameterSpec, Place, Placed, Survey};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Survey, Told, Variable,
+};
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
+pub struct JointCompliance;
+
+impl JointCompliance {
+    pub const NAME: &'static str = "joint_compliance";
+}
+
+impl Cause for JointCompliance {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "joint_compliance",
+            place: "joint",
+            formula: "d = c t",
+            size: "0.1 to 10 urad/Nm",
+            confounded: "joint_hardening, reduction_ratio, link_compliance",
+            needs: "link masses, or motor currents",
+        }
+    }
+
+    fn whole(&self, setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Windup::new(setting.load)))
+    }
+
+    /// Every joint that gravity loads; by motor currents where the robot file has no masses to make a torque from.
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup::of(joint, Load::GravityTorque), 1).positive());
+        let by_current = !survey.robot.has_masses() && survey.data.current.is_some();
+        // The sign of a current is the controller's.
+        let currents = survey.revolute().filter(|_| by_current);
+        let currents = currents.map(|joint| Hypothesis::new(Windup::of(joint, Load::MotorCurrent), 2));
+        by_gravity.chain(currents).collect()
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("{} winds up under its load by {}", told.place, told.value())
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["unknown"]
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(Windup::deserialize(body).map(Form::from))
+    }
+}
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointCompliance {
+pub struct Windup {
     load: Load,
     /// One joint (from 0), or all that turn.
     joint: Option<usize>,
 }
 
-impl JointCompliance {
+impl Windup {
     /// Of every joint that turns.
     pub fn new(load: Load) -> Self {
         Self { load, joint: None }
@@ -29,22 +77,11 @@ impl JointCompliance {
         let one = self.joint;
         (0..robot.joints()).filter(move |j| one.is_none_or(|joint| joint == *j)).filter(|j| robot.is_revolute(*j))
     }
-
-    /// Every joint that gravity loads; by motor currents where the robot file has no masses to make a torque from.
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
-        let by_gravity = by_gravity.map(|joint| Hypothesis::new(Self::of(joint, Load::GravityTorque), 1).positive());
-        let deaf = survey.robot.has_masses() || survey.data.current.is_none();
-        let by_current = survey.revolute().filter(|_| !deaf);
-        // The sign of a current is the controller's.
-        let by_current = by_current.map(|joint| Hypothesis::new(Self::of(joint, Load::MotorCurrent), 2));
-        by_gravity.chain(by_current).collect()
-    }
 }
 
-impl Effect for JointCompliance {
+impl Effect for Windup {
     fn name(&self) -> &'static str {
-        "joint_compliance"
+        JointCompliance::NAME
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -55,7 +92,7 @@ impl Effect for JointCompliance {
         self.joints(robot)
             .map(|j| ParameterSpec {
                 name: format!("joint_compliance.j{}", j + 1),
-                place: format!("joint {}", j + 1),
+                place: Place::Joint(j),
                 unit,
                 prior_sigma,
             })
@@ -93,8 +130,24 @@ impl Effect for JointCompliance {
     }
 }
 
-impl Placed for JointCompliance {
+impl Placed for Windup {
     fn place(&self) -> Place {
         Place::Joint(self.joint.unwrap_or(0))
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &JointCompliance
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.joint.unwrap_or(0) }]
+    }
+
+    fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint?, *p.first()?))
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 }

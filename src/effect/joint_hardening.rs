@@ -1,10 +1,19 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
-use super::form::{cosines, parameters};
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::basis::cosines;
+use super::form::parameters;
+use super::{
+    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
+
+pub struct JointHardening;
+
+impl JointHardening {
+    pub const NAME: &'static str = "joint_hardening";
+}
 
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -23,7 +32,7 @@ pub enum Law {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointHardening {
+pub struct BentWindup {
     joint: usize,
     law: Law,
 }
@@ -34,17 +43,20 @@ const CURVE: usize = 6;
 const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
 
-impl JointHardening {
-    pub fn law(&self) -> Law {
-        self.law
-    }
-
-    pub fn joint(&self) -> usize {
-        self.joint
+impl Cause for JointHardening {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "joint_hardening",
+            place: "joint",
+            formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
+            size: "5 to 50 % of the wind-up",
+            confounded: "joint_compliance, backlash",
+            needs: "link masses and two payloads",
+        }
     }
 
     /// Every loaded joint with several laws each.
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
             let most = survey.load(joint);
@@ -53,15 +65,47 @@ impl JointHardening {
             let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
             let laws = laws.chain([0.1, 0.3, 0.6].map(|share| Law::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(Self { joint, law }, 10).charged(4.0)));
-            out.push(Hypothesis::new(Self { joint, law: Law::Curve { low_nm: low, high_nm: high } }, 1).charged(4.0));
+            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).charged(4.0)));
+            let curve = BentWindup { joint, law: Law::Curve { low_nm: low, high_nm: high } };
+            out.push(Hypothesis::new(curve, 1).charged(4.0));
         }
         out
     }
 
+    fn sentence(&self, told: &Told) -> String {
+        let shape = match told.form::<BentWindup>().map(|windup| windup.law) {
+            Some(Law::Saturating { at_nm }) => format!("it stiffens above about {at_nm:.0} Nm"),
+            Some(Law::SoftZone { at_nm }) => format!("it is soft below about {at_nm:.0} Nm"),
+            Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {at_nm:.0} Nm"),
+            Some(Law::Power { exponent, .. }) => format!("it grows by the load to the power of {exponent:.1}"),
+            _ => "its shape is a free curve of the load".to_string(),
+        };
+        format!("{} winds up under its load, but not in proportion: {shape}", told.place)
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["backlash", "unknown"]
+    }
+
+    fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
+        if called == Backlash::NAME { vec![(Self::NAME, form.place())] } else { Vec::new() }
+    }
+
+    /// From a wind-up in proportion.
+    fn measure(&self) -> Option<Measure> {
+        let advice = "measure with a third payload between none and full, and with joints near their largest load";
+        Some(Measure { rank: 1, advice })
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(BentWindup::deserialize(body).map(Form::from))
+    }
+}
+
+impl BentWindup {
     /// Whether coefficients `p` make a wind-up that does not grow with the load beyond a small one: lost motion to the side of the
     /// load. `most` is the largest torque, Nm.
-    pub fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
+    fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
         match (self.law, p) {
             (Law::Saturating { at_nm } | Law::SoftZone { at_nm } | Law::Knee { at_nm }, [linear, bend]) => {
                 at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs()
@@ -91,9 +135,9 @@ impl JointHardening {
     }
 }
 
-impl Effect for JointHardening {
+impl Effect for BentWindup {
     fn name(&self) -> &'static str {
-        "joint_hardening"
+        JointHardening::NAME
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -128,9 +172,29 @@ impl Effect for JointHardening {
     }
 }
 
-impl Placed for JointHardening {
+impl Placed for BentWindup {
     fn place(&self) -> Place {
         Place::Joint(self.joint)
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &JointHardening
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.joint }]
+    }
+
+    fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
+        Some((self.joint, *p.first()?))
+    }
+
+    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
+        if self.is_lost_motion(p, survey.load(self.joint)) { Backlash::NAME } else { JointHardening::NAME }
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 
     fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {

@@ -2,12 +2,18 @@
 //! joints were logged; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
-/// What the lag goes with.
+pub struct JointLogLag;
+
+impl JointLogLag {
+    pub const NAME: &'static str = "joint_log_lag";
+}
+
+/// What the lag is in proportion to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Behind {
@@ -19,7 +25,7 @@ enum Behind {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointLogLag {
+pub struct Lag {
     /// Whether each joint lags by a share of its own; else all by one.
     each: bool,
     #[serde(default)]
@@ -29,24 +35,65 @@ pub struct JointLogLag {
 /// s: clocks farther apart belong to other postures altogether.
 const LARGEST: f64 = 0.3;
 
-impl JointLogLag {
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        if survey.moves() {
-            // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
-            return vec![Hypothesis::new(Self { each: false, by: Behind::Clock }, 1).within(LARGEST)];
+impl Cause for JointLogLag {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "joint_log_lag",
+            place: "recording",
+            formula: "joints were logged a share of the last move too early; of a moving arm d = c dq/dt of every joint, its clock and the tracker's c apart",
+            size: "0.1 to 5 % of the move; 0.5 to 20 ms",
+            confounded: "backlash; viscous_windup where one joint moves alone",
+            needs: "rows in the order of measurement; joint velocities",
         }
-        [false, true].map(|each| Hypothesis::new(Self { each, by: Behind::Move }, 2)).to_vec()
     }
 
-    /// Whether it is the time between two clocks; else a share of the last move.
-    pub fn is_time(&self) -> bool {
-        self.by == Behind::Clock
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        if survey.moves() {
+            // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
+            return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock }, 1).within(LARGEST)];
+        }
+        [false, true].map(|each| Hypothesis::new(Lag { each, by: Behind::Move }, 2)).to_vec()
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        let clocks = told.form::<Lag>().is_some_and(|lag| lag.by == Behind::Clock);
+        match told.numbers.first() {
+            Some(n) if clocks => {
+                let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
+                let ms = n.value.abs();
+                format!(
+                    "the tracker's clock is {ms:.2} ms {how} against the controller's: points were measured that much {when} the joints \
+                     beside them"
+                )
+            }
+            Some(n) if told.numbers.len() == 1 => format!(
+                "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
+                n.value * 100.0
+            ),
+            Some(_) => {
+                let shares = told.numbers.iter().filter(|n| n.name.contains("share"));
+                let most = shares.map(|n| n.value * 100.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+                format!(
+                    "joints were logged before the arm had settled, each by a share of its own: up to {most:.3} % of the last move was \
+                     still to come"
+                )
+            }
+            None => "joints and points do not belong to the same moment".to_string(),
+        }
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(Lag::deserialize(body).map(Form::from))
     }
 }
 
-impl Effect for JointLogLag {
+impl Effect for Lag {
     fn name(&self) -> &'static str {
-        "joint_log_lag"
+        JointLogLag::NAME
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -68,8 +115,20 @@ impl Effect for JointLogLag {
     }
 }
 
-impl Placed for JointLogLag {
+impl Placed for Lag {
     fn place(&self) -> Place {
         Place::Recording
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &JointLogLag
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![if self.by == Behind::Clock { Variable::Speed } else { Variable::LastMove }]
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 }

@@ -1,11 +1,28 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
 #[derive(Debug, Clone, Copy)]
 pub struct JointOffset;
+
+impl Cause for JointOffset {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "joint_offset",
+            place: "joint",
+            formula: "d = c",
+            size: "0.1 to 5 mrad",
+            confounded: "base_frame, link_geometry",
+            needs: "-",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Self))
+    }
+}
 
 impl Effect for JointOffset {
     fn name(&self) -> &'static str {
@@ -16,7 +33,7 @@ impl Effect for JointOffset {
         (0..robot.joints())
             .map(|j| ParameterSpec {
                 name: format!("joint_offset.j{}", j + 1),
-                place: format!("joint {}", j + 1),
+                place: Place::Joint(j),
                 unit: if robot.is_revolute(j) { Unit::Radian } else { Unit::Millimetre },
                 prior_sigma: 0.02,
             })

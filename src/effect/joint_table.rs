@@ -1,20 +1,11 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
-use super::form::{cosines, parameters};
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, Number, NumberSpec, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JointTable {
-    joint: usize,
-    /// Valid range, rad; beyond it the curve fades out within one wave.
-    range_rad: [f64; 2],
-    /// Cosines over the range.
-    count: usize,
-}
+pub struct JointTable;
 
 /// Highest orders per joint turn that a curve resolves.
 const RESOLUTIONS: [f64; 3] = [12.0, 24.0, 36.0];
@@ -24,43 +15,69 @@ const VALUES_EACH: f64 = 20.0;
 const SUPPORT: usize = 5;
 /// How large a number of a curve may be, rad (60 arcsec): holds it down where points are sparse.
 pub(super) const PLAUSIBLE: f64 = 3e-4;
+/// Cosines of a curve up to this one make at most two periods over its range.
+const SMOOTH: usize = 4;
 
 impl JointTable {
-    pub fn joint(&self) -> usize {
-        self.joint
+    pub const NAME: &'static str = "joint_table";
+}
+
+impl Cause for JointTable {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint",
+            formula: "d = a smooth curve of q over the measured range",
+            size: "5 to 200 arcsec",
+            confounded: "gear_cyclic",
+            needs: "many points",
+        }
     }
 
-    pub fn range(&self) -> [f64; 2] {
-        self.range_rad
-    }
-
-    /// The curve with coefficients `p`, rad.
-    pub fn value(&self, q: f64, p: &[f64]) -> f64 {
-        self.functions(q).zip(p).map(|(value, p)| value * p).sum()
-    }
-
-    fn functions(&self, q: f64) -> impl Iterator<Item = f64> {
-        let [low, high] = self.range_rad;
-        let wave = 2.0 * (high - low) / self.count as f64;
-        let beyond = (low - q).max(q - high).clamp(0.0, wave);
-        let share = if beyond > 0.0 { 0.5 + 0.5 * libm::cos(PI * beyond / wave) } else { 1.0 };
-        cosines(q, self.range_rad, self.count).map(move |value| share * value)
-    }
-
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         for joint in survey.revolute() {
             for resolution in RESOLUTIONS {
-                let Some(range_rad) = well_covered(survey, joint, 2.0 * PI / resolution) else { continue };
-                let count = (resolution * (range_rad[1] - range_rad[0]) / PI).ceil();
+                let Some([low, high]) = well_covered(survey, joint, 2.0 * PI / resolution) else { continue };
+                let count = (resolution * (high - low) / PI).ceil();
                 if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
-                    let form = Self { joint, range_rad, count: count as usize };
-                    out.push(Hypothesis::new(form, RESOLUTIONS.len()).charged(4.0));
+                    let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize });
+                    let term = Term::new(&Self, Motion::Joint { joint }, law);
+                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).charged(4.0));
                 }
             }
         }
         out
     }
+
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        (1..=term.law().count()).map(|k| (format!("cos{k}"), Unit::Radian, PLAUSIBLE)).collect()
+    }
+
+    /// With most of its variance in waves of more than two periods over its range: a gear or an encoder.
+    fn called(&self, _term: &Term, p: &[f64], _survey: &Survey) -> &'static str {
+        let square = |some: &[f64]| some.iter().map(|c| c * c).sum::<f64>();
+        if 2.0 * square(&p[SMOOTH.min(p.len())..]) > square(p) { "gear_cyclic" } else { Self::NAME }
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("{} has a repeatable error of no simple form, kept as a table", told.place)
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["unknown"]
+    }
+}
+
+/// The strongest orders per joint turn of a table, in words.
+pub(super) fn strongest_orders(table: &Term, numbers: &[Number]) -> String {
+    let Basis::Fading { low, high, .. } = table.basis() else { return String::new() };
+    let wave = |n: &Number| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
+    let mut waves: Vec<(f64, f64)> = numbers.iter().filter(|n| n.name.contains("cos")).filter_map(wave).collect();
+    waves.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // A cosine of k half periods over the range makes k pi / range periods a turn.
+    let orders = waves.iter().take(4).map(|(k, _)| format!("{:.0}", k * PI / (high - low)));
+    format!("a curve, strongest about {} times a turn", orders.collect::<Vec<_>>().join(", "))
 }
 
 /// The range of a joint without sparse ends: within a wave (rad) of either end there are some rows.
@@ -71,27 +88,4 @@ fn well_covered(survey: &Survey, joint: usize, wave: f64) -> Option<[f64; 2]> {
     let low = q.windows(SUPPORT).find(|some| covered(some))?[0];
     let high = q.windows(SUPPORT).rfind(|some| covered(some))?[SUPPORT - 1];
     (high > low).then_some([low, high])
-}
-
-impl Effect for JointTable {
-    fn name(&self) -> &'static str {
-        "joint_table"
-    }
-
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        let names: Vec<String> = (1..=self.count).map(|k| format!("cos{k}")).collect();
-        parameters(self, names.iter().map(|name| (name.as_str(), Unit::Radian, PLAUSIBLE)))
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        for (k, value) in self.functions(state.q[self.joint]).enumerate() {
-            out.turn(k, p, self.joint, value);
-        }
-    }
-}
-
-impl Placed for JointTable {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
-    }
 }

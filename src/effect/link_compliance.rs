@@ -1,12 +1,18 @@
 //! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+
+pub struct LinkCompliance;
+
+impl LinkCompliance {
+    pub const NAME: &'static str = "link_compliance";
+}
 
 /// Which moments bend the link.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,7 +27,7 @@ pub enum Bending {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LinkCompliance {
+pub struct BentLink {
     /// From 0.
     link: usize,
     bending: Bending,
@@ -42,25 +48,44 @@ const UNLIKELY: f64 = 10.0;
 /// Most of an arm's elasticity is in its gears: -2 ln of the odds that it is a link.
 const RARER: f64 = 4.0;
 
-impl LinkCompliance {
+impl Cause for LinkCompliance {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "link_compliance",
+            place: "link",
+            formula: "the link bends about its far joint, by the moment there",
+            size: "0.05 to 1 urad/Nm",
+            confounded: "joint_compliance of either end",
+            needs: "link masses",
+        }
+    }
+
     /// Every link that something hangs on.
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let n = survey.joints();
         let loaded = (0..n).any(|joint| survey.is_loaded(joint));
         let bendings = [Bending::AcrossLink, Bending::AcrossAxis, Bending::TwoDirections];
         let links = (0..n - 1).filter(|link| loaded && extent(survey.robot, *link).norm() > SHORT);
-        let forms = links.flat_map(|link| bendings.map(|bending| Self { link, bending }));
-        let odds = |form: &Self| if form.link + WRIST >= n { UNLIKELY } else { RARER };
+        let forms = links.flat_map(|link| bendings.map(|bending| BentLink { link, bending }));
+        let odds = |form: &BentLink| if form.link + WRIST >= n { UNLIKELY } else { RARER };
         forms
             .map(|form| (odds(&form), form))
             .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().charged(odds))
             .collect()
     }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("{} bends under what it carries by {}", told.place, told.value())
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(BentLink::deserialize(body).map(Form::from))
+    }
 }
 
-impl Effect for LinkCompliance {
+impl Effect for BentLink {
     fn name(&self) -> &'static str {
-        "link_compliance"
+        LinkCompliance::NAME
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -93,8 +118,20 @@ impl Effect for LinkCompliance {
     }
 }
 
-impl Placed for LinkCompliance {
+impl Placed for BentLink {
     fn place(&self) -> Place {
         Place::Links(self.link, self.link)
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &LinkCompliance
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 }

@@ -3,7 +3,7 @@
 //! Two displacements and two tilts perpendicular to the axis of joint N+1, about its point; together with `base_frame`,
 //! `joint_offset` and `tool_offset` this is complete (rank 4R + 2P + 3) and free of the singularity of parallel axes.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -18,6 +18,23 @@ fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, b
     shifts.chain(robot.normals(link).iter().map(move |(axis, d)| (*axis, true, screw(d, robot.point(link)))))
 }
 
+impl Cause for LinkGeometry {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "link_geometry",
+            place: "link",
+            formula: "lengths and tilts between two axes",
+            size: "0.1 to 1 mm, 0.1 to 1 mrad",
+            confounded: "joint_offset, tool_offset",
+            needs: "-",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Self))
+    }
+}
+
 impl Effect for LinkGeometry {
     fn name(&self) -> &'static str {
         "link_geometry"
@@ -30,7 +47,7 @@ impl Effect for LinkGeometry {
                 let letter = ['x', 'y', 'z'][axis];
                 out.push(ParameterSpec {
                     name: format!("link_geometry.l{link}.{}{letter}", if tilt { "r" } else { "" }),
-                    place: format!("link {link}"),
+                    place: Place::Links(link - 1, link - 1),
                     unit: if tilt { Unit::Radian } else { Unit::Millimetre },
                     prior_sigma: 5e-3, // 5 mm, 5 mrad
                 });

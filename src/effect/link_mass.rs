@@ -1,34 +1,69 @@
 //! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::counterbalance::{MEASURE, Spring};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+};
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+pub struct LinkMass;
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LinkMass {
+pub struct WrongLinkMass {
     /// From 0.
     link: usize,
     /// Whether the centre is wrong too.
     centre: bool,
 }
 
-impl LinkMass {
+impl Cause for LinkMass {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "link_mass",
+            place: "link",
+            formula: "mass and first moments of a link in the torque model",
+            size: "3 to 20 %",
+            confounded: "counterbalance, payload_error",
+            needs: "link masses and motor currents",
+        }
+    }
+
     /// Every link carried by a joint that yields in the present model.
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let carried = |link: &usize| (0..=*link).any(|joint| survey.yielding[joint] > 0.0);
         let known = |link: &usize| survey.robot.description().joints[*link].centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
-        let forms = links.flat_map(|link| [false, true].map(|centre| Self { link, centre }));
+        let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
         forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("the mass or centre of {} in the torque model is wrong", told.place)
+    }
+
+    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        match form.place() {
+            Place::Links(link, _) if Spring::balances(link) => vec![("counterbalance", Place::Joint(link))],
+            _ => Vec::new(),
+        }
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(MEASURE)
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(WrongLinkMass::deserialize(body).map(Form::from))
     }
 }
 
-impl Effect for LinkMass {
+impl Effect for WrongLinkMass {
     fn name(&self) -> &'static str {
-        "link_mass"
+        LinkMass.about().name
     }
 
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
@@ -61,8 +96,24 @@ impl Effect for LinkMass {
     }
 }
 
-impl Placed for LinkMass {
+impl Placed for WrongLinkMass {
     fn place(&self) -> Place {
         Place::Links(self.link, self.link)
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &LinkMass
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::ArmLoad]
+    }
+
+    fn is_of_torque_model(&self) -> bool {
+        true
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 }

@@ -1,6 +1,6 @@
-//! The library of physical effects: one file each, one line each in [`EFFECTS`].
+//! The library of physical effects: each cause of error in a file of its own, one line each in [`CAUSES`].
 //!
-//! An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
+//! Most causes are laws at a place: effect = sum_k c_k * direction(place) * law_k(variables of the row), a [`Term`]. An effect adds small motions somewhere on the chain and says how they change with its parameters. Identification, prediction
 //! and compensation use the same effects through one composition, the [`EffectStack`].
 
 mod anchor;
@@ -8,12 +8,15 @@ mod axis_wobble;
 mod backlash;
 mod base_compliance;
 mod base_frame;
-mod catalogue;
+mod base_shift;
+mod basis;
+mod cable_drag;
+mod cause;
+mod change;
 mod counterbalance;
 mod coupling_ratio;
 mod deflection;
 mod form;
-mod frame_shift;
 mod gear_cyclic;
 mod gear_motor_cyclic;
 mod joint_compliance;
@@ -21,45 +24,58 @@ mod joint_hardening;
 mod joint_log_lag;
 mod joint_offset;
 mod joint_table;
+mod law;
 mod link_compliance;
 mod link_geometry;
 mod link_mass;
+mod motion;
 mod payload_error;
 mod place;
 mod reduction_ratio;
-mod signature;
 mod stack;
 mod survey;
+mod term;
 mod thermal_growth;
+mod told;
 mod tool_offset;
+mod tool_shift;
 mod tracker_drift;
+mod tracker_scale;
 mod unknown;
+mod variable;
 mod viscous_windup;
+mod warmth;
+mod wrong_point;
 mod zero_shift;
 
 pub use anchor::Anchor;
-pub use backlash::{Backlash, Side};
-pub use base_frame::BaseFrame;
-pub use catalogue::{About, CATALOGUE};
-pub use counterbalance::Counterbalance;
+pub use axis_wobble::AxisWobble;
+pub use backlash::Backlash;
+pub use base_frame::{BaseFrame, BasePlacement};
+pub use basis::Basis;
+pub use cable_drag::CableDrag;
+pub use cause::{About, CAUSES, Cause, Measure, NumberSpec, cause, hypotheses, identified, whole};
 pub use deflection::{Deflection, Direction};
-pub use form::{Form, Placed, is_of_the_measurement};
+pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
 pub use joint_compliance::JointCompliance;
-pub use joint_hardening::{JointHardening, Law};
+pub use joint_hardening::JointHardening;
+
 pub use joint_log_lag::JointLogLag;
 pub use joint_table::JointTable;
-pub use link_mass::LinkMass;
-pub use payload_error::PayloadError;
+pub use law::{Factor, Law};
+pub use link_compliance::LinkCompliance;
+pub use motion::{Axes, Motion};
 pub use place::Place;
 pub use reduction_ratio::ReductionRatio;
-pub use signature::Signature;
 pub use stack::{EffectStack, Scratch, Sight};
 pub use survey::{Hypothesis, Survey};
-pub use thermal_growth::{ThermalGrowth, Warmth};
+pub use term::Term;
+pub use told::{Number, Told, people};
 pub use tool_offset::ToolOffset;
-pub use tracker_drift::{Course, TrackerDrift};
 pub use unknown::Unknown;
+pub use variable::Variable;
+pub use viscous_windup::ViscousWindup;
 
 use crate::robot::{Burden, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;
@@ -72,7 +88,7 @@ pub struct ParameterSpec {
     /// E.g. `reduction_ratio.j2`; zero always means the nominal robot.
     pub name: String,
     /// E.g. `joint 2`, `link 3`, `base`, `tool`.
-    pub place: String,
+    pub place: Place,
     /// The unit that people and tables see; values are SI.
     pub unit: Unit,
     /// One sigma of what is known before any measurement, SI; wide.
@@ -196,58 +212,3 @@ pub struct Setting {
     pub load: Load,
 }
 
-/// A line of the registry.
-pub struct EffectEntry {
-    pub name: &'static str,
-    /// Where two parameters do the same, the one whose effect has the lower precedence number is kept.
-    pub precedence: u8,
-    pub make: fn(&Setting) -> Box<dyn Effect>,
-}
-
-/// Every effect that can be identified, predicted and compensated.
-pub const EFFECTS: &[EffectEntry] = &[
-    EffectEntry { name: "anchor", precedence: 0, make: |_| Box::new(Anchor) },
-    EffectEntry { name: "base_frame", precedence: 1, make: |s| Box::new(BaseFrame::new(s.base)) },
-    EffectEntry { name: "tool_offset", precedence: 2, make: |_| Box::new(ToolOffset) },
-    EffectEntry { name: "joint_offset", precedence: 3, make: |_| Box::new(joint_offset::JointOffset) },
-    EffectEntry { name: "link_geometry", precedence: 4, make: |_| Box::new(link_geometry::LinkGeometry) },
-    EffectEntry { name: "reduction_ratio", precedence: 5, make: |_| Box::new(reduction_ratio::ReductionRatio) },
-    EffectEntry { name: "coupling_ratio", precedence: 6, make: |_| Box::new(coupling_ratio::CouplingRatio) },
-    EffectEntry { name: "joint_compliance", precedence: 7, make: |s| Box::new(joint_compliance::JointCompliance::new(s.load)) },
-];
-
-/// The registry entry of a canonical name.
-pub fn entry(name: &str) -> Option<&'static EffectEntry> {
-    EFFECTS.iter().find(|entry| entry.name == name)
-}
-
-/// What may be left out of a model: causes that diagnosis tries, each at all its places and in all its forms.
-pub struct Cause {
-    pub name: &'static str,
-    /// Every hypothesis that the recording can speak of.
-    pub propose: fn(&Survey) -> Vec<Hypothesis>,
-}
-
-/// Every cause that diagnosis tries, one line each.
-pub const CAUSES: &[Cause] = &[
-    Cause { name: "joint_compliance", propose: JointCompliance::propose },
-    Cause { name: "joint_hardening", propose: JointHardening::propose },
-    Cause { name: "link_compliance", propose: link_compliance::LinkCompliance::propose },
-    Cause { name: "base_compliance", propose: base_compliance::BaseCompliance::propose },
-    Cause { name: "gear_cyclic", propose: GearCyclic::propose },
-    Cause { name: "gear_motor_cyclic", propose: gear_motor_cyclic::GearMotorCyclic::propose },
-    Cause { name: "joint_table", propose: JointTable::propose },
-    Cause { name: "backlash", propose: Backlash::propose },
-    Cause { name: "thermal_growth", propose: ThermalGrowth::propose },
-    Cause { name: "counterbalance", propose: Counterbalance::propose },
-    Cause { name: "link_mass", propose: LinkMass::propose },
-    Cause { name: "payload_error", propose: PayloadError::propose },
-    Cause { name: "axis_wobble", propose: axis_wobble::AxisWobble::propose },
-    Cause { name: "zero_shift", propose: zero_shift::ZeroShift::propose },
-    Cause { name: "base_shift", propose: frame_shift::FrameShift::propose },
-    Cause { name: "tracker_drift", propose: TrackerDrift::propose },
-    Cause { name: "coupling_ratio", propose: coupling_ratio::PairRatio::propose },
-    Cause { name: "joint_log_lag", propose: JointLogLag::propose },
-    Cause { name: "viscous_windup", propose: viscous_windup::ViscousWindup::propose },
-    Cause { name: "unknown", propose: Unknown::propose },
-];

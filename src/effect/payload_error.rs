@@ -1,29 +1,60 @@
 //! `payload_error`: the payload's mass (and first moment) differs from what was declared, where one is carried.
 
 use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::counterbalance::MEASURE;
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+};
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+pub struct PayloadError;
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PayloadError {
+pub struct WrongPayload {
     /// Whether the centre is wrong too.
     centre: bool,
 }
 
-impl PayloadError {
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+impl Cause for PayloadError {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "payload_error",
+            place: "tool",
+            formula: "mass and centre of the payload in the torque model",
+            size: "3 to 30 %",
+            confounded: "joint_hardening",
+            needs: "rows with and without the payload",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let yields = survey.yielding.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
-        forms.map(|centre| Hypothesis::new(Self { centre }, 2)).collect()
+        forms.map(|centre| Hypothesis::new(WrongPayload { centre }, 2)).collect()
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        match told.numbers.first() {
+            Some(n) => format!("the payload is {:+.1} % of what was declared off", n.value * 100.0),
+            None => "the payload is not what was declared".to_string(),
+        }
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(MEASURE)
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(WrongPayload::deserialize(body).map(Form::from))
     }
 }
 
-impl Effect for PayloadError {
+impl Effect for WrongPayload {
     fn name(&self) -> &'static str {
-        "payload_error"
+        PayloadError.about().name
     }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
@@ -58,8 +89,24 @@ impl Effect for PayloadError {
     }
 }
 
-impl Placed for PayloadError {
+impl Placed for WrongPayload {
     fn place(&self) -> Place {
         Place::Tool
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        &PayloadError
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Payload]
+    }
+
+    fn is_of_torque_model(&self) -> bool {
+        true
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self)
     }
 }

@@ -15,6 +15,8 @@ pub enum Place {
     Tool,
     Tracker,
     Recording,
+    /// The far end of a draw-wire or ballbar.
+    Anchor,
 }
 
 impl Place {
@@ -50,6 +52,7 @@ impl fmt::Display for Place {
             Self::Tool => f.write_str("tool"),
             Self::Tracker => f.write_str("tracker"),
             Self::Recording => f.write_str("recording"),
+            Self::Anchor => f.write_str("anchor"),
         }
     }
 }

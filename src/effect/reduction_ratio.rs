@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -12,6 +12,23 @@ pub struct ReductionRatio;
 
 impl ReductionRatio {
     pub const NAME: &'static str = "reduction_ratio";
+}
+
+impl Cause for ReductionRatio {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "reduction_ratio",
+            place: "joint",
+            formula: "d = c q",
+            size: "1e-5 to 1e-3",
+            confounded: "joint_compliance, gear_cyclic of order 1",
+            needs: "a wide travel of the joint",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Self))
+    }
 }
 
 impl Effect for ReductionRatio {
@@ -23,7 +40,7 @@ impl Effect for ReductionRatio {
         (0..robot.joints())
             .map(|j| ParameterSpec {
                 name: format!("reduction_ratio.j{}", j + 1),
-                place: format!("joint {}", j + 1),
+                place: Place::Joint(j),
                 unit: Unit::One,
                 prior_sigma: 0.01,
             })

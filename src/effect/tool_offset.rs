@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about its seat.
 
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -27,6 +27,23 @@ impl ToolOffset {
     }
 }
 
+impl Cause for ToolOffset {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "tool_offset",
+            place: "tool",
+            formula: "a displacement of the measured point",
+            size: "any",
+            confounded: "link_geometry of the last link",
+            needs: "-",
+        }
+    }
+
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        Some(Box::new(Self))
+    }
+}
+
 impl Effect for ToolOffset {
     fn name(&self) -> &'static str {
         Self::NAME
@@ -40,7 +57,7 @@ impl Effect for ToolOffset {
         let all = targets.into_iter().flat_map(|(name, width)| {
             AXES[..width].iter().enumerate().map(move |(k, axis)| ParameterSpec {
                 name: format!("{}{axis}", Self::prefix(name)),
-                place: "tool".into(),
+                place: Place::Tool,
                 unit: if k < 3 { Unit::Millimetre } else { Unit::Radian },
                 prior_sigma: 0.05,
             })

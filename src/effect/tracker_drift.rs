@@ -1,123 +1,81 @@
 //! `tracker_drift`: the tracker's frame moves slowly: steadily, with the warm-up, or as a slow curve in time.
 
-use super::form::{cosines, parameters};
-use super::frame_shift::{MOTION, unit};
-use super::thermal_growth::Warmth;
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::basis::around;
+use super::{About, Axes, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth};
 use crate::robot::RobotModel;
-use serde::{Deserialize, Serialize};
 
-/// How the drift goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Course {
-    /// In proportion to time or to a power of it; 1 at the end of the fitted rows.
-    Steady {
-        start_s: f64,
-        end_s: f64,
-        #[serde(default = "one")]
-        power: f64,
-    },
-    /// With temperature or warm-up.
-    Warming(Warmth),
-    /// Three cosines over the fitted rows, held at their value beyond.
-    Slow { start_s: f64, end_s: f64 },
-}
+pub struct TrackerDrift;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TrackerDrift {
-    course: Course,
-    /// Whether the frame also turns.
-    turns: bool,
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-/// Powers of time that a drift may go with: what settles and what begins slowly.
-const POWERS: std::ops::RangeInclusive<f64> = 0.25..=3.0;
+/// Powers of time by which a drift may go on: what settles and what begins slowly.
+const POWERS: [f64; 2] = [0.25, 3.0];
 /// Cosines of a slow course.
 const SLOW: usize = 3;
 
-impl TrackerDrift {
-    pub fn course(&self) -> Course {
-        self.course
+impl Cause for TrackerDrift {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "tracker_drift",
+            place: "tracker",
+            formula: "the tracker's frame moves steadily, with the warm-up, or slowly",
+            size: "10 to 200 um",
+            confounded: "thermal_growth, base_shift",
+            needs: "time",
+        }
     }
 
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let [start_s, end_s] = survey.time;
-        if end_s <= start_s {
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let [start, end] = survey.time;
+        if end <= start {
             return Vec::new();
         }
+        let form = |axes, law| Term::new(&Self, Motion::Tracker { axes }, law);
         let mut out = Vec::new();
-        for turns in [false, true] {
-            out.push(Hypothesis::new(Self { course: Course::Steady { start_s, end_s, power: 1.0 }, turns }, 3));
-            for (by, tried) in Warmth::all(survey) {
-                out.push(Hypothesis::new(Self { course: Course::Warming(by), turns }, 3 * tried).charged(4.0));
+        for axes in [Axes::Place, Axes::Both] {
+            let steady = Law::new(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
+            out.push(Hypothesis::new(form(axes, steady), 3));
+            for (law, tried) in warmth::all(survey) {
+                out.push(Hypothesis::new(form(axes, law), 3 * tried).charged(4.0));
             }
         }
-        out.push(Hypothesis::new(Self { course: Course::Slow { start_s, end_s }, turns: false }, 1).charged(4.0));
+        let slow = Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: SLOW });
+        out.push(Hypothesis::new(form(Axes::Place, slow), 1).charged(4.0));
         out
     }
 
-    fn axes(&self) -> usize {
-        if self.turns { 6 } else { 3 }
-    }
-}
-
-impl Effect for TrackerDrift {
-    fn name(&self) -> &'static str {
-        "tracker_drift"
-    }
-
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
-        if let Course::Slow { .. } = self.course {
-            let numbers = (1..=SLOW).flat_map(|k| MOTION.into_iter().take(3).map(move |m| (format!("{}_cos{k}", m.0), m.1, m.2)));
-            let numbers: Vec<_> = numbers.collect();
-            return parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)));
-        }
-        parameters(self, MOTION.into_iter().take(self.axes()))
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let rate = match self.course {
-            Course::Steady { start_s, end_s, power } => {
-                let share = (state.time() - start_s) / (end_s - start_s);
-                // Rows before the fitted ones lie on the other side.
-                libm::copysign(libm::pow(share.abs(), power), share)
-            }
-            Course::Warming(by) => by.at(state),
-            Course::Slow { start_s, end_s } => {
-                for (k, value) in cosines(state.time(), [start_s, end_s], SLOW).enumerate() {
-                    for axis in 0..3 {
-                        out.shift(3 * k + axis, p, 0, unit(axis) * value);
-                    }
-                }
-                return;
-            }
-        };
-        for axis in 0..self.axes() {
-            out.shift(axis, p, 0, unit(axis) * rate);
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        let frame = |suffix: String| term.motion().frame_numbers(move |name| format!("{name}{suffix}"));
+        match term.basis() {
+            Basis::Cosines { count, .. } => (1..=count).flat_map(|k| frame(format!("_cos{k}"))).collect(),
+            _ => frame(String::new()),
         }
     }
-}
 
-impl Placed for TrackerDrift {
-    fn place(&self) -> Place {
-        Place::Tracker
+    fn near(&self, term: &Term, _survey: &Survey, level: i32) -> Vec<Term> {
+        match term.basis() {
+            Basis::Power { start, end, exponent } => {
+                let exponents = around(exponent, 1.5, 0.7, level, POWERS);
+                term.with_bases(exponents.map(|exponent| Basis::Power { start, end, exponent }))
+            }
+            basis => term.with_bases(warmth::near(basis, level)),
+        }
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        let courses: Vec<Course> = match self.course {
-            Course::Steady { start_s, end_s, power } => {
-                let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
-                let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
-                powers.map(|power| Course::Steady { start_s, end_s, power }).collect()
-            }
-            Course::Warming(by) => by.near(level).into_iter().map(Course::Warming).collect(),
-            Course::Slow { .. } => Vec::new(),
+    fn sentence(&self, told: &Told) -> String {
+        let how = match told.terms(self.name()).next().map(Term::basis) {
+            Some(Basis::Power { exponent, .. }) if exponent < 0.7 => "slower and slower",
+            Some(Basis::Power { exponent, .. }) if exponent > 1.4 => "faster and faster",
+            Some(Basis::Power { .. }) => "steadily",
+            Some(Basis::Cosines { .. }) | None => "slowly",
+            Some(_) => "with the warm-up",
         };
-        courses.into_iter().map(|course| Self { course, ..self.clone() }.into()).collect()
+        format!("the tracker's frame drifts {how}")
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(super::thermal_growth::MEASURE)
     }
 }

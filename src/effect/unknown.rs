@@ -1,22 +1,15 @@
-//! `unknown`: form-free signatures, for what no entry of the library explains: placed and described, never christened.
+//! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
-use super::form::{cosines, parameters};
-use super::frame_shift::{MOTION, unit};
+use super::basis::around;
 use super::joint_table::PLAUSIBLE;
-use super::signature::Signature;
-use super::thermal_growth::Warmth;
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{
+    About, Axes, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth,
+};
 use crate::robot::RobotModel;
-use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Unknown {
-    place: Place,
-    signature: Signature,
-}
+pub struct Unknown;
 
-/// Cosines of a smooth function of one variable, and of each of two.
+/// Cosines of a smooth function of one variable, of a frame in time, and of each of two.
 const CURVE: usize = 8;
 const EACH: usize = 3;
 /// Rows within a bump's width: fewer make a bump of any single wrong point.
@@ -26,309 +19,263 @@ const LOCAL: f64 = 0.2;
 /// Widths (rad) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 /// Powers of time by which something creeps.
-const POWERS: std::ops::RangeInclusive<f64> = 0.3..=3.0;
-/// Lengths of the recording, from its start, over which a creep is believed to go on.
-const CREEPING: f64 = 2.0;
+const POWERS: [f64; 2] = [0.3, 3.0];
 /// Periods of a sway as shares of the recording.
 const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
-/// What goes with another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
+/// What depends on another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
 const WOBBLE: f64 = 12.0;
 /// -2 ln of the odds of things outside the library.
 const OPEN: f64 = 8.0;
+/// One sigma of what is known of a coefficient before any measurement, SI.
+const WIDE: f64 = 0.01;
 
 impl Unknown {
-    pub fn signature(&self) -> Signature {
-        self.signature
-    }
-
-    /// Whether a joint follows a function of its own angle and a neighbour's, as where a hose runs along both and pulls.
-    pub fn is_hose(&self) -> bool {
-        let Place::Joint(joint) = self.place else { return false };
-        self.two_angles().is_some_and(|[a, b]| (a == joint || b == joint) && a.abs_diff(b) == 1)
-    }
-
-    /// The angles of which a joint follows a function, where there are two.
-    pub fn two_angles(&self) -> Option<[usize; 2]> {
-        match self.signature {
-            Signature::Product { a, b } | Signature::Surface { a, b, .. } => Some([a, b]),
-            _ => None,
-        }
-    }
-
-    /// Whether a joint follows a smooth function of its own angle: nearly geometry, or another law of that angle, in its slow part.
-    pub fn is_curve(&self) -> bool {
-        matches!((self.signature, self.place), (Signature::Angle { by, .. }, Place::Joint(joint)) if by == joint)
-    }
-
-    /// Whether it is a motion of the base in time: it says nothing of the arm, nor of another time.
-    pub fn is_passing(&self) -> bool {
-        self.place == Place::Base && matches!(self.signature, Signature::Sway { .. } | Signature::Time { .. })
-    }
-
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
-        let mut add = |place, signature, tried, charge: f64| {
-            out.push(Hypothesis::new(Self { place, signature }, tried).charged(OPEN + charge));
-        };
-        let [start_s, end_s] = survey.time;
-        if end_s > start_s {
-            add(Place::Base, Signature::Time { start_s, end_s }, 1, 0.0);
-            let periods = SWAYS.map(|share| share * (end_s - start_s));
-            for period_s in periods {
-                [false, true]
-                    .into_iter()
-                    .for_each(|turns| add(Place::Base, Signature::Sway { period_s, turns }, 2 * SWAYS.len(), 0.0));
-            }
-        }
-        (0..3).for_each(|axis| add(Place::Tool, Signature::Side { axis }, 3, 0.0));
-        add(Place::Tool, Signature::Sag, 1, 0.0);
-        if survey.payload_changes() {
-            let signature = Signature::Payload { above_kg: survey.heavy_payload() };
-            add(Place::Tool, signature, 1, 6.0);
-            add(Place::Base, signature, 1, 6.0);
-        }
-        out
-    }
+    pub const NAME: &'static str = "unknown";
 
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
-        let place = Place::Joint(joint);
-        let mut add = |signature, tried: usize, charge: f64| {
-            out.push(Hypothesis::new(Self { place, signature }, tried).charged(OPEN + charge));
+        let mut add = |law: Law, tried: usize, charge: f64| {
+            let term = Term::new(&Self, Motion::Joint { joint }, law);
+            out.push(Hypothesis::new(term, tried).charged(OPEN + charge));
         };
-        let n = survey.joints();
+        let own = |basis| Law::new(Variable::Angle { joint }, basis);
         let [low, high] = survey.range[joint];
         let places = (survey.travel(joint) / 0.1) as usize + 1;
         // Centre and width are fitted, too: as much as two numbers in the criterion.
         let two_numbers = 3 * survey.rows.len();
-        for width_rad in WIDTHS {
-            let count = ((high - low - 0.5 * width_rad) / width_rad).ceil().max(0.0) as usize;
-            let centres = (0..count).map(|k| low + width_rad * (k as f64 + 0.5));
-            for centre_rad in centres.filter(|centre| supported(survey, joint, *centre, width_rad)) {
-                add(Signature::Bump { centre_rad, width_rad }, two_numbers, 0.0);
-                if width_rad > WIDTHS[0] {
-                    add(Signature::Step { centre_rad, width_rad }, two_numbers, 0.0);
+        for width in WIDTHS {
+            let count = ((high - low - 0.5 * width) / width).ceil().max(0.0) as usize;
+            let centres = (0..count).map(|k| low + width * (k as f64 + 0.5));
+            for centre in centres.filter(|centre| supported(survey, joint, *centre, width)) {
+                add(own(Basis::Bump { centre, width }), two_numbers, 0.0);
+                if width > WIDTHS[0] {
+                    add(own(Basis::Rise { centre, width }), two_numbers, 0.0);
                 }
             }
         }
         for share in [0.25, 0.5, 0.75] {
             for upwards in [true, false] {
-                let from_rad = low + share * (high - low);
-                add(Signature::Hinge { by: joint, from_rad, upwards }, places, 0.0);
+                add(own(Basis::Hinge { from: low + share * (high - low), upwards }), places, 0.0);
             }
         }
-        for by in 0..n {
-            let [low, high] = survey.range[by];
-            add(Signature::Angle { by, low, high }, 1, 0.0);
+        for by in 0..survey.joints() {
+            let cosines = |joint: usize, count| {
+                let [low, high] = survey.range[joint];
+                Basis::Cosines { low, high, count }
+            };
+            let angle = Variable::Angle { joint: by };
+            add(Law::new(angle, cosines(by, CURVE)), 1, 0.0);
             if by != joint {
-                (1..=ORDERS).for_each(|order| add(Signature::Periodic { by, order }, 6, WOBBLE));
+                (1..=ORDERS).for_each(|order| add(Law::new(angle, Basis::Wave { order, overtone: false }), 6, WOBBLE));
             }
-            for b in by + 1..n {
-                add(Signature::Product { a: by, b }, 3, 0.0);
-                add(Signature::Surface { a: by, b, a_range: survey.range[by], b_range: survey.range[b] }, 1, 0.0);
+            for other in by + 1..survey.joints() {
+                let (second, wave) = (Variable::Angle { joint: other }, Basis::Wave { order: 1, overtone: false });
+                add(Law::new(angle, wave).times(second, wave), 3, 0.0);
+                add(Law::new(angle, cosines(by, EACH)).times(second, cosines(other, EACH)), 1, 0.0);
             }
         }
-        let [start_s, end_s] = survey.time;
-        if end_s > start_s {
-            add(Signature::Time { start_s, end_s }, 1, 0.0);
-            add(Signature::Creep { start_s, end_s, power: 1.0 }, 1, 4.0);
+        let [start, end] = survey.time;
+        if end > start {
+            add(Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: CURVE }), 1, 0.0);
+            add(Law::new(Variable::Time, Basis::Creep { start, end, exponent: 1.0 }), 1, 4.0);
         }
-        Warmth::all(survey).into_iter().for_each(|(by, tried)| add(Signature::Warming(by), tried, 4.0));
+        warmth::all(survey).into_iter().for_each(|(law, tried)| add(law, tried, 4.0));
+        out
+    }
+}
+
+impl Cause for Unknown {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint, base or tool",
+            formula: "a form-free function of joints, time or payload",
+            size: "any",
+            confounded: "whatever is in no list",
+            needs: "-",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
+        let mut add = |motion, law, tried, charge: f64| {
+            out.push(Hypothesis::new(Term::new(&Self, motion, law), tried).charged(OPEN + charge));
+        };
+        let [start, end] = survey.time;
+        if end > start {
+            let slow = Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: EACH });
+            add(Motion::Base { axes: Axes::Both }, slow, 1, 0.0);
+            for share in SWAYS {
+                let sway = Law::new(Variable::Time, Basis::Sway { period: share * (end - start) });
+                for axes in [Axes::Place, Axes::Rotation] {
+                    add(Motion::Base { axes }, sway, 2 * SWAYS.len(), 0.0);
+                }
+            }
+        }
+        let tool = Motion::Tool { axes: Axes::Place };
+        // A seat with play: other on either side of an axis. A mounting that yields: by the direction of gravity.
+        (0..3).for_each(|axis| add(tool, Law::new(Variable::Gravity { axis: Some(axis) }, Basis::Sign), 3, 0.0));
+        add(tool, Law::of(Variable::Gravity { axis: None }), 1, 0.0);
+        if survey.payload_changes() {
+            let loaded = Law::new(Variable::Payload, Basis::After { at: survey.heavy_payload() });
+            add(tool, loaded, 1, 6.0);
+            add(Motion::Base { axes: Axes::Both }, loaded, 1, 6.0);
+        }
         out
     }
 
-    /// Values of the signature in a row: the motion is their combination.
-    fn values(&self, state: &ArmState, mut each: impl FnMut(usize, f64)) {
-        let at = |joint: usize| state.q[joint];
-        match self.signature {
-            Signature::Angle { by, low, high } => {
-                cosines(at(by), [low, high], CURVE).enumerate().for_each(|(k, value)| each(k, value));
+    fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
+        let counted = 1..=term.law().count();
+        match term.motion() {
+            Motion::Joint { .. } => {
+                let sigma = if term.is_own_curve() { PLAUSIBLE } else { WIDE };
+                counted.map(|k| (format!("c{k}"), term.motion().unit(robot), sigma)).collect()
             }
-            Signature::Bump { centre_rad, width_rad } => {
-                let Place::Joint(joint) = self.place else { return };
-                let distance = (at(joint) - centre_rad) / width_rad;
-                each(0, libm::exp(-distance * distance));
+            motion => {
+                let numbers = counted.flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
+                numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
             }
-            Signature::Step { centre_rad, width_rad } => {
-                let Place::Joint(joint) = self.place else { return };
-                each(0, libm::tanh((at(joint) - centre_rad) / width_rad));
-            }
-            Signature::Hinge { by, from_rad, upwards } => {
-                let beyond = at(by) - from_rad;
-                each(0, if upwards { beyond.max(0.0) } else { (-beyond).max(0.0) });
-            }
-            Signature::Periodic { by, order } => {
-                let (sine, cosine) = libm::sincos(f64::from(order) * at(by));
-                each(0, sine);
-                each(1, cosine);
-            }
-            Signature::Product { a, b } => {
-                let ((sa, ca), (sb, cb)) = (libm::sincos(at(a)), libm::sincos(at(b)));
-                [sa * sb, sa * cb, ca * sb, ca * cb].into_iter().enumerate().for_each(|(k, value)| each(k, value));
-            }
-            Signature::Surface { a, b, a_range, b_range } => {
-                for (i, x) in cosines(at(a), a_range, EACH).enumerate() {
-                    cosines(at(b), b_range, EACH).enumerate().for_each(|(k, y)| each(EACH * i + k, x * y));
-                }
-            }
-            Signature::Sway { period_s, .. } => {
-                let (sine, cosine) = libm::sincos(std::f64::consts::TAU * state.time() / period_s);
-                each(0, sine);
-                each(1, cosine);
-            }
-            Signature::Time { start_s, end_s } => {
-                let count = if self.is_joint() { CURVE } else { EACH };
-                cosines(state.time(), [start_s, end_s], count).enumerate().for_each(|(k, value)| each(k, value));
-            }
-            Signature::Creep { start_s, end_s, power } => {
-                let share = (state.time() - start_s) / (end_s - start_s);
-                // Long after the recording what was seen last holds.
-                each(0, libm::pow(if share > CREEPING { 1.0 } else { share.max(0.0) }, power));
-            }
-            Signature::Warming(by) => each(0, by.at(state)),
-            Signature::Side { axis } => each(0, state.posture.down(self.station(state)).map_or(0.0, |down| down[axis].signum())),
-            Signature::Sag => {
-                let down = state.posture.down(self.station(state)).unwrap_or_default();
-                (0..3).for_each(|axis| each(axis, down[axis]));
-            }
-            Signature::Payload { above_kg } => each(0, f64::from(state.payload() > above_kg)),
         }
     }
 
-    fn is_joint(&self) -> bool {
-        matches!(self.place, Place::Joint(_))
-    }
-
-    fn station(&self, state: &ArmState) -> usize {
-        match self.place {
-            Place::Tool => state.q.len(),
-            _ => 0,
-        }
-    }
-
-    fn count(&self) -> usize {
-        match self.signature {
-            Signature::Angle { .. } => CURVE,
-            Signature::Periodic { .. } | Signature::Sway { .. } => 2,
-            Signature::Product { .. } => 4,
-            Signature::Sag => 3,
-            Signature::Surface { .. } => EACH * EACH,
-            Signature::Time { .. } if self.is_joint() => CURVE,
-            Signature::Time { .. } => EACH,
-            _ => 1,
-        }
-    }
-
-    /// Directions at a frame, of [`MOTION`]: displacement of a tool, one kind of motion of a swaying base, all of a base else.
-    fn axes(&self) -> std::ops::Range<usize> {
-        match self.signature {
-            Signature::Sway { turns: true, .. } => 3..6,
-            Signature::Sway { .. } => 0..3,
-            _ if self.place == Place::Tool => 0..3,
-            _ => 0..6,
-        }
-    }
-}
-
-impl Effect for Unknown {
-    fn name(&self) -> &'static str {
-        "unknown"
-    }
-
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let numbers: Vec<(String, Unit, f64)> = match self.place {
-            Place::Joint(joint) => {
-                let unit = if robot.is_revolute(joint) { Unit::Radian } else { Unit::Millimetre };
-                let size = if self.is_curve() { PLAUSIBLE } else { 0.01 };
-                (1..=self.count()).map(|k| (format!("c{k}"), unit, size)).collect()
-            }
-            _ => (1..=self.count())
-                .flat_map(|k| self.axes().map(move |axis| (format!("{}{k}", MOTION[axis].0), MOTION[axis].1, 0.01)))
-                .collect(),
-        };
-        parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
-    }
-
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let (axes, station) = (self.axes(), self.station(state));
-        self.values(state, |k, value| match self.place {
-            Place::Joint(joint) => out.turn(k, p, joint, value),
-            _ => axes.clone().for_each(|axis| out.shift(axes.len() * k + axis - axes.start, p, station, unit(axis) * value)),
-        });
-    }
-
-    fn needs_torque(&self) -> bool {
-        matches!(self.signature, Signature::Side { .. } | Signature::Sag)
-    }
-}
-
-/// Whether a bump or step is local, and enough rows lie within it: a wide one stands in for any law of the angle.
-fn supported(survey: &Survey, joint: usize, centre_rad: f64, width_rad: f64) -> bool {
-    let [low, high] = survey.range[joint];
-    if width_rad > LOCAL * (high - low) || !(low..=high).contains(&centre_rad) {
-        return false;
-    }
-    let within = |row: &&usize| (survey.data.q(**row)[joint] - centre_rad).abs() < width_rad;
-    survey.rows.iter().filter(within).take(SUPPORT).count() == SUPPORT
-}
-
-impl Placed for Unknown {
-    fn place(&self) -> Place {
-        self.place
-    }
-
-    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
-        let with = |signature| Form::from(Self { place: self.place, signature });
-        match self.signature {
-            Signature::Bump { centre_rad, width_rad } | Signature::Step { centre_rad, width_rad } => {
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        match term.basis() {
+            Basis::Bump { centre, width } | Basis::Rise { centre, width } => {
+                let Some((joint, _)) = term.of_one() else { return Vec::new() };
                 let step = libm::exp2(-f64::from(level));
                 let power = libm::exp2(-0.5 * f64::from(level));
-                let widths = [0.75, 1.0, 1.33].map(|factor| width_rad * libm::pow(factor, power));
-                let centres = [-0.4, 0.0, 0.4].map(|share| centre_rad + share * width_rad * step);
-                let pairs = centres.into_iter().flat_map(|c| widths.map(|w| (c, w)));
-                let Place::Joint(joint) = self.place else { return Vec::new() };
-                let shape = |(centre_rad, width_rad)| match self.signature {
-                    Signature::Step { .. } => Signature::Step { centre_rad, width_rad },
-                    _ => Signature::Bump { centre_rad, width_rad },
-                };
-                pairs.filter(|(centre, width)| supported(survey, joint, *centre, *width)).map(|pair| with(shape(pair))).collect()
+                let widths = [0.75, 1.0, 1.33].map(|factor| width * libm::pow(factor, power));
+                let centres = [-0.4, 0.0, 0.4].map(|share| centre + share * width * step);
+                let pairs = centres.into_iter().flat_map(|centre| widths.map(|width| (centre, width)));
+                let pairs = pairs.filter(|(centre, width)| supported(survey, joint, *centre, *width));
+                let bump = matches!(term.basis(), Basis::Bump { .. });
+                let shape =
+                    |(centre, width)| if bump { Basis::Bump { centre, width } } else { Basis::Rise { centre, width } };
+                term.with_bases(pairs.map(shape))
             }
-            Signature::Hinge { by, from_rad, upwards } => {
-                let [low, high] = survey.range[by];
+            Basis::Hinge { from, upwards } => {
+                let Variable::Angle { joint } = term.law().first.of else { return Vec::new() };
+                let [low, high] = survey.range[joint];
                 let step = 0.12 * (high - low) * libm::exp2(-0.7 * f64::from(level));
-                let places = [from_rad - step, from_rad + step].into_iter().filter(|at| *at > low && *at < high);
-                places.map(|from_rad| with(Signature::Hinge { by, from_rad, upwards })).collect()
+                let places = [from - step, from + step].into_iter().filter(|at| *at > low && *at < high);
+                term.with_bases(places.map(|from| Basis::Hinge { from, upwards }))
             }
-            Signature::Sway { period_s, turns } => {
-                let step = libm::pow(1.15, libm::exp2(-0.7 * f64::from(level)));
-                [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor, turns })).to_vec()
+            Basis::Sway { period } => {
+                let periods = around(period, 1.15, 0.7, level, [0.0, f64::INFINITY]);
+                term.with_bases(periods.map(|period| Basis::Sway { period }))
             }
-            Signature::Creep { start_s, end_s, power } => {
-                let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
-                let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
-                powers.map(|power| with(Signature::Creep { start_s, end_s, power })).collect()
+            Basis::Creep { start, end, exponent } => {
+                let exponents = around(exponent, 1.5, 0.7, level, POWERS);
+                term.with_bases(exponents.map(|exponent| Basis::Creep { start, end, exponent }))
             }
-            Signature::Warming(by) => by.near(level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
+            basis => term.with_bases(warmth::near(basis, level)),
+        }
+    }
+
+    fn variant(&self, term: &Term) -> String {
+        let names: Vec<String> = term.law().variables().iter().map(Variable::to_string).collect();
+        let frame = !matches!(term.motion(), Motion::Joint { .. });
+        match (term.basis(), term.law().first.of) {
+            (Basis::Hinge { .. }, _) => "hinge".into(),
+            (Basis::Bump { .. }, _) => "bump".into(),
+            (Basis::Rise { .. }, _) => "step".into(),
+            (Basis::Sway { .. }, _) => {
+                if term.motion() == (Motion::Base { axes: Axes::Rotation }) { "rock" } else { "sway" }.into()
+            }
+            (Basis::Creep { .. }, _) => "creep".into(),
+            (Basis::Sign, Variable::Gravity { .. }) => "side".into(),
+            (_, Variable::Gravity { .. }) => "sag".into(),
+            (Basis::Cosines { .. }, Variable::Time) => "time".into(),
+            (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "warm".into(),
+            (_, Variable::Payload) => "payload".into(),
+            _ if frame => String::new(),
+            _ => names.join("_"),
+        }
+    }
+
+    /// A joint that follows a function of its own angle and a neighbour's: a hose runs along both and pulls.
+    fn called(&self, term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
+        if is_hose(term) { "cable_drag" } else { Self::NAME }
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        let law = told.terms(Self::NAME).next().map(described).unwrap_or_default();
+        format!("{} has an error that no entry of the library explains: {law}", told.place)
+    }
+
+    fn is_nameless(&self) -> bool {
+        true
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["gear_cyclic", "joint_table"]
+    }
+
+    fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
+        let Some(term) = form.term() else { return Vec::new() };
+        let joint = matches!(form.place(), Place::Joint(_));
+        match (term.basis(), term.law().first.of) {
+            (Basis::Wave { .. }, Variable::Angle { joint: by }) if term.law().times.is_none() => {
+                vec![("axis_wobble", Place::Joint(by))]
+            }
+            // No motor current tells of a pull.
+            _ if called == "cable_drag" => vec![(Self::NAME, form.place())],
+            _ if joint && term.two_angles().is_some() => vec![("cable_drag", form.place())],
             _ => Vec::new(),
         }
     }
+}
 
-    fn variant(&self) -> String {
-        match self.signature {
-            Signature::Angle { by, .. } | Signature::Periodic { by, .. } => format!("q{}", by + 1),
-            Signature::Hinge { .. } => "hinge".into(),
-            Signature::Bump { .. } => "bump".into(),
-            Signature::Step { .. } => "step".into(),
-            Signature::Product { a, b } | Signature::Surface { a, b, .. } => format!("q{}_q{}", a + 1, b + 1),
-            Signature::Sway { turns, .. } => if turns { "rock" } else { "sway" }.into(),
-            Signature::Time { .. } => "time".into(),
-            Signature::Creep { .. } => "creep".into(),
-            Signature::Warming(_) => "warm".into(),
-            Signature::Side { .. } => "side".into(),
-            Signature::Sag => "sag".into(),
-            Signature::Payload { .. } => "payload".into(),
+/// Whether a joint follows a function of its own angle and a neighbour's.
+pub(super) fn is_hose(term: &Term) -> bool {
+    let Place::Joint(joint) = term.motion().place() else { return false };
+    term.two_angles().is_some_and(|[a, b]| (a == joint || b == joint) && a.abs_diff(b) == 1)
+}
+
+/// Whether a bump or step is local, and enough rows lie within it: a wide one stands in for any law of the angle.
+fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
+    let [low, high] = survey.range[joint];
+    if width > LOCAL * (high - low) || !(low..=high).contains(&centre) {
+        return false;
+    }
+    let within = |row: &&usize| (survey.data.q(**row)[joint] - centre).abs() < width;
+    survey.rows.iter().filter(within).take(SUPPORT).count() == SUPPORT
+}
+
+/// What a law is a function of and how, in words.
+pub(super) fn described(term: &Term) -> String {
+    let variables: Vec<String> = term.law().variables().iter().map(Variable::to_string).collect();
+    let of = variables.join(" and ");
+    match (term.basis(), term.law().first.of) {
+        (Basis::Bump { centre, width }, _) => {
+            format!("local bump at {:.1} deg, width {:.1} deg", centre.to_degrees(), width.to_degrees())
         }
+        (Basis::Rise { centre, width }, _) => {
+            format!("step at {:.1} deg within {:.1} deg", centre.to_degrees(), width.to_degrees())
+        }
+        (Basis::Hinge { from, upwards }, _) => {
+            let side = if upwards { "above" } else { "below" };
+            format!("grows with {of} {side} {:.1} deg, nothing on the other side", from.to_degrees())
+        }
+        (Basis::Wave { .. }, _) if term.law().times.is_some() => format!("product of functions of {of}"),
+        (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),
+        (Basis::Sway { period }, _) => {
+            let turns = term.motion() == Motion::Base { axes: Axes::Rotation };
+            format!("{} with a period of {period:.0} s", if turns { "rocks" } else { "sways" })
+        }
+        (Basis::Creep { exponent, .. }, _) if (exponent - 1.0).abs() < 0.3 => "creeps steadily with time".into(),
+        (Basis::Creep { exponent, .. }, _) => {
+            format!("creeps with time, {} and {0}", if exponent > 1.0 { "faster" } else { "slower" })
+        }
+        (Basis::Sign, Variable::Gravity { axis }) => {
+            let name = ["x", "y", "z"].get(axis.unwrap_or(2)).unwrap_or(&"z");
+            format!("other on either side of its {name}: which one hangs down decides, as where a seat has play")
+        }
+        (_, Variable::Gravity { .. }) => "depends on the direction in which it hangs, as where a mounting yields".into(),
+        (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "depends on the warm-up".into(),
+        (_, Variable::Payload) => "differs with the payload".into(),
+        _ => format!("function of {of}"),
     }
 }

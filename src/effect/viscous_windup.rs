@@ -2,52 +2,52 @@
 //!
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Hypothesis, ParameterSpec, Place, Placed, Survey};
-use crate::robot::{Measurements, RobotModel};
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable};
+use crate::robot::RobotModel;
 use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ViscousWindup {
-    joint: usize,
-}
+pub struct ViscousWindup;
 
 /// s: a joint that trails farther is not driven.
 const LARGEST: f64 = 0.1;
 
 impl ViscousWindup {
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
+    pub const NAME: &'static str = "viscous_windup";
+}
+
+impl Cause for ViscousWindup {
+    fn about(&self) -> &'static About {
+        &About {
+            name: Self::NAME,
+            place: "joint",
+            formula: "d = -c dq/dt: the joint trails in proportion to its speed",
+            size: "0.2 to 10 arcsec for each deg/s",
+            confounded: "joint_log_lag where one joint moves alone",
+            needs: "joint velocities, of a moving arm",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         if !survey.moves() {
             return Vec::new();
         }
         let moving = |joint: &usize| survey.rows.iter().any(|row| survey.data.velocity(*row, *joint) != 0.0);
-        let joints = (0..survey.joints()).filter(moving);
-        joints.map(|joint| Hypothesis::new(Self { joint }, 1).positive().within(LARGEST)).collect()
-    }
-}
-
-impl Effect for ViscousWindup {
-    fn name(&self) -> &'static str {
-        "viscous_windup"
+        let law = |joint| Law::new(Variable::Velocity { joint }, Basis::Linear { zero: 0.0, per: -1.0 });
+        let terms = (0..survey.joints()).filter(moving).map(|joint| Term::new(&Self, Motion::Joint { joint }, law(joint)));
+        terms.map(|term| Hypothesis::new(term, 1).positive().within(LARGEST)).collect()
     }
 
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let unit = if robot.is_revolute(self.joint) { Unit::RadianPerRadianPerSecond } else { Unit::Second };
-        parameters(self, [("trail", unit, 0.01)])
+    fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
+        let turns = term.motion().unit(robot) == Unit::Radian;
+        vec![("trail".into(), if turns { Unit::RadianPerRadianPerSecond } else { Unit::Second }, 0.01)]
     }
 
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        out.turn(0, p, self.joint, -state.velocity(self.joint));
+    fn sentence(&self, told: &Told) -> String {
+        let trail = told.numbers.first().map_or_else(String::new, |n| format!("{:.2} {}", n.value, n.unit));
+        format!("{} trails behind in proportion to its speed, by {trail}", told.place)
     }
 
-    fn missing(&self, _robot: &RobotModel, data: &Measurements) -> Option<String> {
-        data.velocity.is_none().then(|| "the recording has no joint velocities".into())
-    }
-}
-
-impl Placed for ViscousWindup {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
+    fn finer(&self) -> &'static [&'static str] {
+        &["backlash", "gear_cyclic", "unknown"]
     }
 }

@@ -1,53 +1,44 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
-use super::form::parameters;
-use super::{ArmState, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey};
+use super::{About, Cause, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Survey, Term, Told, change};
 use crate::robot::RobotModel;
-use crate::units::Unit;
-use serde::{Deserialize, Serialize};
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ZeroShift {
-    joint: usize,
-    time_s: f64,
-}
+pub struct ZeroShift;
 
-/// Change points tried at first; the best is refined to every one.
-pub(super) const CHANGES: usize = 40;
-
-impl ZeroShift {
-    pub fn time_s(&self) -> f64 {
-        self.time_s
+impl Cause for ZeroShift {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "zero_shift",
+            place: "joint",
+            formula: "d = c after some time",
+            size: "10 to 500 arcsec",
+            confounded: "base_shift (joint 1), tool_shift (last joint)",
+            needs: "rows in the order of measurement",
+        }
     }
 
-    pub fn propose(survey: &Survey) -> Vec<Hypothesis> {
-        let at = |joint: usize| survey.changes(CHANGES).map(move |time_s| Self { joint, time_s });
-        let forms = (0..survey.joints()).flat_map(at);
-        forms.map(|form| Hypothesis::new(form, survey.boundaries.len())).collect()
-    }
-}
-
-impl Effect for ZeroShift {
-    fn name(&self) -> &'static str {
-        "zero_shift"
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let joints = 0..survey.joints();
+        joints.flat_map(|joint| change::propose(&Self, &[Motion::Joint { joint }], survey)).collect()
     }
 
-    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let unit = if robot.is_revolute(self.joint) { Unit::Radian } else { Unit::Millimetre };
-        parameters(self, [("step", unit, 0.1)])
+    fn numbers(&self, term: &Term, robot: &RobotModel) -> Vec<NumberSpec> {
+        vec![("step".into(), term.motion().unit(robot), 0.1)]
     }
 
-    fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        out.turn(0, p, self.joint, f64::from(state.time() > self.time_s));
-    }
-}
-
-impl Placed for ZeroShift {
-    fn place(&self) -> Place {
-        Place::Joint(self.joint)
+    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
+        change::near(term, survey)
     }
 
-    fn near(&self, survey: &Survey, _level: i32) -> Vec<Form> {
-        survey.changes_near(self.time_s).into_iter().map(|time_s| Self { joint: self.joint, time_s }.into()).collect()
+    fn sentence(&self, told: &Told) -> String {
+        format!("the zero of {} steps by {}{}", told.place, told.size(), told.when(self.name()))
+    }
+
+    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        if form.place() == Place::Joint(0) { vec![("base_shift", Place::Base)] } else { Vec::new() }
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(change::MEASURE)
     }
 }

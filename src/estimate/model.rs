@@ -3,7 +3,7 @@
 use super::known::Known;
 pub use super::piece::Miss;
 use super::piece::miss;
-use crate::effect::{BaseFrame, EffectStack};
+use crate::effect::{BaseFrame, BasePlacement, EffectStack};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -34,7 +34,7 @@ impl Model {
         self.stack
             .effects()
             .find(|(effect, _)| effect.name() == BaseFrame::NAME)
-            .map_or(*self.stack.base(), |(_, range)| BaseFrame::new(*self.stack.base()).pose(&self.x[range]))
+            .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
     }
 
     /// What is left of every row, where some row measured other than a whole point; empty where all measured just that.

@@ -6,7 +6,7 @@
 use super::fisher::tail;
 use super::model::Model;
 use super::piece::Weight;
-use crate::effect::{EffectStack, Load, Setting, entry};
+use crate::effect::{EffectStack, Load, Setting, whole};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -186,7 +186,7 @@ impl Group {
 /// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
 fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
     let setting = Setting { base: model.base(), load: Load::GravityTorque };
-    let zeros = entry("joint_offset").map(|entry| (entry.make)(&setting));
+    let zeros = whole("joint_offset", &setting);
     let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
     let mut scratch = joints.stack.scratch(&joints.robot);
     let mut columns = vec![Vector3::zeros(); joints.robot.joints()];

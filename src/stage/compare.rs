@@ -96,7 +96,7 @@ impl Stage for Compare {
             rows.push(ChangeRow {
                 name: spec.name.clone(),
                 effect: effect(&before.effect).into(),
-                place: spec.place.clone(),
+                place: spec.place.to_string(),
                 unit: spec.unit.symbol().into(),
                 previous: before.value,
                 change: show(change.step),

@@ -38,7 +38,7 @@ pub(super) fn curves(
     for finding in &findings.0 {
         let own: Vec<usize> = (model.stack.effects())
             .filter(|(effect, _)| effect.name() == finding.effect)
-            .flat_map(|(_, range)| range.filter(|k| specs[*k].place == finding.place).collect::<Vec<_>>())
+            .flat_map(|(_, range)| range.filter(|k| specs[*k].place.to_string() == finding.place).collect::<Vec<_>>())
             .collect();
         if own.is_empty() {
             continue;

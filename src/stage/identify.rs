@@ -2,7 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{Anchor, EFFECTS, Effect, EffectStack, Setting, entry};
+use crate::effect::{Anchor, Effect, EffectStack, Setting, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{Fate, FitOptions, Fitted, Model, fit, gauge};
 use crate::robot::{Measurements, RobotModel};
@@ -34,7 +34,7 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 fn all_effects() -> Vec<String> {
-    EFFECTS.iter().map(|entry| entry.name.to_string()).collect()
+    identified().map(|cause| cause.name().to_string()).collect()
 }
 
 crate::stage::reads! {
@@ -64,8 +64,8 @@ impl Stage for Identify {
             }
         }
         for (k, name) in self.effects.iter().enumerate() {
-            if entry(name).is_none() {
-                let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+            if !identified().any(|cause| cause.name() == name) {
+                let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
                 let hint =
                     nearest(name, names.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
                 faults.push(Fault::new(
@@ -83,13 +83,13 @@ impl Stage for Identify {
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
         let setting = Setting { base, load: self.load.into() };
         let mut effects = Vec::new();
-        for entry in EFFECTS.iter().filter(|entry| self.effects.iter().any(|name| name == entry.name)) {
-            let effect = (entry.make)(&setting);
+        let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
+        for effect in asked.filter_map(|cause| cause.whole(&setting)) {
             if effect.name() == Anchor::NAME && robot.gauging().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
-                Some(reason) => context.services.note(format!("{} is left out: {reason}", entry.name)),
+                Some(reason) => context.services.note(format!("{} is left out: {reason}", effect.name())),
                 None => effects.push(effect),
             }
         }
@@ -182,7 +182,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
         free.collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = entry(COMPLIANCE).map(|entry| (entry.make)(setting)) else { return };
+    let Some(compliance) = whole(COMPLIANCE, setting) else { return };
     let asked = model.stack.effects().any(|(effect, _)| effect.name() == COMPLIANCE);
     if suspects.is_empty() || asked {
         return;
@@ -198,7 +198,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     }
     // Known names first, compliance behind them: numbers of the first model stay valid in the second.
     let mut effects: Vec<Box<dyn Effect>> =
-        model.stack.effects().filter_map(|(effect, _)| entry(effect.name())).map(|entry| (entry.make)(setting)).collect();
+        model.stack.effects().filter_map(|(effect, _)| whole(effect.name(), setting)).collect();
     effects.push(compliance);
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
     rival.known.clone_from(&model.known);

@@ -3,7 +3,7 @@
 //! Figures are in the unit that the table `parameters` shows for each (mm, rad, rad/Nm, ...). Where several patterns of one
 //! setting match a parameter the longest counts.
 
-use crate::effect::{BaseFrame, EFFECTS};
+use crate::effect::{BaseFrame, identified};
 use crate::error::{Fault, nearest};
 use crate::estimate::{Bounds, Known, Model, Prior};
 use crate::stage::Context;
@@ -41,7 +41,7 @@ impl ParameterSet<'_> {
 
     /// What is wrong with the settings whatever the robot.
     pub fn faults(&self) -> Vec<Fault> {
-        let names: Vec<&str> = EFFECTS.iter().map(|entry| entry.name).collect();
+        let names: Vec<&str> = identified().map(|cause| cause.name()).collect();
         let mut faults = Vec::new();
         for (setting, pattern) in self.patterns() {
             let effect = pattern.split('.').next().unwrap_or_default();

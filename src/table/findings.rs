@@ -62,7 +62,7 @@ impl Findings {
         let rows = ranked(diagnosis).map(|(rank, finding)| FindingRow {
             rank,
             effect: finding.effect.into(),
-            place: finding.place.clone(),
+            place: finding.place.to_string(),
             statement: finding.statement.clone(),
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),
@@ -101,7 +101,7 @@ impl Rivals {
             finding.rivals.iter().map(move |rival| RivalRow {
                 rank,
                 effect: rival.effect.into(),
-                place: rival.place.clone(),
+                place: rival.place.to_string(),
                 delta_bic: rival.delta_bic,
             })
         });

@@ -29,7 +29,7 @@ crate::table::rows! { "parameters",
 }
 
 use crate::effect::{
-    Anchor, BaseFrame, EFFECTS, Effect, EffectStack, Form, Load, Setting, ToolOffset, entry, is_of_the_measurement,
+    Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole,
 };
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
@@ -104,7 +104,7 @@ impl Parameters {
                 rows.push(ParameterRow {
                     name: spec.name.clone(),
                     effect: effect.name().into(),
-                    place: spec.place.clone(),
+                    place: spec.place.to_string(),
                     unit: spec.unit.symbol().into(),
                     nominal,
                     value,
@@ -147,7 +147,7 @@ impl Parameters {
     /// The effects of the whole arm in this model, in the registry's order.
     pub fn effects(&self) -> Vec<&'static str> {
         let has = |name: &&str| self.0.iter().any(|row| row.effect == *name && row.form.is_none());
-        EFFECTS.iter().map(|entry| entry.name).filter(has).collect()
+        identified().map(|cause| cause.name()).filter(has).collect()
     }
 
     /// Effects at a place, in the order of their parameters. Fails where a form cannot be read.
@@ -167,7 +167,7 @@ impl Parameters {
         let mut rows = Vec::with_capacity(self.0.len());
         for row in &self.0 {
             let form = row.form.as_deref().map(read_form).transpose()?;
-            if !is_of_the_measurement(&row.effect, &row.place, form.as_ref()) {
+            if !form.is_some_and(|form| form.is_of_the_measurement()) {
                 rows.push(row.clone());
             }
         }
@@ -185,9 +185,9 @@ impl Parameters {
             };
         let robot = self.gauging(robot);
         let setting = Setting { base, load };
-        let names = EFFECTS.iter().map(|entry| entry.name);
+        let names = identified().map(|cause| cause.name());
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
-        let whole = chosen.iter().filter_map(|name| entry(name)).map(|entry| (entry.make)(&setting));
+        let whole = chosen.iter().filter_map(|name| whole(name, &setting));
         let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));

@@ -7,7 +7,7 @@ use crate::cli::diagnose::diagnosis;
 use crate::cli::surroundings::open_store;
 use crate::cli::{emit, emit_json};
 use crate::diagnose::{Standing, contest};
-use crate::effect::{CATALOGUE, Effect, Form, Load, Placed};
+use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Site, Told, median, tell};
 use crate::pipeline::StageReport;
@@ -77,7 +77,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
         Ok((contest, form)) => {
             rival = (form.name().to_string(), form.place().to_string());
             // A free curve is known where points were fitted, and nowhere else.
-            if forms.iter().chain([&form]).any(|form| matches!(form, Form::JointTable(_) | Form::Unknown(_))) {
+            if forms.iter().chain([&form]).any(|form| form.is(&JointTable) || form.cause().is_nameless()) {
                 within(&mut site, &recorded);
             }
             tried = Some(form);
@@ -127,7 +127,7 @@ fn name(text: &str) -> Result<(&str, Option<&str>)> {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
     };
-    let known = || CATALOGUE.iter().map(|about| about.name);
+    let known = || CAUSES.iter().map(|cause| cause.name());
     if known().any(|name| name == effect) {
         return Ok((effect, place));
     }

@@ -1,0 +1,43 @@
+//! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
+
+use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, change};
+use crate::robot::RobotModel;
+
+pub struct BaseShift;
+
+impl Cause for BaseShift {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "base_shift",
+            place: "base",
+            formula: "the base moves at some time",
+            size: "20 to 500 um",
+            confounded: "zero_shift of joint 1, tracker_drift",
+            needs: "rows in the order of measurement",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        change::propose(&Self, &[Axes::Place, Axes::Both].map(|axes| Motion::Base { axes }), survey)
+    }
+
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        term.motion().frame_numbers(|name| name.to_string())
+    }
+
+    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
+        change::near(term, survey)
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("the base (or the tracker) has moved{}", told.when(self.name()))
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(change::MEASURE)
+    }
+}

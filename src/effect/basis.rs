@@ -1,0 +1,115 @@
+//! Functions of one variable, linear in their coefficients, with few shape numbers (in the variable's SI unit).
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// (u - zero) / per.
+    Linear { zero: f64, per: f64 },
+    /// sin(order u) and cos(order u), and with an overtone those of twice the order.
+    Wave { order: u32, overtone: bool },
+    /// Sine and cosine of a period.
+    Sway { period: f64 },
+    /// cos(k pi (u - low) / (high - low)), k = 1..=count, held at either end: a curve without its mean.
+    Cosines { low: f64, high: f64, count: usize },
+    /// The same, fading out beyond either end within one wave of the highest cosine.
+    Fading { low: f64, high: f64, count: usize },
+    /// exp(-((u - centre) / width)^2).
+    Bump { centre: f64, width: f64 },
+    /// tanh((u - centre) / width): one level below, another above.
+    Rise { centre: f64, width: f64 },
+    /// Nothing on one side of `from`, in proportion to the distance on the other.
+    Hinge { from: f64, upwards: bool },
+    /// 1 above `at`, else 0.
+    After { at: f64 },
+    /// -1 or 1.
+    Sign,
+    /// The power of the share of the way from `start` to `end`, odd about `start`.
+    Power { start: f64, end: f64, exponent: f64 },
+    /// The same from `start` on; 1 later than [`CREEPING`] times the way.
+    Creep { start: f64, end: f64, exponent: f64 },
+    /// 1 - exp(-(u - start) / constant) from `start` on.
+    Settling { start: f64, constant: f64 },
+}
+
+/// Lengths of the recording, from its start, over which a creep is believed to go on.
+const CREEPING: f64 = 2.0;
+
+impl Basis {
+    /// The variable itself.
+    pub const PROPORTIONAL: Self = Self::Linear { zero: 0.0, per: 1.0 };
+
+    /// How many functions it has.
+    pub fn count(&self) -> usize {
+        match self {
+            Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
+            Self::Sway { .. } => 2,
+            Self::Cosines { count, .. } | Self::Fading { count, .. } => *count,
+            _ => 1,
+        }
+    }
+
+    /// Whether it is a free curve.
+    pub fn is_curve(&self) -> bool {
+        matches!(self, Self::Cosines { .. } | Self::Fading { .. })
+    }
+
+    /// The values of its functions at `u`, numbered.
+    pub(super) fn values(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
+        match *self {
+            Self::Linear { zero, per } => each(0, (u - zero) / per),
+            Self::Wave { order, overtone } => {
+                for k in 0..=usize::from(overtone) {
+                    let (sine, cosine) = libm::sincos((k + 1) as f64 * f64::from(order) * u);
+                    each(2 * k, sine);
+                    each(2 * k + 1, cosine);
+                }
+            }
+            Self::Sway { period } => {
+                let (sine, cosine) = libm::sincos(TAU * u / period);
+                each(0, sine);
+                each(1, cosine);
+            }
+            Self::Cosines { low, high, count } => cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value)),
+            Self::Fading { low, high, count } => {
+                let wave = 2.0 * (high - low) / count as f64;
+                let beyond = (low - u).max(u - high).clamp(0.0, wave);
+                let share = if beyond > 0.0 { 0.5 + 0.5 * libm::cos(PI * beyond / wave) } else { 1.0 };
+                cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, share * value));
+            }
+            Self::Bump { centre, width } => {
+                let distance = (u - centre) / width;
+                each(0, libm::exp(-distance * distance));
+            }
+            Self::Rise { centre, width } => each(0, libm::tanh((u - centre) / width)),
+            Self::Hinge { from, upwards } => each(0, if upwards { (u - from).max(0.0) } else { (from - u).max(0.0) }),
+            Self::After { at } => each(0, f64::from(u > at)),
+            Self::Sign => each(0, u.signum()),
+            Self::Power { start, end, exponent } => {
+                let share = (u - start) / (end - start);
+                each(0, libm::copysign(libm::pow(share.abs(), exponent), share));
+            }
+            Self::Creep { start, end, exponent } => {
+                let share = (u - start) / (end - start);
+                // Long after the recording what was seen last holds.
+                each(0, libm::pow(if share > CREEPING { 1.0 } else { share.max(0.0) }, exponent));
+            }
+            Self::Settling { start, constant } => each(0, 1.0 - libm::exp(-(u - start).max(0.0) / constant)),
+        }
+    }
+}
+
+/// Cosines of `u` held within the range, see [`Basis::Cosines`].
+pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
+    let phase = PI * ((u - low) / (high - low).max(1e-12)).clamp(0.0, 1.0);
+    (1..=count).map(move |k| libm::cos(k as f64 * phase))
+}
+
+/// A number divided and multiplied by a step that shrinks from `first` towards 1 with the level, kept within bounds; the number
+/// itself is none of them.
+pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    let step = libm::pow(first, libm::exp2(-pace * f64::from(level)));
+    [value * step, value / step].map(|other| other.clamp(low, high)).into_iter().filter(move |other| *other != value)
+}

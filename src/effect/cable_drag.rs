@@ -1,0 +1,54 @@
+//! `cable_drag`: a hose package pulls on a joint by its angle, seen through the joint's compliance as a balancer's spring is; or by its
+//! own angle and its neighbour's, as a law without a name that is called so.
+
+use super::counterbalance::{MEASURE, Spring};
+use super::unknown::described;
+use super::{About, Cause, Form, Hypothesis, Measure, Place, Survey, Told, Unknown};
+use serde::Deserialize;
+
+pub struct CableDrag;
+
+impl Cause for CableDrag {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "cable_drag",
+            place: "joint",
+            formula: "t by the angles of the joint and its neighbour",
+            size: "1 to 10 % of the joint's torque",
+            confounded: "unknown, gear_cyclic of order 1",
+            needs: "motor currents",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        Spring::propose(survey, |joint| !Spring::balances(joint))
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        let place = told.place;
+        match told.terms(Unknown::NAME).next() {
+            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law)),
+            None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
+        }
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["gear_cyclic", "unknown", "joint_table", "backlash"]
+    }
+
+    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        let mut out = vec![("gear_cyclic", form.place())];
+        if let Place::Joint(joint) = form.place() {
+            out.push(("link_mass", Place::Links(joint, joint)));
+        }
+        out
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(MEASURE)
+    }
+
+    fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        Some(Spring::deserialize(body).map(Form::from))
+    }
+}

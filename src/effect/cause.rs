@@ -1,0 +1,160 @@
+//! Causes of error: everything that the project knows of one stands in the file that implements [`Cause`], and every cause in one list.
+
+use super::*;
+
+/// What a cause is, in words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct About {
+    /// Canonical name.
+    pub name: &'static str,
+    /// Where it sits.
+    pub place: &'static str,
+    /// q: joint position, dq/dt: its velocity, t: load torque of a joint, s: direction of approach, T: temperature; d: turn of the joint.
+    pub formula: &'static str,
+    /// On industrial arms.
+    pub size: &'static str,
+    /// Effects that do nearly the same where a recording is poor.
+    pub confounded: &'static str,
+    /// Columns of the recording and entries of the robot file without which it cannot be told.
+    pub needs: &'static str,
+}
+
+/// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Measure {
+    pub rank: u8,
+    pub advice: &'static str,
+}
+
+/// Name, unit and one sigma of what is known before any measurement (SI), of a coefficient.
+pub type NumberSpec = (String, Unit, f64);
+
+/// A cause of error.
+pub trait Cause: Sync {
+    fn about(&self) -> &'static About;
+
+    fn name(&self) -> &'static str {
+        self.about().name
+    }
+
+    /// The effect of the whole arm, for causes that are identified, not searched for.
+    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+        None
+    }
+
+    /// Every hypothesis that the recording can speak of.
+    fn propose(&self, _survey: &Survey) -> Vec<Hypothesis> {
+        Vec::new()
+    }
+
+    /// What a mechanic is told of a finding, without its size at the tool.
+    fn sentence(&self, told: &Told) -> String {
+        format!("{} at {}", self.name(), told.place)
+    }
+
+    /// Whether it belongs to one measurement and not to the arm.
+    fn is_of_the_measurement(&self) -> bool {
+        false
+    }
+
+    /// Whether its forms describe something that is in no list.
+    fn is_nameless(&self) -> bool {
+        false
+    }
+
+    /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
+    fn finer(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Other causes that do the same as a form of this one, named `called`, in whatever data: identities of kinematics and statics.
+    fn identities(&self, _form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        Vec::new()
+    }
+
+    /// What separates it from others beside more poses.
+    fn measure(&self) -> Option<Measure> {
+        None
+    }
+
+    /// Reads a form that is no [`Term`], as [`Placed::body`] wrote it.
+    fn read(&self, _body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        None
+    }
+
+    /// The coefficients of a term of this cause.
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        Vec::new()
+    }
+
+    /// See [`Placed::near`].
+    fn near(&self, _term: &Term, _survey: &Survey, _level: i32) -> Vec<Term> {
+        Vec::new()
+    }
+
+    /// See [`Placed::variant`].
+    fn variant(&self, _term: &Term) -> String {
+        String::new()
+    }
+
+    /// See [`Placed::called`].
+    fn called(&self, _term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
+        self.name()
+    }
+}
+
+/// Every cause, in the order in which a model is built up. Where two parameters do the same, the one whose cause comes first is kept.
+pub const CAUSES: &[&dyn Cause] = &[
+    &anchor::Anchor,
+    &base_frame::BaseFrame,
+    &tool_offset::ToolOffset,
+    &joint_offset::JointOffset,
+    &link_geometry::LinkGeometry,
+    &reduction_ratio::ReductionRatio,
+    &coupling_ratio::CouplingRatio,
+    &joint_compliance::JointCompliance,
+    &joint_hardening::JointHardening,
+    &link_compliance::LinkCompliance,
+    &base_compliance::BaseCompliance,
+    &gear_cyclic::GearCyclic,
+    &gear_motor_cyclic::GearMotorCyclic,
+    &joint_table::JointTable,
+    &backlash::Backlash,
+    &thermal_growth::ThermalGrowth,
+    &counterbalance::Counterbalance,
+    &cable_drag::CableDrag,
+    &link_mass::LinkMass,
+    &payload_error::PayloadError,
+    &axis_wobble::AxisWobble,
+    &viscous_windup::ViscousWindup,
+    &zero_shift::ZeroShift,
+    &tool_shift::ToolShift,
+    &base_shift::BaseShift,
+    &tracker_drift::TrackerDrift,
+    &tracker_scale::TrackerScale,
+    &joint_log_lag::JointLogLag,
+    &wrong_point::Outlier,
+    &wrong_point::MislabelledPoint,
+    &unknown::Unknown,
+];
+
+/// The cause of a canonical name.
+pub fn cause(name: &str) -> Option<&'static dyn Cause> {
+    CAUSES.iter().copied().find(|cause| cause.name() == name)
+}
+
+/// The effect of the whole arm of a name, if there is one.
+pub fn whole(name: &str, setting: &Setting) -> Option<Box<dyn Effect>> {
+    cause(name)?.whole(setting)
+}
+
+/// Causes that are effects of the whole arm, which are identified; all others are searched for.
+pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
+    let setting = Setting { base: Pose::identity(), load: Load::GravityTorque };
+    CAUSES.iter().copied().filter(move |cause| cause.whole(&setting).is_some())
+}
+
+/// Every hypothesis of every cause.
+pub fn hypotheses(survey: &Survey) -> Vec<Hypothesis> {
+    CAUSES.iter().flat_map(|cause| cause.propose(survey)).collect()
+}

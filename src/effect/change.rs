@@ -1,0 +1,23 @@
+//! Changes at one moment: what `zero_shift`, `base_shift` and `tool_shift` have in common.
+
+use super::{Basis, Cause, Hypothesis, Law, Measure, Motion, Survey, Term, Variable};
+
+/// Change points tried at first; the best is refined to every one.
+const CHANGES: usize = 40;
+
+/// What shows when something has moved.
+pub(super) const MEASURE: Measure =
+    Measure { rank: 3, advice: "return to a few anchor poses with different first joints every half hour" };
+
+/// Motions at each of the change points.
+pub(super) fn propose(cause: &'static dyn Cause, motions: &[Motion], survey: &Survey) -> Vec<Hypothesis> {
+    let law = |at| Law::new(Variable::Time, Basis::After { at });
+    let terms = survey.changes(CHANGES).flat_map(|at| motions.iter().map(move |motion| Term::new(cause, *motion, law(at))));
+    terms.map(|term| Hypothesis::new(term, survey.boundaries.len())).collect()
+}
+
+/// The same at neighbouring change points.
+pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
+    let Basis::After { at } = term.basis() else { return Vec::new() };
+    term.with_bases(survey.changes_near(at).into_iter().map(|at| Basis::After { at }))
+}

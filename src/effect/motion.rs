@@ -1,0 +1,128 @@
+//! Where a small motion enters the chain, and along which directions: the generators of laws.
+
+use super::link_compliance::extent;
+use super::{Deflection, NumberSpec, Place};
+use crate::robot::RobotModel;
+use crate::spatial::{Twist, screw};
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+
+/// Joints and links count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Motion {
+    /// A joint travels.
+    Joint { joint: usize },
+    /// Joint `moved` travels because of joint `by`.
+    Coupled { by: usize, moved: usize },
+    /// The axis of a joint tilts about the directions across it, or about one of them (0 or 1). It stands in the link before, or turns
+    /// with the joint.
+    Axis { joint: usize, about: Option<usize>, turning: bool },
+    /// Neighbouring links grow along themselves, each in proportion to its length.
+    Links { first: usize, last: usize },
+    /// The base.
+    Base { axes: Axes },
+    /// The measuring frame.
+    Tracker { axes: Axes },
+    /// The tool, axes of the base at the zero pose.
+    Tool { axes: Axes },
+}
+
+/// Directions of a frame's motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Axes {
+    /// Displaced.
+    Place,
+    /// Turned about the origin.
+    Rotation,
+    /// Both.
+    Both,
+}
+
+impl Axes {
+    fn range(self) -> std::ops::Range<usize> {
+        match self {
+            Self::Place => 0..3,
+            Self::Rotation => 3..6,
+            Self::Both => 0..6,
+        }
+    }
+
+    /// Name, unit and usual size of each.
+    fn numbers(self) -> &'static [(&'static str, Unit, f64)] {
+        &MOTION[self.range()]
+    }
+}
+
+/// The numbers of a rigid motion.
+const MOTION: [(&str, Unit, f64); 6] = [
+    ("x", Unit::Millimetre, 0.1),
+    ("y", Unit::Millimetre, 0.1),
+    ("z", Unit::Millimetre, 0.1),
+    ("rx", Unit::Radian, 0.1),
+    ("ry", Unit::Radian, 0.1),
+    ("rz", Unit::Radian, 0.1),
+];
+
+impl Motion {
+    pub fn place(&self) -> Place {
+        match *self {
+            Self::Joint { joint } | Self::Axis { joint, .. } => Place::Joint(joint),
+            Self::Coupled { by, moved } => Place::Coupled(by, moved),
+            Self::Links { first, last } => Place::Links(first, last),
+            Self::Base { .. } => Place::Base,
+            Self::Tracker { .. } => Place::Tracker,
+            Self::Tool { .. } => Place::Tool,
+        }
+    }
+
+    /// The unit of a travel of the joint that moves; of a frame, of its displacement.
+    pub(super) fn unit(&self, robot: &RobotModel) -> Unit {
+        match *self {
+            Self::Joint { joint } | Self::Coupled { moved: joint, .. } if robot.is_revolute(joint) => Unit::Radian,
+            Self::Axis { .. } => Unit::Radian,
+            _ => Unit::Millimetre,
+        }
+    }
+
+    /// Coefficients of a frame's motion, under names made of those of its axes.
+    pub(super) fn frame_numbers(&self, name: impl Fn(&str) -> String) -> Vec<NumberSpec> {
+        match self {
+            Self::Base { axes } | Self::Tracker { axes } | Self::Tool { axes } => {
+                axes.numbers().iter().map(|(axis, unit, sigma)| (name(axis), *unit, *sigma)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Moves by function number `k` of `count`, which has `value`.
+    pub(super) fn add(&self, robot: &RobotModel, (k, count): (usize, usize), value: f64, p: &[f64], out: &mut Deflection) {
+        match *self {
+            Self::Joint { joint } | Self::Coupled { moved: joint, .. } => out.turn(k, p, joint, value),
+            Self::Axis { joint, about, turning } => {
+                let normals = robot.normals(joint).iter().enumerate();
+                let station = if turning { joint + 1 } else { joint };
+                let chosen = normals.filter(|(axis, _)| about.is_none_or(|about| about == *axis)).map(|(_, normal)| normal);
+                for (i, (_, normal)) in chosen.enumerate() {
+                    out.shift(count * i + k, p, station, screw(normal, robot.point(joint)) * value);
+                }
+            }
+            Self::Links { first, last } => {
+                for link in first..=last {
+                    let growth = extent(robot, link) * value;
+                    out.shift(k, p, link + 1, Twist::new(growth.x, growth.y, growth.z, 0.0, 0.0, 0.0));
+                }
+            }
+            Self::Base { axes } | Self::Tracker { axes } => shift(0, axes, k, value, p, out),
+            Self::Tool { axes } => shift(robot.joints(), axes, k, value, p, out),
+        }
+    }
+}
+
+fn shift(station: usize, axes: Axes, k: usize, value: f64, p: &[f64], out: &mut Deflection) {
+    let range = axes.range();
+    for (i, axis) in range.clone().enumerate() {
+        out.shift(range.len() * k + i, p, station, Twist::ith(axis, value));
+    }
+}

@@ -1,0 +1,144 @@
+//! Terms: effect = sum_k c_k * direction(place, row) * law_k(variables of the row; shape numbers).
+
+use super::form::Placed;
+use super::{ArmState, Basis, Cause, Deflection, Effect, Form, Law, Motion, ParameterSpec, Place, Survey, Variable};
+use crate::robot::{Measurements, RobotModel};
+use serde::{Deserialize, Serialize};
+
+/// A law at a place, under the name of a cause.
+#[derive(Clone)]
+pub struct Term {
+    cause: &'static dyn Cause,
+    motion: Motion,
+    law: Law,
+}
+
+/// What a table of parameters keeps of a term beside its cause's name.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    motion: Motion,
+    law: Law,
+}
+
+impl Term {
+    pub fn new(cause: &'static dyn Cause, motion: Motion, law: Law) -> Self {
+        Self { cause, motion, law }
+    }
+
+    /// Reads what [`Form::body`] made of a term.
+    pub(super) fn read(cause: &'static dyn Cause, body: serde_json::Value) -> serde_json::Result<Form> {
+        let Stored { motion, law } = serde_json::from_value(body)?;
+        Ok(Self { cause, motion, law }.into())
+    }
+
+    pub fn motion(&self) -> Motion {
+        self.motion
+    }
+
+    pub fn law(&self) -> &Law {
+        &self.law
+    }
+
+    /// The same with another law.
+    pub fn with(&self, law: Law) -> Self {
+        Self { law, ..*self }
+    }
+
+    /// The same with other bases of its first variable.
+    pub fn with_bases(&self, bases: impl IntoIterator<Item = Basis>) -> Vec<Self> {
+        bases.into_iter().map(|basis| self.with(self.law.with(basis))).collect()
+    }
+
+    /// The basis of its first variable.
+    pub fn basis(&self) -> Basis {
+        self.law.first.basis
+    }
+
+    /// The variable of a joint that moves by a law of one variable.
+    pub fn of_one(&self) -> Option<(usize, Variable)> {
+        match (self.motion, self.law.times) {
+            (Motion::Joint { joint }, None) => Some((joint, self.law.first.of)),
+            _ => None,
+        }
+    }
+
+    /// Whether a joint follows a free curve of its own angle: nearly geometry, or another law of that angle, in its slow part.
+    pub fn is_own_curve(&self) -> bool {
+        let own = |(joint, of)| of == Variable::Angle { joint };
+        self.basis().is_curve() && self.of_one().is_some_and(own)
+    }
+
+    /// The angles of which it is a function, where they are two.
+    pub fn two_angles(&self) -> Option<[usize; 2]> {
+        match (self.law.first.of, self.law.times?.of) {
+            (Variable::Angle { joint: a }, Variable::Angle { joint: b }) => Some([a, b]),
+            _ => None,
+        }
+    }
+}
+
+impl PartialEq for Term {
+    fn eq(&self, other: &Self) -> bool {
+        self.cause.name() == other.cause.name() && self.motion == other.motion && self.law == other.law
+    }
+}
+
+impl Effect for Term {
+    fn name(&self) -> &'static str {
+        self.cause.name()
+    }
+
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        let numbers = self.cause.numbers(self, robot);
+        super::form::parameters(self, numbers.iter().map(|(name, unit, sigma)| (name.as_str(), *unit, *sigma)))
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let count = self.law.count();
+        self.law.values(robot, state, &mut |k, value| self.motion.add(robot, (k, count), value, p, out));
+    }
+
+    fn needs_torque(&self) -> bool {
+        self.law.factors().any(|factor| factor.of.needs_torque())
+    }
+
+    fn missing(&self, _robot: &RobotModel, data: &Measurements) -> Option<String> {
+        let velocity = |variable| matches!(variable, Variable::Velocity { .. });
+        let needed = self.law.factors().any(|factor| velocity(factor.of));
+        (needed && data.velocity.is_none()).then(|| "the recording has no joint velocities".into())
+    }
+}
+
+impl Placed for Term {
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
+    }
+
+    fn place(&self) -> Place {
+        self.motion.place()
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        self.law.variables()
+    }
+
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
+        self.cause.near(self, survey, level).into_iter().map(Form::from).collect()
+    }
+
+    fn variant(&self) -> String {
+        self.cause.variant(self)
+    }
+
+    fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
+        self.cause.called(self, p, survey)
+    }
+
+    fn term(&self) -> Option<&Term> {
+        Some(self)
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(Stored { motion: self.motion, law: self.law })
+    }
+}

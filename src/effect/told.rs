@@ -1,0 +1,70 @@
+//! What a cause is given to put its finding into words.
+
+use super::{Form, Place, Term, Variable};
+use crate::units::Unit;
+
+/// A coefficient of a finding in the unit in which people read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    pub name: String,
+    pub value: f64,
+    pub unit: &'static str,
+    pub sigma: Option<f64>,
+}
+
+/// The unit in which people read a number of this unit.
+pub fn people(unit: Unit) -> (Unit, &'static str) {
+    match unit {
+        Unit::Radian => (Unit::Arcsecond, "arcsec"),
+        Unit::Second => (Unit::Millisecond, "ms"),
+        Unit::RadianPerRadianPerSecond => (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)"),
+        other => (other, other.symbol()),
+    }
+}
+
+/// A finding: its place, its forms and their fitted numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Told<'a> {
+    pub place: Place,
+    pub forms: &'a [Form],
+    pub numbers: &'a [Number],
+}
+
+impl<'a> Told<'a> {
+    /// The first form of a type.
+    pub(super) fn form<T: super::Placed>(&self) -> Option<&'a T> {
+        self.forms.iter().find_map(Form::as_a)
+    }
+
+    /// The terms under a cause's name.
+    pub(super) fn terms(&self, name: &'static str) -> impl Iterator<Item = &'a Term> {
+        self.forms.iter().filter(move |form| form.cause().name() == name).filter_map(|form| form.term())
+    }
+
+    /// The first number with its unit.
+    pub(super) fn value(&self) -> String {
+        self.numbers.first().map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit))
+    }
+
+    /// The size of the first number with its unit.
+    pub(super) fn size(&self) -> String {
+        self.numbers.first().map_or_else(String::new, |n| format!("{:.0} {}", n.value.abs(), n.unit))
+    }
+
+    /// When the first term of a cause changes, if it does.
+    pub(super) fn when(&self, name: &'static str) -> String {
+        let change = self.terms(name).find_map(|term| match (term.law().first.of, term.basis()) {
+            (Variable::Time, super::Basis::After { at }) => Some(at),
+            _ => None,
+        });
+        change.map_or_else(String::new, |time| format!(" at {time:.0} s"))
+    }
+}
+
+/// The amplitude of a sine and a cosine.
+pub(super) fn amplitude(pair: Option<&[Number]>) -> String {
+    match pair {
+        Some([a, b]) => format!("{:.0} {}", a.value.hypot(b.value), a.unit),
+        _ => String::new(),
+    }
+}

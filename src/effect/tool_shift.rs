@@ -1,0 +1,39 @@
+//! `tool_shift`: the mounting of the measured target steps at some time.
+
+use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, change};
+use crate::robot::RobotModel;
+
+pub struct ToolShift;
+
+impl Cause for ToolShift {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "tool_shift",
+            place: "tool",
+            formula: "the target moves at some time",
+            size: "20 to 500 um",
+            confounded: "zero_shift of the last joints",
+            needs: "rows in the order of measurement",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        change::propose(&Self, &[Motion::Tool { axes: Axes::Place }], survey)
+    }
+
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        term.motion().frame_numbers(|name| name.to_string())
+    }
+
+    fn near(&self, term: &Term, survey: &Survey, _level: i32) -> Vec<Term> {
+        change::near(term, survey)
+    }
+
+    fn sentence(&self, told: &Told) -> String {
+        format!("the target on the tool has moved{}", told.when(self.name()))
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(change::MEASURE)
+    }
+}

@@ -1,0 +1,91 @@
+//! What a row of a recording offers that an error may depend on.
+
+use super::ArmState;
+use crate::robot::RobotModel;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A scalar of a row; joints count from 0 here and from 1 in words.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Variable {
+    /// Commanded position of a joint, rad or m.
+    Angle { joint: usize },
+    /// Angle of a joint's motor, rad: the joint's angle times its reduction ratio.
+    Motor { joint: usize },
+    /// Load torque about a joint, Nm.
+    Load { joint: usize },
+    /// Load torque plus so much friction (Nm) to the side from which the joint came, Nm.
+    Push { joint: usize, friction_nm: f64 },
+    /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
+    Approach { joint: usize },
+    /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
+    Velocity { joint: usize },
+    /// Declared payload, kg.
+    Payload,
+    /// Direction of gravity as the tool sees it: one component (0 to 2, axes of the tool at the zero pose), or all three.
+    Gravity { axis: Option<usize> },
+    /// C, where recorded.
+    Temperature,
+    /// s; the number of the row where the recording has no clock.
+    Time,
+    /// Moments of all that the arm carries: of effects that are no law of one scalar.
+    ArmLoad,
+    /// What each joint moved from the row before.
+    LastMove,
+    /// Velocities of all joints together.
+    Speed,
+}
+
+impl Variable {
+    /// How many numbers it is.
+    pub(super) fn components(self) -> usize {
+        if self == (Self::Gravity { axis: None }) { 3 } else { 1 }
+    }
+
+    /// One of its numbers in a row; `None` where the row does not tell.
+    pub(super) fn value(self, component: usize, robot: &RobotModel, state: &ArmState) -> Option<f64> {
+        match self {
+            Self::Angle { joint } => Some(state.q[joint]),
+            Self::Motor { joint } => Some(robot.description().joints[joint].reduction_ratio.unwrap_or(0.0) * state.q[joint]),
+            Self::Load { joint } => Some(state.torque()[joint]),
+            Self::Push { joint, friction_nm } => Some(state.torque()[joint] + friction_nm * state.direction(joint)),
+            Self::Approach { joint } => Some(state.direction(joint)),
+            Self::Velocity { joint } => Some(state.velocity(joint)),
+            Self::Payload => Some(state.payload()),
+            Self::Gravity { axis } => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(component)]),
+            Self::Temperature => state.temperature(),
+            Self::Time => Some(state.time()),
+            Self::ArmLoad | Self::LastMove | Self::Speed => None,
+        }
+    }
+
+    /// Whether its value needs to know how the arm hangs.
+    pub(super) fn needs_torque(self) -> bool {
+        matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad)
+    }
+
+    /// Whether it follows from the way to the row, which nobody knows for the first one.
+    pub fn follows_the_way(self) -> bool {
+        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::LastMove)
+    }
+}
+
+impl fmt::Display for Variable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Angle { joint } => write!(f, "q{}", joint + 1),
+            Self::Motor { joint } => write!(f, "motor {}", joint + 1),
+            Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
+            Self::Push { joint, .. } | Self::Approach { joint } => write!(f, "approach of joint {}", joint + 1),
+            Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
+            Self::Payload => f.write_str("payload"),
+            Self::Gravity { .. } => f.write_str("direction of gravity"),
+            Self::Temperature => f.write_str("temperature"),
+            Self::Time => f.write_str("time"),
+            Self::ArmLoad => f.write_str("load of the arm"),
+            Self::LastMove => f.write_str("last move"),
+            Self::Speed => f.write_str("speed"),
+        }
+    }
+}

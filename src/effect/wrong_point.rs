@@ -1,0 +1,41 @@
+//! `outlier` and `mislabelled_point`: single wrong points, and points under each other's name; the screening of the fit finds them.
+
+use super::{About, Cause};
+
+pub struct Outlier;
+
+impl Cause for Outlier {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "outlier",
+            place: "recording",
+            formula: "single wrong points",
+            size: "any",
+            confounded: "-",
+            needs: "-",
+        }
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+}
+
+pub struct MislabelledPoint;
+
+impl Cause for MislabelledPoint {
+    fn about(&self) -> &'static About {
+        &About {
+            name: "mislabelled_point",
+            place: "recording",
+            formula: "points that carry each other's name",
+            size: "any",
+            confounded: "-",
+            needs: "-",
+        }
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+}
