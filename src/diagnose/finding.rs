@@ -8,8 +8,8 @@ use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
 use crate::effect::{
-    AxisWobble, Backlash, Basis, Effect, Form, GearCyclic, JointCompliance, JointHardening, JointLogLag, Number, ParameterSpec, Place,
-    ReductionRatio, Term, Told, Unknown, Variable, cause, people,
+    AxisWobble, Backlash, Basis, Effect, Form, GearCyclic, JointCompliance, JointHardening, JointLogLag, Number, ParameterSpec,
+    Place, ReductionRatio, Term, Told, Unknown, Variable, cause, people,
 };
 use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
 use std::collections::BTreeMap;
@@ -194,7 +194,7 @@ fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
         let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
         whole - solve(pool, &rest).gain
     };
-    let gains: BTreeMap<Key, f64> = groups.iter().map(|(key, members)| (key.clone(), gain(members))).collect();
+    let gains: BTreeMap<Key, f64> = groups.iter().map(|(key, members)| (*key, gain(members))).collect();
     for (small, own) in &gains {
         let main = gains
             .iter()
@@ -206,7 +206,7 @@ fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
             .max_by(|a, b| a.1.total_cmp(b.1));
         if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
             let members = groups.remove(small).unwrap_or_default();
-            groups.entry(main.clone()).or_default().extend(members);
+            groups.entry(*main).or_default().extend(members);
         }
     }
 }
@@ -227,10 +227,10 @@ fn both_angles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
         }
         _ => false,
     };
-    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| key.clone()).collect();
+    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| *key).collect();
     for part in parts {
         let members = groups.remove(&part).unwrap_or_default();
-        groups.entry(main.clone()).or_default().extend(members);
+        groups.entry(main).or_default().extend(members);
     }
 }
 

@@ -30,7 +30,10 @@ pub use outside::beside;
 pub use separate::{Standing, contest, other_means};
 pub use verdict::{Diagnosis, Errors, Verdict};
 
-use crate::effect::{BaseFrame, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey, Term, identified, whole};
+use crate::effect::{
+    BaseFrame, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey, Term, identified,
+    whole,
+};
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened, rows_alike};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -261,12 +264,8 @@ fn fitted(
     let robot = question.robot;
     // The base starts where it was found, so that its correction is too small to matter to what else moves it.
     let setting = Setting { base: from.base(), load: Load::GravityTorque };
-    let rigid: Vec<Box<dyn Effect>> = from
-        .stack
-        .effects()
-        .take(base)
-        .filter_map(|(effect, _)| whole(effect.name(), &setting))
-        .collect();
+    let rigid: Vec<Box<dyn Effect>> =
+        from.stack.effects().take(base).filter_map(|(effect, _)| whole(effect.name(), &setting)).collect();
     let count = rigid.iter().map(|effect| effect.parameters(robot).len()).sum::<usize>();
     let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
     let stack = EffectStack::new(robot, setting.base, rigid.into_iter().chain(own).collect());

@@ -1,6 +1,6 @@
 //! `anchor`: the far end of a draw-wire or ballbar is elsewhere; three parameters each, tracker axes. It moves no point.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use nalgebra::Vector3;

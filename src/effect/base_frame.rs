@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;

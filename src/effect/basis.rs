@@ -72,7 +72,9 @@ impl Basis {
                 each(0, sine);
                 each(1, cosine);
             }
-            Self::Cosines { low, high, count } => cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value)),
+            Self::Cosines { low, high, count } => {
+                cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value))
+            }
             Self::Fading { low, high, count } => {
                 let wave = 2.0 * (high - low) / count as f64;
                 let beyond = (low - u).max(u - high).clamp(0.0, wave);

@@ -6,7 +6,8 @@
 
 use super::form::parameters;
 use super::{
-    About, ArmState, CableDrag, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    About, ArmState, CableDrag, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told,
+    Variable,
 };
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;

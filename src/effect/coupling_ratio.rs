@@ -3,8 +3,8 @@
 //! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Survey,
-    Term, Told, Variable,
+    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Survey, Term,
+    Told, Variable,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;

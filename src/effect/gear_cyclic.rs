@@ -1,7 +1,7 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
-use super::told::amplitude;
 use super::joint_table::{JointTable, strongest_orders};
+use super::told::amplitude;
 use super::{About, Basis, Cause, Form, Hypothesis, Law, Motion, Number, NumberSpec, Place, Survey, Term, Told, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;

@@ -3,7 +3,8 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Survey, Told, Variable,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Survey, Told,
+    Variable,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -90,12 +91,7 @@ impl Effect for Windup {
             Load::MotorCurrent => (Unit::RadianPerAmpere, 1e-2),
         };
         self.joints(robot)
-            .map(|j| ParameterSpec {
-                name: format!("joint_compliance.j{}", j + 1),
-                place: Place::Joint(j),
-                unit,
-                prior_sigma,
-            })
+            .map(|j| ParameterSpec { name: format!("joint_compliance.j{}", j + 1), place: Place::Joint(j), unit, prior_sigma })
             .collect()
     }
 

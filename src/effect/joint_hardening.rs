@@ -3,7 +3,8 @@
 use super::basis::cosines;
 use super::form::parameters;
 use super::{
-    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;

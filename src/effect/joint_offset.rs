@@ -1,6 +1,6 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 

@@ -3,7 +3,7 @@
 //! Two displacements and two tilts perpendicular to the axis of joint N+1, about its point; together with `base_frame`,
 //! `joint_offset` and `tool_offset` this is complete (rank 4R + 2P + 3) and free of the singularity of parallel axes.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;

@@ -211,4 +211,3 @@ pub struct Setting {
     pub base: Pose,
     pub load: Load,
 }
-

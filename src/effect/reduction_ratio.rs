@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 

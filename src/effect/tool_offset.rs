@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about its seat.
 
-use super::{About, Cause, Setting, ArmState, Deflection, Effect, ParameterSpec, Place};
+use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;

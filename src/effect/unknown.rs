@@ -2,9 +2,7 @@
 
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
-use super::{
-    About, Axes, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth,
-};
+use super::{About, Axes, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth};
 use crate::robot::RobotModel;
 
 pub struct Unknown;
@@ -151,8 +149,7 @@ impl Cause for Unknown {
                 let pairs = centres.into_iter().flat_map(|centre| widths.map(|width| (centre, width)));
                 let pairs = pairs.filter(|(centre, width)| supported(survey, joint, *centre, *width));
                 let bump = matches!(term.basis(), Basis::Bump { .. });
-                let shape =
-                    |(centre, width)| if bump { Basis::Bump { centre, width } } else { Basis::Rise { centre, width } };
+                let shape = |(centre, width)| if bump { Basis::Bump { centre, width } } else { Basis::Rise { centre, width } };
                 term.with_bases(pairs.map(shape))
             }
             Basis::Hinge { from, upwards } => {

@@ -6,14 +6,7 @@ pub struct Outlier;
 
 impl Cause for Outlier {
     fn about(&self) -> &'static About {
-        &About {
-            name: "outlier",
-            place: "recording",
-            formula: "single wrong points",
-            size: "any",
-            confounded: "-",
-            needs: "-",
-        }
+        &About { name: "outlier", place: "recording", formula: "single wrong points", size: "any", confounded: "-", needs: "-" }
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -28,9 +28,7 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{
-    Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole,
-};
+use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
 use crate::robot::{self, Gauging, RobotModel, Target};

@@ -1,7 +1,7 @@
 //! What the benches fit: a robot, its recording, and which of its rows.
 
 use crate::fixture;
-use calib::effect::{EFFECTS, EffectStack, Load, Setting};
+use calib::effect::{EffectStack, Load, Setting, identified};
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::robot::{Measurements, RobotModel};
@@ -33,7 +33,7 @@ impl Case {
     pub fn simulated_as(rows: usize, seed: u64) -> Self {
         let description = fixture::spherical();
         let robot = RobotModel::new(description.clone());
-        let effects: Vec<String> = EFFECTS.iter().map(|entry| entry.name.to_string()).collect();
+        let effects: Vec<String> = identified().map(|cause| cause.name().to_string()).collect();
         let mut truth = model(&robot, Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2)), &effects);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut spread = |size: f64| size * random.random_range(-1.7..1.7);
@@ -115,8 +115,8 @@ impl Case {
 
 fn model(robot: &RobotModel, base: Pose, effects: &[String]) -> Model {
     let setting = Setting { base, load: Load::GravityTorque };
-    let chosen = EFFECTS.iter().filter(|entry| effects.iter().any(|name| name == entry.name));
-    Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.map(|entry| (entry.make)(&setting)).collect()))
+    let chosen = identified().filter(|cause| effects.iter().any(|name| name == cause.name()));
+    Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.filter_map(|cause| cause.whole(&setting)).collect()))
 }
 
 fn numbers(value: &Value) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! The laws that every effect obeys: zero parameters are the nominal robot, partials are derivatives, order is irrelevant.
 
 use crate::fixture;
-use calib::effect::{CATALOGUE, CAUSES, EFFECTS, Effect, EffectStack, Load, ParameterSpec, Setting};
+use calib::effect::{Effect, EffectStack, Load, ParameterSpec, Setting, identified};
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
@@ -25,7 +25,7 @@ fn data(robot: &RobotModel, rows: usize) -> Measurements {
 }
 
 fn all_effects(load: Load) -> Vec<Box<dyn Effect>> {
-    EFFECTS.iter().map(|entry| (entry.make)(&setting(load))).collect()
+    identified().filter_map(|cause| cause.whole(&setting(load))).collect()
 }
 
 /// A plausible value of each parameter, of either sign: a hundredth of its prior sigma, and a stiff gear for compliances.
@@ -42,20 +42,16 @@ fn zero_parameters_are_the_nominal_robot() {
     for description in fixture::all() {
         let robot = RobotModel::new(description);
         let data = data(&robot, 20);
-        for entry in EFFECTS {
+        for effect in all_effects(Load::GravityTorque) {
             let setting = setting(Load::GravityTorque);
-            let stack = EffectStack::new(&robot, setting.base, vec![(entry.make)(&setting)]);
+            let name = effect.name();
+            let stack = EffectStack::new(&robot, setting.base, vec![effect]);
             let zeros = vec![0.0; stack.specs().len()];
             let mut scratch = stack.scratch(&robot);
             for row in 0..data.rows() {
                 let nominal = setting.base.point(&robot.forward(data.q(row)).translation);
                 let point = stack.point(&robot, &data, row, &zeros, &mut scratch);
-                assert!(
-                    (point - nominal).norm() < 1e-12,
-                    "{} moves {} without a parameter",
-                    entry.name,
-                    robot.description().name
-                );
+                assert!((point - nominal).norm() < 1e-12, "{name} moves {} without a parameter", robot.description().name);
             }
         }
     }
@@ -119,33 +115,6 @@ fn the_order_of_effects_is_irrelevant() {
 }
 
 #[test]
-fn every_effect_is_registered_under_its_own_name_and_its_parameters_are_named_after_it() {
-    let files = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/effect")).expect("the effects' folder");
-    let machinery = ["mod", "catalogue", "deflection", "stack", "form", "place", "signature", "survey"];
-    // One mounting steps like another: base and tool share a file.
-    let file = |name: &str| if ["base_shift", "tool_shift"].contains(&name) { "frame_shift".into() } else { name.to_string() };
-    let mut names: Vec<String> = files
-        .filter_map(|file| file.ok()?.path().file_stem()?.to_str().map(String::from))
-        .filter(|name| !machinery.contains(&name.as_str()))
-        .collect();
-    names.sort();
-    let whole = EFFECTS.iter().map(|entry| entry.name);
-    let mut registered: Vec<String> = whole.chain(CAUSES.iter().map(|cause| cause.name)).map(file).collect();
-    registered.sort();
-    registered.dedup();
-    assert_eq!(names, registered, "one file, one line in EFFECTS or CAUSES");
-    let robot = RobotModel::new(fixture::spherical());
-    for entry in EFFECTS {
-        let effect = (entry.make)(&setting(Load::GravityTorque));
-        assert_eq!(effect.name(), entry.name);
-        for spec in effect.parameters(&robot) {
-            assert!(spec.name.starts_with(&format!("{}.", entry.name)), "{}", spec.name);
-            assert!(spec.prior_sigma > 0.0);
-        }
-    }
-}
-
-#[test]
 fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     let robot = RobotModel::new(fixture::offset_wrist());
     let mut posture = Posture::new(6);
@@ -160,16 +129,4 @@ fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     lower[1] = 1e-3 * torque[1].signum();
     assert!(robot.forward(&lower).translation.z < robot.forward(&[0.0; 6]).translation.z);
     assert!(torque[0].abs() < 1e-12, "gravity has no moment about a vertical axis");
-}
-
-#[test]
-fn the_catalogue_has_every_effect_once() {
-    let mut names: Vec<&str> = CATALOGUE.iter().map(|about| about.name).collect();
-    for name in EFFECTS.iter().map(|entry| entry.name).chain(CAUSES.iter().map(|cause| cause.name)) {
-        assert!(names.contains(&name), "{name}");
-    }
-    names.sort_unstable();
-    let all = names.len();
-    names.dedup();
-    assert_eq!(names.len(), all);
 }

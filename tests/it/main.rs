@@ -14,6 +14,7 @@ mod export;
 mod fixture;
 mod fleet;
 mod folds;
+mod forms;
 mod gauges;
 mod identify;
 mod ingest;

@@ -1,7 +1,7 @@
 //! Proposed poses tell more than random ones, and simulated fits confirm it; limits hold, seeds repeat.
 
 use crate::fixture;
-use calib::effect::{EFFECTS, EffectStack, Load, Setting, entry};
+use calib::effect::{EffectStack, Load, Setting, identified, whole};
 use calib::estimate::choose::{Aim, Proposal, Score, Site, Wish, median, propose};
 use calib::estimate::{Fate, FitOptions, Model, fit};
 use calib::robot::description::RobotDescription;
@@ -31,13 +31,13 @@ fn wish(aim: Aim) -> Wish {
 fn model(robot: &RobotDescription, effects: &[&str]) -> Model {
     let robot = RobotModel::new(robot.clone());
     let setting = Setting { base: Pose::identity(), load: Load::GravityTorque };
-    let made = effects.iter().map(|name| (entry(name).expect("registered").make)(&setting)).collect();
+    let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     let stack = EffectStack::new(&robot, setting.base, made);
     Model::nominal(robot, stack)
 }
 
 fn all_effects() -> Vec<&'static str> {
-    EFFECTS.iter().map(|entry| entry.name).collect()
+    identified().map(|cause| cause.name()).collect()
 }
 
 fn proposed(robot: &RobotDescription, site: &Site, effects: &[&str], aim: Aim) -> Proposal {

@@ -1,7 +1,7 @@
 //! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, entry};
+use calib::effect::{EffectStack, Load, Setting, whole};
 use calib::estimate::{FitOptions, Kind, Model, Screening, align, fit, fit_screened};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
@@ -30,7 +30,7 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
 
 fn model(robot: &RobotModel, base: Pose) -> Model {
     let setting = Setting { base, load: Load::GravityTorque };
-    let made = EFFECTS.iter().map(|name| (entry(name).expect("registered").make)(&setting)).collect();
+    let made = EFFECTS.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
 
