@@ -8,7 +8,7 @@
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
-//! | [`error`], [`units`] | errors by reader, units of stored columns | - |
+//! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
@@ -46,6 +46,7 @@
 #![forbid(unsafe_code)]
 
 pub mod error;
+pub mod statistics;
 pub mod units;
 pub mod yaml;
 
@@ -78,6 +79,8 @@ pub mod pipeline;
 pub mod audit;
 pub mod fleet;
 
+#[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;
 
+#[expect(clippy::disallowed_methods, reason = "reads the environment and the clock for all others, and prints")]
 pub mod cli;
