@@ -57,6 +57,18 @@ pub struct Groups {
     pub campaign: Option<String>,
 }
 
+impl Groups {
+    /// These, and where they are silent the other's.
+    pub(super) fn or(&self, other: &Self) -> Self {
+        let first = |a: &Option<String>, b: &Option<String>| a.clone().or_else(|| b.clone());
+        Self {
+            model: first(&self.model, &other.model),
+            plant: first(&self.plant, &other.plant),
+            campaign: first(&self.campaign, &other.campaign),
+        }
+    }
+}
+
 /// Robots: exactly one of `folders`, `list` and `recording`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -1,6 +1,6 @@
 //! Robots from a list: CSV or Parquet, one row a robot.
 
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::Override;
 use arrow::util::display::array_value_to_string;

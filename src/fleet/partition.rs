@@ -1,7 +1,7 @@
 //! One big recording table, parted by robot into files below the store; a table that was parted before is not parted again.
 
 use super::list::{csv_reader, is_parquet};
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Result};
 use crate::store::{FileHash, Store};
 use arrow::array::{Array, RecordBatch, UInt32Array};

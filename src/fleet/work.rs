@@ -2,7 +2,7 @@
 
 use super::Fleet;
 use super::ledger::{Ending, LATER, Ledger, Made, Record};
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Result};
 use crate::pipeline::{Observer, Plan, RunOptions, Selection, StageReport, Surroundings, run};
 use crate::stage::STAGES;

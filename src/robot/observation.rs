@@ -1,6 +1,6 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
-use crate::robot::measured::{Distances, Named, Turns};
+use crate::robot::measured::{Distance, Distances, Named, Turns};
 use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
@@ -100,6 +100,47 @@ impl Measurements {
     pub fn in_motion(&self, rows: &[usize]) -> bool {
         let moves = |row: &&usize| (0..self.joints).any(|joint| self.velocity(**row, joint) != 0.0);
         self.velocity.is_some() && 10 * rows.iter().filter(moves).count() > rows.len()
+    }
+
+    /// The name of the target that a row measured; empty for the tool point.
+    pub fn target(&self, row: usize) -> &str {
+        self.target.as_ref().map_or("", |target| target.name(row))
+    }
+
+    /// Whether all three axes of a row's point were measured.
+    pub fn whole(&self, row: usize) -> bool {
+        self.sigma[row].iter().all(|sigma| sigma.is_finite())
+    }
+
+    /// How many axes of a row's point were measured.
+    pub fn axes(&self, row: usize) -> usize {
+        self.sigma[row].iter().filter(|sigma| sigma.is_finite()).count()
+    }
+
+    /// Measured - predicted (m); zero along axes that were not measured.
+    pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
+        let residual = self.position[row] - predicted;
+        if self.whole(row) {
+            return residual;
+        }
+        Vector3::from_fn(|axis, _| if self.sigma[row][axis].is_finite() { residual[axis] } else { 0.0 })
+    }
+
+    /// The measured orientation of a row's target and its standard deviation about each axis, rad.
+    pub fn turn(&self, row: usize) -> Option<(&Matrix3<f64>, f64)> {
+        let turn = self.turn.as_ref()?;
+        Some((turn.rotation[row].as_ref()?, turn.sigma[row]))
+    }
+
+    pub fn distance(&self, row: usize) -> Option<Distance<'_>> {
+        let all = self.distance.as_ref()?;
+        let length = all.length[row];
+        length.is_finite().then(|| Distance { anchor: all.anchor.name(row), length, sigma: all.sigma[row] })
+    }
+
+    /// Numbers that a row measured: axes of its point, angles, distance.
+    pub fn values(&self, row: usize) -> usize {
+        self.axes(row) + 3 * usize::from(self.turn(row).is_some()) + usize::from(self.distance(row).is_some())
     }
 
     /// Whether rows `a` and `b` are the same pose under the same payload.

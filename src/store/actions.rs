@@ -3,33 +3,21 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::Store;
 use super::content::TableHash;
 use super::disk::{make_read_only, place, refused, write};
 use super::frame::Frame;
-use super::key::{ActionId, FileHash, StageKey};
+use super::key::{ActionId, StageKey};
 use super::reader;
 use super::seal::{seal, unseal};
+use super::table_ref::{TableRef, same_bytes};
 use super::writer::{FinishedFile, TableWriter};
 use crate::error::{Error, Result};
 
 /// Bumped when older records can no longer be understood: all stages run again.
 const RECORD_FORMAT: u32 = 1;
-
-/// A published table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TableRef {
-    /// `name/version`.
-    pub schema: String,
-    /// Identity of the content.
-    pub table_hash: TableHash,
-    /// Name of the object that holds it.
-    pub file_hash: FileHash,
-    pub rows: u64,
-    pub bytes: u64,
-}
 
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -200,10 +188,6 @@ impl Store {
         }
         Ok(table)
     }
-}
-
-pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
-    fs::File::open(path).and_then(FileHash::of_reader).is_ok_and(|found| found == table.file_hash)
 }
 
 fn conflict(standing: &ActionRecord, fresh: &ActionRecord) -> Option<String> {

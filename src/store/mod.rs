@@ -5,6 +5,7 @@
 //! visible by half, and what a power cut tears is told by its hash.
 
 pub mod actions;
+mod bucket;
 pub(crate) mod bytes;
 mod cell;
 mod check;
@@ -23,19 +24,21 @@ mod s3;
 pub mod schema;
 mod seal;
 mod sweep;
+mod table_ref;
 mod tags;
 mod verify;
 mod view;
 mod workspace;
 pub mod writer;
 
-pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
+pub use actions::{Account, ActionRecord, Lookup, Product, Published};
+pub use bucket::Bucket;
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
 pub use reader::read_table;
-pub use remote::Bucket;
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
+pub use table_ref::TableRef;
 pub use verify::Verification;
 pub use writer::{FinishedFile, TableWriter};
 

@@ -5,12 +5,12 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::fs::{self, File};
 use std::path::Path;
 
-use super::actions::TableRef;
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
 use super::key::FileHash;
 use super::migrate::{self, Columns, MIGRATIONS};
 use super::schema::{self, Version};
+use super::table_ref::TableRef;
 use crate::error::{Error, Fault, Result};
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.

@@ -14,13 +14,13 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::actions::TableRef;
 use super::check;
 use super::content::ContentHasher;
 use super::disk::refused;
 use super::frame::Frame;
 use super::key::FileHash;
 use super::schema::TableSchema;
+use super::table_ref::TableRef;
 use super::workspace::Workspace;
 use crate::error::{Error, Result};
 

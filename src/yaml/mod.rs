@@ -3,12 +3,13 @@
 //! The only file that knows the YAML crate. Booleans are `true` and `false` alone; a key given twice is a fault.
 
 mod node;
+mod path;
 mod trouble;
 mod typed;
 
 pub use node::{Mark, Node, Value};
+pub(crate) use path::join;
 pub use trouble::Trouble;
-pub(crate) use trouble::join;
 pub use typed::typed;
 
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};

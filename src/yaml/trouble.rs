@@ -1,6 +1,7 @@
 //! One fault of a YAML value: path, place and message; built from the inside out while serde unwinds.
 
 use super::Mark;
+use super::path::join;
 use crate::error::{Fault, nearest};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;
@@ -57,15 +58,6 @@ impl Trouble {
             Some(Mark::Unknown) | None => file.into(),
         };
         Fault::new(if self.path.is_empty() { place } else { format!("{place}: {}", self.path) }, self.message)
-    }
-}
-
-/// `stages[2]` + `with.every` -> `stages[2].with.every`.
-pub(crate) fn join(path: &str, rest: &str) -> String {
-    match (path.is_empty(), rest.is_empty() || rest.starts_with('[')) {
-        (true, _) => rest.into(),
-        (false, true) => format!("{path}{rest}"),
-        (false, false) => format!("{path}.{rest}"),
     }
 }
 
