@@ -14,7 +14,6 @@ mod disk;
 mod durable;
 pub mod frame;
 pub mod key;
-mod migrate;
 mod notes;
 mod reader;
 mod remote;

@@ -1,17 +1,21 @@
 //! Parquet files back to frames: the file's hash first, then schema and version, then the columns.
 
+use arrow::array::ArrayRef;
 use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::Path;
 
 use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
 use super::key::FileHash;
-use super::migrate::{self, Columns, MIGRATIONS};
 use super::schema::{self, Version};
 use super::table_ref::TableRef;
 use crate::error::{Error, Fault, Result};
+
+/// The columns of a table, by name.
+type Columns = BTreeMap<String, ArrayRef>;
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
@@ -38,7 +42,6 @@ fn known_schema<'a>(path: &Path, id: &'a str) -> Result<(&'a str, Version)> {
     let known = schema::all().find(|schema| schema.name == kind).map(|schema| schema.version);
     match known {
         Some(known) if known.major == version.major && version.minor <= known.minor => Ok((kind, version)),
-        Some(known) if migrate::reaches(MIGRATIONS, kind, version.major, known.major) => Ok((kind, version)),
         Some(known) => Err(Error::store(
             place,
             format!("the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"),
@@ -60,13 +63,6 @@ fn read(path: &Path, kind: &str, version: Version) -> Result<Frame> {
     let batch = concat_batches(&arrow_schema, &batches).map_err(|e| unreadable(&e))?;
     let names = arrow_schema.fields().iter().map(|field| field.name().clone());
     let columns: Columns = names.zip(batch.columns().iter().cloned()).collect();
-    let known = schema::of(kind)?.version;
-    let (columns, version) = if version.major < known.major {
-        let columns = migrate::climb(MIGRATIONS, kind, version.major, known.major, columns);
-        (columns.map_err(|why| Error::store(path.display().to_string(), why))?, Version { minor: 0, patch: 0, ..known })
-    } else {
-        (columns, version)
-    };
     let mut frame = FrameBuilder::new(kind);
     let added = added_since(kind, version, &columns, batch.num_rows())?;
     for (name, column) in columns.into_iter().chain(added) {
