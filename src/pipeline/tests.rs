@@ -1,5 +1,7 @@
 //! The engine with small stages of its own: caching, reasons, wiring, panics.
 
+#![expect(clippy::disallowed_methods, reason = "a test is its own cli: it hands the clock down")]
+
 use super::*;
 use crate::error::{Error, Fault, Result};
 use crate::stage::{Context, Labelled, RawFile, Stage, StageEntry, reads, writes};
