@@ -1,7 +1,17 @@
 //! Integration tests, one module a capability.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "tests read the environment and the clock, and say what they skipped"
+)]
+
+#[cfg(target_os = "linux")]
+mod alone;
 mod arms;
 mod bucket;
+mod circles;
 mod cmd;
 mod compensate;
 mod conceal;
@@ -15,6 +25,7 @@ mod fixture;
 mod fleet;
 mod folds;
 mod gauges;
+mod held;
 mod identify;
 mod ingest;
 mod init;
@@ -35,6 +46,7 @@ mod robot;
 mod robot_faults;
 mod schema;
 mod screen;
+mod source;
 mod split;
 mod sr210d;
 mod store;
