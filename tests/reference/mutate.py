@@ -57,7 +57,7 @@ class Bench:
         self.urdfs = {name: text.encode() for name, text in bases.urdfs().items()}
         for name in self.urdfs:
             (self.folder / f"u_{name}.yaml").write_text(
-                "calib_robot: 1\nname: u\nkinematics: {urdf: {base: world_base, tip: tool0}}\n")
+                "calib_robot: 1\nname: u\nunits: {length: m, angle: rad}\nkinematics: {urdf: {base: world_base, tip: tool0}}\n")
             (self.folder / f"p_{name}.yaml").write_text(
                 f"calib: 1\nname: u\nstages:\n  - uses: robot\n    with: {{file: u_{name}.yaml, urdf: m.urdf}}\n")
         self.files = sorted(os.listdir(self.folder))
