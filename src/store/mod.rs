@@ -15,6 +15,7 @@ pub mod frame;
 pub mod key;
 mod migrate;
 mod notes;
+pub mod raw;
 mod reader;
 mod remote;
 pub mod runs;

@@ -119,7 +119,7 @@ fn units_are_stated_and_known() {
     assert_eq!(
         calib(&format!("{}joints: [{{limits: [-185, 185]}}, ]\n", GOOD.replace("deg", "rad"))),
         "robot.yaml:8:9: joints: 1 entries for 2 joints; expected one per joint\n\
-         robot.yaml:8:19: joints[0].limits: [-185, 185] rad is more than ten turns; is it in another unit?"
+         robot.yaml:8:19: joints[0].limits: -185 rad is more than 63 rad, ten turns; is it in another unit?"
     );
 }
 

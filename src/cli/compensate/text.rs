@@ -4,8 +4,9 @@ use super::columns::{Columns, Role, Units};
 use super::correct::{Answer, Corrector, Target};
 use super::decimal;
 use crate::error::{Error, Fault, Result};
+use crate::robot::Bound;
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -349,6 +350,12 @@ impl Row {
     }
 
     pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<Target, String> {
+        let joints = self.target.q.iter().flatten().zip(&columns.joints);
+        let joints = joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
+        let others = self.point.iter().map(|x| (Bound::Length, *x)).chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
+        if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
+            return Err(message);
+        }
         // Where joints are the targets, what else stands there is not the tool's place in the base frame, e.g. measured points.
         if columns.point && (cartesian || columns.joints.is_empty()) {
             self.target.point = Some(Vector3::from(self.point));
