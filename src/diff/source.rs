@@ -56,7 +56,8 @@ impl Source {
         let file = raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
         // Arrow's own types (dictionaries, views) are left aside, so that every writer's text is plain text.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let metadata = raw::decoded(|| ArrowReaderMetadata::load(&file, options)).map_err(|e| unreadable(ParquetError::General(e)))?;
+        let metadata =
+            raw::decoded(|| ArrowReaderMetadata::load(&file, options)).map_err(|e| unreadable(ParquetError::General(e)))?;
         let metadata = metadata.map_err(unreadable)?;
         let footer = metadata.metadata().file_metadata();
         let rows = usize::try_from(footer.num_rows()).unwrap_or(0);

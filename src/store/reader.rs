@@ -87,6 +87,8 @@ pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Frame> {
     };
     read(path, kind, version).map_err(|error| match error {
         Error::Bug(message) => Error::data(&place, message),
+        // It is no object of a store, which a later try could mend.
+        Error::Store(fault) => Error::Data(vec![fault]),
         Error::Data(faults) => {
             Error::Data(faults.into_iter().map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message)).collect())
         }

@@ -25,7 +25,8 @@ pub(super) fn csv(answer: &Answer) -> Result<String> {
 
 /// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
 fn inert(text: Cow<str>) -> String {
-    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { format!("'{text}") } else { text.into_owned() }
+    let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    if runs { format!("'{text}") } else { text.into_owned() }
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.
