@@ -3,8 +3,8 @@
 use super::emit;
 use crate::error::Result;
 use crate::pipeline::{Override, Plan};
+use crate::raw;
 use crate::stage::STAGES;
-use crate::store::raw;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

@@ -11,7 +11,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::store::raw;
+use crate::raw;
 use crate::store::schema::{self, TableSchema, Version};
 
 /// Rows that are decoded at a time.

@@ -1,7 +1,7 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
 
 use crate::error::{Error, Fault, Result};
-use crate::store::raw;
+use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;

@@ -3,7 +3,7 @@
 use super::roster::Robot;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::Override;
-use crate::store::raw;
+use crate::raw;
 use arrow::util::display::array_value_to_string;
 use std::fs::File;
 use std::path::Path;

@@ -3,7 +3,8 @@
 use super::list::{csv_reader, is_parquet};
 use super::roster::Robot;
 use crate::error::{Error, Result};
-use crate::store::{FileHash, Store, raw};
+use crate::raw;
+use crate::store::{FileHash, Store};
 use arrow::array::{Array, RecordBatch, UInt32Array};
 use arrow::compute::{concat_batches, take_record_batch};
 use arrow::util::display::array_value_to_string;

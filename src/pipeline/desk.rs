@@ -3,9 +3,10 @@
 use super::plan::{Plan, PlannedStage};
 use super::services::label;
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::Arity;
 use crate::store::schema;
-use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef, raw};
+use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

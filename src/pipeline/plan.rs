@@ -6,8 +6,8 @@ pub use super::wiring::{Input, Origin};
 use super::overrides::Override;
 use super::{spec, wiring};
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::stage::{ErasedStage, Port, StageEntry};
-use crate::store::raw;
 use std::path::{Path, PathBuf};
 
 /// A pipeline that can be run.

@@ -1,9 +1,10 @@
 //! What the engine does for a running stage: files, sinks, progress and lines that are kept.
 
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::{RawFile, Services, Sink, Source, Streamed};
 use crate::store::frame::Frame;
-use crate::store::{FinishedFile, Store, TableWriter, raw};
+use crate::store::{FinishedFile, Store, TableWriter};
 use std::sync::{Mutex, PoisonError};
 
 /// Whoever watches a run: a terminal, a log, nobody.

@@ -3,8 +3,8 @@
 use bytes::Bytes;
 
 use super::frame::{Frame, FrameBuilder};
-use super::raw;
 use crate::error::{Error, Result};
+use crate::raw;
 
 /// Rows read at a time.
 const BATCH: usize = 1 << 16;

@@ -15,7 +15,6 @@ pub mod frame;
 pub mod key;
 mod migrate;
 mod notes;
-pub mod raw;
 mod reader;
 mod remote;
 pub mod runs;

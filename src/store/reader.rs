@@ -9,9 +9,9 @@ use super::disk::refused;
 use super::frame::{Frame, FrameBuilder};
 use super::key::FileHash;
 use super::migrate::{self, Columns, MIGRATIONS};
-use super::raw;
 use super::schema::{self, Version};
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {

@@ -3,7 +3,7 @@
 use super::names::{Name, joints, point};
 use super::quoted;
 use crate::error::{Error, Result};
-use crate::store::raw;
+use crate::raw;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 

@@ -1,11 +1,11 @@
 //! Ranges on the command line, the robot file, and recordings to compare with.
 
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements};
 use crate::store::frame::FrameBuilder;
-use crate::store::raw;
 use crate::table::{Recording, Table};
 use nalgebra::Vector3;
 use std::path::Path;

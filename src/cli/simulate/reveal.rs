@@ -3,7 +3,7 @@
 use super::super::{emit, emit_json};
 use super::seal::{SEALED, Seal};
 use crate::error::{Error, Result};
-use crate::store::raw;
+use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
 use crate::twin::reveal::mark::{Case, mark};

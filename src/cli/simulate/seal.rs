@@ -1,7 +1,7 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
 use crate::error::{Error, Fault, Result};
-use crate::store::raw;
+use crate::raw;
 use crate::twin::conceal::design::Design;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

@@ -4,7 +4,7 @@
 
 use super::lines::{Record, failed};
 use crate::error::{Error, Result};
-use crate::store::raw::{self, ParquetFile};
+use crate::raw::{self, ParquetFile};
 use arrow::array::RecordBatch;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 use std::fmt::{Display, Write};
