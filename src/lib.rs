@@ -9,6 +9,7 @@
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
@@ -17,13 +18,13 @@
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
-//! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
-//! | [`diff`] | two tables or two runs compared | store |
+//! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
+//! | [`diff`] | two tables or two runs compared | raw, store |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
-//! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
-//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
+//! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
+//! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
@@ -49,6 +50,8 @@
 pub mod error;
 pub mod statistics;
 pub mod units;
+
+pub mod raw;
 pub mod yaml;
 
 pub mod spatial;

@@ -3,6 +3,7 @@
 use super::emit;
 use crate::error::Result;
 use crate::pipeline::{Override, Plan};
+use crate::raw;
 use crate::stage::STAGES;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
 
 /// A warning where lines are left that `calib init` marked for the user to fill in.
 fn marked(path: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = raw::text(path).ok()?;
     let lines = text.lines().filter(|line| line.split_once('#').is_some_and(|(_, comment)| comment.contains("REPLACE"))).count();
     let line = if lines == 1 { "a line is" } else { "lines are" };
     let path = path.display();

@@ -10,6 +10,7 @@ mod text;
 use super::identified::{Identified, ModelArguments};
 use crate::compensate::Arm;
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::robot::RobotModel;
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
@@ -189,7 +190,7 @@ fn language(targets: &Path) -> Option<Language> {
 /// A controller's program, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
     let program =
-        std::fs::read(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
+        raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let robot = RobotModel::new(layout.robot.clone());
     let (text, warnings) = program::corrected(layout.place, &program, language, &robot, corrector)?;
     let warnings: String = warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
@@ -238,7 +239,7 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
 
 fn convert(targets: &Path, output: impl Write + Send, columnar: bool, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
     let open =
-        || File::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
+        || raw::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
     let mut output = BufWriter::new(output);
     if columnar {
         return parquet::stream(open()?, &mut output, layout, corrector);

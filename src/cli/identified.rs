@@ -7,6 +7,7 @@ use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::pipeline::Selection;
+use crate::raw;
 use crate::robot::description::RobotDescription;
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements, RobotModel};
@@ -15,10 +16,8 @@ use crate::store::frame::FrameBuilder;
 use crate::store::{Store, TableRef};
 use crate::table::{Network, Parameters, Recording, Robot, Table, standing};
 use clap::Args;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Deserialize;
 use std::ffi::OsString;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// Where the model comes from.
@@ -40,6 +39,9 @@ pub(super) struct ModelArguments {
     #[arg(long, short)]
     pub quiet: bool,
 }
+
+/// Rows read at a time.
+const BATCH: usize = 1 << 16;
 
 /// What was identified, and from what.
 pub(super) struct Identified {
@@ -225,7 +227,7 @@ pub(super) fn read_robot(path: &Path) -> Result<RobotDescription> {
         return read_table::<Robot>(path)?.to_description();
     }
     let label = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
     let file = Text { label: &label, text: &text };
     Ok(if ending == "json" { read_case(file)?.robot } else { read_calib(file, None)?.robot })
 }
@@ -234,14 +236,10 @@ pub(super) fn read_robot(path: &Path) -> Result<RobotDescription> {
 fn read_table<T: Table>(path: &Path) -> Result<T> {
     let label = path.display().to_string();
     let fault = |message: String| Error::Data(vec![Fault::new(&label, format!("not a table `{}` of calib: {message}", T::KIND))]);
-    let file = File::open(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| fault(error.to_string()))?;
-    let schema = builder.schema().clone();
-    let reader = builder.build().map_err(|error| fault(error.to_string()))?;
-    let batches = reader.collect::<std::result::Result<Vec<_>, _>>().map_err(|error| fault(error.to_string()))?;
-    let batch = arrow::compute::concat_batches(&schema, &batches).map_err(|error| fault(error.to_string()))?;
+    let file = raw::open(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let batch = raw::parquet(file, BATCH).and_then(raw::ParquetFile::whole).map_err(fault)?;
     let mut frame = FrameBuilder::new(T::KIND);
-    for (field, column) in schema.fields().iter().zip(batch.columns()) {
+    for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
         frame.push(field.name(), column.clone());
     }
     let named = |error: Error| match error {

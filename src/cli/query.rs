@@ -62,12 +62,7 @@ pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
     if !sql.is_empty() && !sql.contains(char::is_whitespace) && !arguments.csv {
         return list::tell(&store, &[tables.find(sql)?], arguments.json);
     }
-    // Where polars gives up in the middle, the error that follows says enough.
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(|_| ()));
-    let answer = query(&store, &tables, sql);
-    std::panic::set_hook(hook);
-    let answer = answer?;
+    let answer = query(&store, &tables, sql)?;
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&lines::csv(&answer)?),
         (_, true) => emit(&lines::json(&answer)?),

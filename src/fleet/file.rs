@@ -1,6 +1,7 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
 
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -160,7 +161,7 @@ impl FleetFile {
     /// Reads the file; fails with every fault at once.
     pub fn load(path: &Path) -> Result<(Self, Node)> {
         let label = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
+        let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
         let Some(tree) = tree else { return Err(faulty(&label, troubles)) };
         match typed::<Self>(&tree) {
@@ -216,7 +217,7 @@ impl FleetFile {
 
 /// The text of the pipeline, or the place in FLEET.yaml that names it.
 pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result<String> {
-    std::fs::read_to_string(pipeline).map_err(|error| {
+    raw::text(pipeline).map_err(|error| {
         let message = format!("`{}`: {} (relative to this file)", pipeline.display(), unreadable(&error));
         let trouble = Trouble::new(message).at(tree.nearest_mark("pipeline")).below("pipeline");
         Error::Spec(vec![trouble.fault(&path.display().to_string())])

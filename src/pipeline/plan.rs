@@ -6,6 +6,7 @@ pub use super::wiring::{Input, Origin};
 use super::overrides::Override;
 use super::{spec, wiring};
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::stage::{ErasedStage, Port, StageEntry};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +37,7 @@ impl Plan {
     /// Reads a pipeline; fails with every fault at once.
     pub fn load(file: &Path, overrides: &[Override], stages: &'static [StageEntry]) -> Result<Self> {
         let label = file.display().to_string();
-        let text = std::fs::read(file).map_err(|error| {
+        let text = raw::bytes(file).map_err(|error| {
             Error::spec(
                 &label,
                 if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() },

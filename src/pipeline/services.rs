@@ -1,10 +1,10 @@
 //! What the engine does for a running stage: files, sinks, progress and lines that are kept.
 
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::{RawFile, Services, Sink, Source, Streamed};
 use crate::store::frame::Frame;
 use crate::store::{FinishedFile, Store, TableWriter};
-use std::fs::File;
 use std::sync::{Mutex, PoisonError};
 
 /// Whoever watches a run: a terminal, a log, nobody.
@@ -52,7 +52,7 @@ impl Services for StageServices<'_> {
             return Err(Error::Bug(message));
         }
         let shown = file.0.display().to_string();
-        let opened = File::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
+        let opened = raw::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
         let size = opened.metadata().ok().map(|metadata| metadata.len());
         Ok(Source { label: label(&file.0), reader: Box::new(opened), size })
     }

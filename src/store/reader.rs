@@ -1,7 +1,6 @@
 //! Parquet files back to frames: the file's hash first, then schema and version, then the columns.
 
 use arrow::array::ArrayRef;
-use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -13,6 +12,7 @@ use super::key::FileHash;
 use super::schema::{self, Version};
 use super::table_ref::TableRef;
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 
 /// The columns of a table, by name.
 type Columns = BTreeMap<String, ArrayRef>;
@@ -56,12 +56,8 @@ fn read(path: &Path, kind: &str, version: Version) -> Result<Frame> {
     let unreadable =
         |e: &dyn std::fmt::Display| Error::store(path.display().to_string(), format!("not a readable Parquet file: {e}"));
     let file = File::open(path).map_err(|e| refused(path, "read", &e))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
-    let arrow_schema = builder.schema().clone();
-    let reader = builder.with_batch_size(1 << 16).build().map_err(|e| unreadable(&e))?;
-    let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|e| unreadable(&e))?;
-    let batch = concat_batches(&arrow_schema, &batches).map_err(|e| unreadable(&e))?;
-    let names = arrow_schema.fields().iter().map(|field| field.name().clone());
+    let batch = raw::parquet(file, 1 << 16).and_then(raw::ParquetFile::whole).map_err(|e| unreadable(&e))?;
+    let names = batch.schema_ref().fields().iter().map(|field| field.name().clone());
     let columns: Columns = names.zip(batch.columns().iter().cloned()).collect();
     let mut frame = FrameBuilder::new(kind);
     let added = added_since(kind, version, &columns, batch.num_rows())?;
@@ -75,8 +71,9 @@ fn read(path: &Path, kind: &str, version: Version) -> Result<Frame> {
 pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Frame> {
     let place = path.display().to_string();
     let unreadable = |e: &dyn std::fmt::Display| Error::data(&place, format!("not a readable Parquet file: {e}"));
-    let file = File::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
+    let file = raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+    let builder = raw::decoded(|| ParquetRecordBatchReaderBuilder::try_new(file)).map_err(|e| unreadable(&e))?;
+    let builder = builder.map_err(|e| unreadable(&e))?;
     let said = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
     let id = said.filter(|pair| pair.key == "calib.schema").find_map(|pair| pair.value.clone());
     let (kind, version) = match (kind, &id) {
@@ -86,6 +83,8 @@ pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Frame> {
     };
     read(path, kind, version).map_err(|error| match error {
         Error::Bug(message) => Error::data(&place, message),
+        // It is no object of a store, which a later try could mend.
+        Error::Store(fault) => Error::Data(vec![fault]),
         Error::Data(faults) => {
             Error::Data(faults.into_iter().map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message)).collect())
         }

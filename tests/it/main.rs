@@ -37,6 +37,7 @@ mod parameter_sets;
 mod pipelines;
 mod poses;
 mod query;
+mod raw;
 mod readme;
 mod remedies;
 mod repeats;

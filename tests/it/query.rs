@@ -205,6 +205,30 @@ fn what_is_not_there_is_named_with_what_is() {
 }
 
 #[test]
+fn a_product_of_tables_that_no_memory_holds_is_refused_before_it_is_made() {
+    for sql in [
+        "SELECT count(*) FROM recording a CROSS JOIN recording b CROSS JOIN recording c CROSS JOIN recording d CROSS JOIN recording e",
+        "WITH p AS (SELECT a.sequence FROM recording a CROSS JOIN recording b) SELECT * FROM p x CROSS JOIN p y CROSS JOIN p z",
+        "SELECT a.sequence FROM recording a, recording b, (SELECT x.sequence FROM recording x, recording y) c, recording d",
+    ] {
+        let told = refused(sql);
+        assert!(
+            told.contains("every row of one table with every row of the other gives") && told.contains("USING"),
+            "{sql}: {told}"
+        );
+    }
+    // 80 rows twice are no harm.
+    assert_eq!(rows("SELECT a.sequence FROM recording a CROSS JOIN recording b").len(), 6400);
+}
+
+#[test]
+fn a_text_that_a_spreadsheet_would_run_is_only_a_text_in_csv() {
+    let sql = "SELECT '=1+1' AS a, '@x' AS b, '-2.5' AS c, '+x' AS d, sequence AS \"=e\" FROM recording LIMIT 1";
+    assert_eq!(ask(&[sql, "--csv"]), "a,b,c,d,'=e\n'=1+1,'@x,-2.5,'+x,0\n");
+    assert_eq!(rows(sql)[0]["a"], "=1+1");
+}
+
+#[test]
 fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
     let before = objects(STORE.path());
     for sql in [

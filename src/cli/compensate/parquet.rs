@@ -4,13 +4,13 @@ use super::columns::{Columns, Role};
 use super::correct::{Answer, Corrector, Target};
 use super::text::{Layout, Row};
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::robot::description::JointKind;
 use crate::units::Unit;
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
@@ -20,17 +20,16 @@ const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
 pub(super) fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
-    let fault = |error: &dyn std::fmt::Display| Error::data(layout.place, format!("not a readable Parquet file: {error}"));
-    let builder = ParquetRecordBatchReaderBuilder::try_new(input).map_err(|error| fault(&error))?;
-    let schema = builder.schema().clone();
+    let fault = |message: String| Error::data(layout.place, format!("not a readable Parquet file: {message}"));
+    let reader = raw::parquet(input, BATCH).map_err(fault)?;
+    let schema = reader.schema.clone();
     let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
     let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
-    let reader = builder.with_batch_size(BATCH).build().map_err(|error| fault(&error))?;
     let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
     let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
     let mut rows = 0;
     for batch in reader {
-        let batch = batch.map_err(|error| fault(&error))?;
+        let batch = batch.map_err(fault)?;
         let targets = targets(&batch, &columns, layout, rows)?;
         let answers = corrector.batch(targets);
         let columns = answered(&batch, &columns, layout, &answers);

@@ -4,12 +4,13 @@ use super::columns::{Columns, Role, Units};
 use super::correct::{Answer, Corrector, Target};
 use super::decimal;
 use crate::error::{Error, Fault, Result};
+use crate::robot::Bound;
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::io::{BufRead, Write};
+use std::io::{BufRead, Read, Write};
 use std::ops::Range;
 
 /// Rows held in memory at a time.
@@ -20,6 +21,9 @@ const CHUNK: usize = 256;
 
 /// Faults told of one file.
 const FAULTS: usize = 20;
+
+/// Bytes of a line; a device that never ends a line must not fill the memory.
+const LONGEST: u64 = 16 << 20;
 
 /// Decimals of an angle in deg and of a length in mm: 1e-7 deg is 0.004 um at 2.5 m.
 const DECIMALS: usize = 7;
@@ -113,10 +117,7 @@ impl Block {
         self.ends.clear();
         place.clone_into(&mut self.place);
         while self.ends.len() < BATCH {
-            let read = input
-                .read_until(b'\n', &mut self.bytes)
-                .map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
-            if read == 0 {
+            if read_line(input, &mut self.bytes, place)? == 0 {
                 break;
             }
             self.ends.push(self.bytes.len());
@@ -144,10 +145,19 @@ fn put(output: &mut dyn Write, text: &str) -> Result<bool> {
     }
 }
 
+/// Appends the next line; gives its bytes, 0 at the end of the input.
+fn read_line(input: &mut dyn BufRead, bytes: &mut Vec<u8>, place: &str) -> Result<usize> {
+    let read = input.take(LONGEST).read_until(b'\n', bytes);
+    let read = read.map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
+    if read as u64 == LONGEST {
+        return Err(Error::data(place, format!("has a line of more than {} MB; expected a table of targets", LONGEST >> 20)));
+    }
+    Ok(read)
+}
+
 fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
     let mut bytes = Vec::new();
-    let read = input.read_until(b'\n', &mut bytes).map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
-    if read == 0 {
+    if read_line(input, &mut bytes, place)? == 0 {
         return Ok(None);
     }
     String::from_utf8(bytes).map(Some).map_err(|_| Error::data(place, "is no text in UTF-8"))
@@ -349,6 +359,13 @@ impl Row {
     }
 
     pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<Target, String> {
+        let joints = self.target.q.iter().flatten().zip(&columns.joints);
+        let joints =
+            joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
+        let others = self.point.iter().map(|x| (Bound::Length, *x)).chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
+        if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
+            return Err(message);
+        }
         // Where joints are the targets, what else stands there is not the tool's place in the base frame, e.g. measured points.
         if columns.point && (cartesian || columns.joints.is_empty()) {
             self.target.point = Some(Vector3::from(self.point));

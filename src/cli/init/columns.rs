@@ -3,7 +3,7 @@
 use super::names::{Name, joints, point};
 use super::quoted;
 use crate::error::{Error, Result};
-use std::fs::File;
+use crate::raw;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub(super) struct Found {
 impl Found {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
-        let file = File::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+        let file = raw::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
         let mut lines = Vec::new();
         for line in BufReader::new(file.take(LOOKED)).split(b'\n').take(LINES) {
             let line = line.map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;

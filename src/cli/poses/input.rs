@@ -1,15 +1,17 @@
 //! Ranges on the command line, the robot file, and recordings to compare with.
 
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements};
 use crate::store::frame::FrameBuilder;
 use crate::table::{Recording, Table};
 use nalgebra::Vector3;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use std::fs::File;
 use std::path::Path;
+
+/// Rows read at a time.
+const BATCH: usize = 1 << 16;
 
 /// Lower and upper ends; infinite where left empty.
 #[derive(Debug, Clone)]
@@ -33,7 +35,7 @@ pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
 pub(super) fn robot(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> {
     let read = |path: &Path| {
         let label = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+        let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
         Ok((label, text))
     };
     let (label, text) = read(path)?;
@@ -65,14 +67,10 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
 }
 
 fn read(path: &Path) -> Result<Recording, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| error.to_string())?;
-    let schema = builder.schema().clone();
-    let batches =
-        builder.build().and_then(|reader| Ok(reader.collect::<Result<Vec<_>, _>>()?)).map_err(|error| error.to_string())?;
-    let batch = arrow::compute::concat_batches(&schema, &batches).map_err(|error| error.to_string())?;
+    let file = raw::open(path).map_err(|error| error.to_string())?;
+    let batch = raw::parquet(file, BATCH)?.whole()?;
     let mut frame = FrameBuilder::new(Recording::KIND);
-    for (field, column) in schema.fields().iter().zip(batch.columns()) {
+    for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
         frame.push(field.name(), column.clone());
     }
     let named = |error: Error| match error {

@@ -3,6 +3,7 @@
 use super::super::{emit, emit_json};
 use super::seal::{SEALED, Seal};
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
 use crate::twin::reveal::mark::{Case, mark};
@@ -62,7 +63,7 @@ pub(super) fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let text = raw::text(path).map_err(|error| error.to_string())?;
     serde_json::from_str(&text).map_err(|error| error.to_string())
 }
 
