@@ -23,6 +23,7 @@
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
+//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, stage, store, table, numerics |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
@@ -77,6 +78,7 @@ pub mod pipeline;
 
 pub mod audit;
 pub mod fleet;
+pub mod identified;
 
 pub mod progress;
 

@@ -16,7 +16,7 @@ use std::time::Duration;
   calib gc --dry-run
   calib gc --keep-runs 3 --grace-hours 1")]
 pub(super) struct GcArguments {
-    /// Runs of every pipeline whose tables are kept, beside tagged ones
+    /// Complete runs of every pipeline whose tables are kept, and as many others since; tagged ones always are
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     keep_runs: u32,
     /// Leaves what was written within so many hours

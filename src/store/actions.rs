@@ -179,6 +179,11 @@ impl Store {
         reader::load(&self.object(table)?, table)
     }
 
+    /// Whether the file of a published table is there, byte for byte.
+    pub fn is_whole(&self, table: &TableRef) -> Result<bool> {
+        Ok(same_bytes(&self.object(table)?, table))
+    }
+
     fn write_frame(&self, frame: &Frame) -> Result<FinishedFile> {
         let mut writer = TableWriter::new(frame.schema(), self.workspace()?);
         writer.push(frame)?;

@@ -5,10 +5,10 @@
 //! visible by half, and what a power cut tears is told by its hash.
 
 pub mod actions;
-pub(crate) mod bytes;
 mod cell;
 mod check;
 pub mod content;
+mod decode;
 mod disk;
 mod durable;
 pub mod frame;
@@ -32,7 +32,8 @@ pub mod writer;
 pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
-pub use reader::read_table;
+pub(crate) use reader::table_of_bytes;
+pub use reader::{Loose, read_table};
 pub use remote::Bucket;
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;

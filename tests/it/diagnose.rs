@@ -308,7 +308,7 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
 /// A table that a run of the pipeline of cases wrote.
 fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
     let path = folder.join(".calib/tables/case").join(name);
-    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table")
+    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table").table
 }
 
 /// What is left, squared and over the noise, of points that `truth` makes where `other` is fitted to them in all that is `free`.

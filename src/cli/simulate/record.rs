@@ -4,7 +4,7 @@ use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
 use super::conceal::vacant;
 use crate::error::{Error, Result};
-use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::stage::{STAGES, Simulate, Stage};
 use crate::store::Store;
@@ -60,7 +60,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let store = open_store(arguments.store.as_deref())?;
     let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-    let options = RunOptions { selection: Selection::default(), jobs: cores() };
+    let options = RunOptions { selection: Selection::default(), jobs: cores(), purpose: Purpose::Simulate };
     let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
     progress.finish();
     let outcome = result?;

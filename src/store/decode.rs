@@ -1,0 +1,86 @@
+//! A table's Parquet file decoded: what it says of itself, its columns, and the hash of what they hold.
+
+use arrow::array::RecordBatch;
+use arrow::compute::concat_batches;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::reader::ChunkReader;
+use std::collections::BTreeMap;
+
+use super::content::{TableHash, hash_of_columns};
+use super::frame::{Frame, FrameBuilder};
+use super::migrate::{self, Columns, MIGRATIONS};
+use super::schema::{self, Version};
+use crate::error::{Error, Result};
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 1 << 16;
+
+pub(super) struct Decoded {
+    said: BTreeMap<String, String>,
+    batch: RecordBatch,
+}
+
+impl Decoded {
+    /// Decodes a whole file, or says why that cannot be.
+    pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        let text = |error: &dyn std::fmt::Display| error.to_string();
+        let builder = ParquetRecordBatchReaderBuilder::try_new(source).map_err(|error| text(&error))?;
+        let pairs = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+        let said = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+        let schema = builder.schema().clone();
+        let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(|error| text(&error))?;
+        let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| text(&error))?;
+        let batch = concat_batches(&schema, &batches).map_err(|error| text(&error))?;
+        Ok(Self { said, batch })
+    }
+
+    /// The file's own key-value metadata.
+    pub fn said(&self, key: &str) -> Option<&str> {
+        self.said.get(key).map(String::as_str)
+    }
+
+    pub fn rows(&self) -> u64 {
+        self.batch.num_rows() as u64
+    }
+
+    /// The hash of the columns as the file has them, whichever minor version wrote them.
+    pub fn table_hash(&self, kind: &str, version: Version) -> Option<TableHash> {
+        hash_of_columns(kind, version.major, &self.batch)
+    }
+
+    /// The columns of an older or the newest version, checked against the newest.
+    pub fn frame(self, kind: &str, version: Version, place: &str) -> Result<Frame> {
+        let names = self.batch.schema_ref().fields().iter().map(|field| field.name().clone());
+        let pairs: Vec<_> = names.zip(self.batch.columns().iter().cloned()).collect();
+        if let Some(twice) = pairs.iter().enumerate().find(|(at, (name, _))| pairs[..*at].iter().any(|(other, _)| other == name)) {
+            return Err(Error::Bug(format!("table {kind}: column {} twice", twice.1.0)));
+        }
+        let columns: Columns = pairs.into_iter().collect();
+        let known = schema::of(kind)?.version;
+        let (columns, version) = if version.major < known.major {
+            let columns = migrate::climb(MIGRATIONS, kind, version.major, known.major, columns);
+            (columns.map_err(|why| Error::store(place, why))?, Version { minor: 0, patch: 0, ..known })
+        } else {
+            (columns, version)
+        };
+        let mut frame = FrameBuilder::new(kind);
+        let added = added_since(kind, version, &columns, self.batch.num_rows())?;
+        for (name, column) in columns.into_iter().chain(added) {
+            frame.push(name, column);
+        }
+        frame.finish()
+    }
+}
+
+/// Nullable columns that a later minor version has, as nulls.
+fn added_since(kind: &str, version: Version, columns: &Columns, rows: usize) -> Result<Columns> {
+    let schema = schema::of(kind)?;
+    if version.minor == schema.version.minor {
+        return Ok(Columns::new());
+    }
+    let added = schema
+        .fields
+        .iter()
+        .filter(|field| field.nullable && !field.optional && !field.per_joint && !columns.contains_key(&field.name));
+    Ok(added.map(|field| (field.name.clone(), arrow::array::new_null_array(&field.column_type.arrow(), rows))).collect())
+}
