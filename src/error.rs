@@ -94,7 +94,8 @@ mod tests {
 
     #[test]
     fn one_of_a_thing_is_named_as_one() {
-        let said = [(1, "row"), (2, "row"), (0, "fault"), (1, "copy"), (3, "copy"), (2, "key"), (2, "class"), (5, "action record")];
+        let said =
+            [(1, "row"), (2, "row"), (0, "fault"), (1, "copy"), (3, "copy"), (2, "key"), (2, "class"), (5, "action record")];
         let said = said.map(|(count, noun)| counted(count, noun));
         assert_eq!(said, ["1 row", "2 rows", "0 faults", "1 copy", "3 copies", "2 keys", "2 classes", "5 action records"]);
     }

@@ -46,9 +46,7 @@ pub fn stage_of(plan: &Plan, step: Option<&str>) -> Result<usize> {
     let diagnosed = stages.iter().rfind(|stage| stage.entry.name == Diagnose::NAME && step.is_none());
     let stands = diagnosed.and_then(|stage| standing(own(), &stage.id));
     let last = steps().rfind(|at| stands.is_none_or(|id| stages[*at].id == id));
-    last.ok_or_else(|| {
-        Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split")
-    })
+    last.ok_or_else(|| Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"))
 }
 
 impl Identified {
@@ -165,7 +163,9 @@ impl Files {
         let place = path.display().to_string();
         match (loose.vouched, self.unchecked) {
             (true, _) => {}
-            (false, true) => warnings.push(format!("{place} carries no content hash: whether its numbers were changed cannot be told")),
+            (false, true) => {
+                warnings.push(format!("{place} carries no content hash: whether its numbers were changed cannot be told"))
+            }
             (false, false) => {
                 let message = "carries no content hash, as a file has that another program wrote: whether its numbers were changed since they were \
                                identified cannot be told, and they move a robot. Take the file that calib wrote (`tables/` in the store), or say \

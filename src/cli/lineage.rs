@@ -4,7 +4,7 @@ use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::{Node, lineage};
 use crate::diff::table_hash;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::Store;
 use clap::Args;
@@ -65,7 +65,7 @@ fn lines(node: &Node, port: &str, depth: usize, text: &mut String) {
         text.push_str(&format!("{indent}{port}{hash}: the store has no record of who made it\n"));
         return;
     };
-    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {} rows", made.stage, made.port, made.rows));
+    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {}", made.stage, made.port, counted(made.rows, "row")));
     if made.told_before {
         text.push_str("  (as above)\n");
         return;

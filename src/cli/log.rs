@@ -3,7 +3,7 @@
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::error::Result;
-use crate::pipeline::{Manifest, RunStatus, StageStatus};
+use crate::pipeline::{Manifest, RunStatus, StageStatus, find_run};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -36,6 +36,8 @@ pub(super) struct LogArguments {
 pub(super) fn main(arguments: &LogArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let tags = store.tags()?;
+    // Where there is none, or a manifest is damaged, the list says so in its lines.
+    let head = find_run(&store, "HEAD").ok();
     let (mut text, mut rows, mut shown) = (String::new(), Vec::new(), 0);
     for run in store.runs()?.into_iter().rev() {
         if arguments.limit > 0 && shown == arguments.limit {
@@ -43,14 +45,16 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
             break;
         }
         let own: Vec<&str> = tags.iter().filter(|(_, tagged)| **tagged == run).map(|(tag, _)| tag.as_str()).collect();
+        let is_head = head.as_ref() == Some(&run);
         match Manifest::of(&store, &run) {
             Ok(manifest) if arguments.pipeline.as_ref().is_some_and(|name| name != &manifest.pipeline.name) => continue,
             Ok(manifest) => {
-                text.push_str(&line(&manifest, &own));
+                let names: Vec<&str> = is_head.then_some("HEAD").into_iter().chain(own.iter().copied()).collect();
+                text.push_str(&line(&manifest, &names));
                 rows.push(json!({
                     "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name, "status": manifest.status,
                     "wall_seconds": manifest.wall_seconds, "executed": count(&manifest, StageStatus::Executed),
-                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "error": manifest.error,
+                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "head": is_head, "error": manifest.error,
                 }));
             }
             Err(error) => {

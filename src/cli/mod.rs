@@ -30,7 +30,7 @@ mod tables;
 mod tag;
 mod verify;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
@@ -123,7 +123,9 @@ fn complain(error: &Error) -> u8 {
 /// One fault a line, and how many there are where there are several.
 fn message(error: &Error) -> String {
     match error {
-        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => format!("{error}\nerror: {} faults", faults.len()),
+        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => {
+            format!("{error}\nerror: {}", counted(faults.len(), "fault"))
+        }
         _ => format!("error: {error}"),
     }
 }

@@ -4,8 +4,8 @@ use super::emit;
 use crate::error::{Error, Result, counted, nearest};
 use crate::pipeline;
 use crate::stage::STAGES;
-use crate::store::{Loose, read_table};
 use crate::store::schema::{self, TableSchema};
+use crate::store::{Loose, read_table};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 

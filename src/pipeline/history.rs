@@ -19,7 +19,9 @@ pub fn find_run(store: &Store, text: &str) -> Result<String> {
         let Some(back) = back else { return nothing("expected HEAD or HEAD~N".into()) };
         return match complete(store, &runs, back)? {
             Ok(run) => Ok(run),
-            Err(0) => nothing(format!("the store has no complete run of `calib run`; the last run of all is {newest}, `calib log` tells what it is")),
+            Err(0) => nothing(format!(
+                "the store has no complete run of `calib run`; the last run of all is {newest}, `calib log` tells what it is"
+            )),
             Err(count) => nothing(format!("the store has {} of `calib run`", counted(count, "complete run"))),
         };
     }
@@ -45,7 +47,10 @@ fn complete(store: &Store, runs: &[String], back: usize) -> Result<Result<String
     let mut count = 0;
     for run in runs.iter().rev().filter(|run| store.has_manifest(run)) {
         let manifest = Manifest::of(store, run).map_err(|error| {
-            Error::store(format!("run {run}"), format!("cannot be read, so that HEAD is not known; name a run by its id ({error})"))
+            Error::store(
+                format!("run {run}"),
+                format!("cannot be read, so that HEAD is not known; name a run by its id ({error})"),
+            )
         })?;
         if manifest.is_complete() {
             if count == back {

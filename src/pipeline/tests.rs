@@ -190,7 +190,11 @@ fn forcing_runs_what_is_cached() {
 #[test]
 fn a_selected_stage_needs_its_inputs() {
     let folder = tempfile::tempdir().unwrap();
-    let only = |id: &str| RunOptions { selection: Selection { only: Some(id.into()), ..Default::default() }, jobs: 1, purpose: Purpose::Run };
+    let only = |id: &str| RunOptions {
+        selection: Selection { only: Some(id.into()), ..Default::default() },
+        jobs: 1,
+        purpose: Purpose::Run,
+    };
     let plan = plan(TWO, &[]).unwrap();
     let error = go(folder.path(), &plan, &only("count")).err().unwrap();
     assert!(error.to_string().contains("stage `count` reads from `b`, which is not cached"), "{error}");

@@ -129,7 +129,9 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
     let loose = from_parquet(&source.label, bytes)?;
     if !loose.vouched {
         let label = &source.label;
-        context.services.warn(format!("{label} carries no content hash: whether it was changed since calib wrote it cannot be told"));
+        context
+            .services
+            .warn(format!("{label} carries no content hash: whether it was changed since calib wrote it cannot be told"));
     }
     Ok(loose.table)
 }

@@ -13,7 +13,7 @@ use super::key::{ActionId, FileHash, StageKey};
 use super::reader;
 use super::seal::{seal, unseal};
 use super::writer::{FinishedFile, TableWriter};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 
 /// Bumped when older records can no longer be understood: all stages run again.
 const RECORD_FORMAT: u32 = 1;
@@ -130,7 +130,7 @@ impl Store {
                 Ok(length) if length == table.bytes && same_bytes(&path, table) => (),
                 _ if self.obtain(table, &path)? => (),
                 Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
-                Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
+                Ok(length) => return damaged(format!("table {port} has {} instead of {}", counted(length, "byte"), table.bytes)),
                 Err(e) => return damaged(format!("table {port}: {e}")),
             }
         }

@@ -2,14 +2,18 @@
 
 use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use arrow::datatypes::{Field, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::file::reader::ChunkReader;
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use super::content::{TableHash, hash_of_columns};
 use super::frame::{Frame, FrameBuilder};
 use super::migrate::{self, Columns, MIGRATIONS};
 use super::schema::{self, Version};
+use super::writer::UNITS;
 use crate::error::{Error, Result};
 
 /// Rows that are decoded at a time.
@@ -23,14 +27,29 @@ pub(super) struct Decoded {
 impl Decoded {
     /// Decodes a whole file, or says why that cannot be.
     pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        // The decoder trusts what it reads: of some damaged files it comes to no end but a panic.
+        catch_unwind(AssertUnwindSafe(|| Self::decoded(source))).unwrap_or_else(|_| Err("the decoder gave it up".into()))
+    }
+
+    fn decoded<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         let text = |error: &dyn std::fmt::Display| error.to_string();
-        let builder = ParquetRecordBatchReaderBuilder::try_new(source).map_err(|error| text(&error))?;
+        // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options).map_err(|error| text(&error))?;
         let pairs = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
-        let said = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+        let said: BTreeMap<String, String> = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+        let units: BTreeMap<String, String> =
+            said.get(UNITS).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
         let schema = builder.schema().clone();
         let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(|error| text(&error))?;
         let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| text(&error))?;
         let batch = concat_batches(&schema, &batches).map_err(|error| text(&error))?;
+        let with_unit = |field: &Arc<Field>| {
+            let unit = units.get(field.name()).map(|unit| ("unit".to_string(), unit.clone()));
+            field.as_ref().clone().with_metadata(unit.into_iter().collect())
+        };
+        let schema = Arc::new(Schema::new(schema.fields().iter().map(with_unit).collect::<Vec<_>>()));
+        let batch = RecordBatch::try_new(schema, batch.columns().to_vec()).map_err(|error| text(&error))?;
         Ok(Self { said, batch })
     }
 
@@ -52,7 +71,8 @@ impl Decoded {
     pub fn frame(self, kind: &str, version: Version, place: &str) -> Result<Frame> {
         let names = self.batch.schema_ref().fields().iter().map(|field| field.name().clone());
         let pairs: Vec<_> = names.zip(self.batch.columns().iter().cloned()).collect();
-        if let Some(twice) = pairs.iter().enumerate().find(|(at, (name, _))| pairs[..*at].iter().any(|(other, _)| other == name)) {
+        if let Some(twice) = pairs.iter().enumerate().find(|(at, (name, _))| pairs[..*at].iter().any(|(other, _)| other == name))
+        {
             return Err(Error::Bug(format!("table {kind}: column {} twice", twice.1.0)));
         }
         let columns: Columns = pairs.into_iter().collect();

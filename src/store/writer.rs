@@ -24,8 +24,9 @@ use super::schema::TableSchema;
 use super::workspace::Workspace;
 use crate::error::{Error, Result};
 
-/// Keys of a file's metadata: the table's `name/version`, and the hash of its content.
+/// Keys of a file's metadata: the table's `name/version`, the units of its columns as JSON, and the hash of its content.
 pub(super) const SCHEMA: &str = "calib.schema";
+pub(super) const UNITS: &str = "calib.units";
 pub(super) const CONTENT_HASH: &str = "calib.table_hash";
 
 /// Rows of a row group: a few MB of a recording, so that readers can skip and writers stay small.
@@ -196,7 +197,7 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, rows: u64) -> Resu
         (SCHEMA, schema.id()),
         ("calib.description", schema.description.clone()),
         ("calib.primary_key", schema.primary_key.join(",")),
-        ("calib.units", super::key::canonical(&units.into())),
+        (UNITS, super::key::canonical(&units.into())),
     ];
     let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
     let compression = if rows < SMALL_ROWS { Compression::SNAPPY } else { Compression::ZSTD(level) };

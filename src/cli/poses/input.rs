@@ -48,7 +48,13 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
     let label = path.display().to_string();
     let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
         Error::Data(faults) => Error::Data(
-            faults.into_iter().map(|fault| Fault { message: format!("{}; `ingest` makes a `recording` table of any recording", fault.message), ..fault }).collect(),
+            faults
+                .into_iter()
+                .map(|fault| Fault {
+                    message: format!("{}; `ingest` makes a `recording` table of any recording", fault.message),
+                    ..fault
+                })
+                .collect(),
         ),
         other => other,
     })?;

@@ -3,7 +3,7 @@
 use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
 use super::conceal::vacant;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::stage::{STAGES, Simulate, Stage};
@@ -88,7 +88,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     if arguments.json {
         return emit_json(&json!({ "folder": arguments.out, "points": rows, "true_numbers": truth.0.len() }));
     }
-    emit(&format!("{rows} points, {} true numbers: {}\n", truth.0.len(), arguments.out.display()))
+    emit(&format!("{}, {}: {}\n", counted(rows, "point"), counted(truth.0.len(), "true number"), arguments.out.display()))
 }
 
 fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {
