@@ -24,6 +24,7 @@
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
+//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
@@ -82,6 +83,7 @@ pub mod pipeline;
 
 pub mod audit;
 pub mod fleet;
+pub mod identified;
 
 #[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;

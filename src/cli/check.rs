@@ -1,7 +1,7 @@
 //! `calib check`: reads and wires a pipeline and prints its graph, or every fault at once.
 
 use super::emit;
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::pipeline::{Override, Plan};
 use crate::raw;
 use crate::stage::STAGES;
@@ -41,7 +41,7 @@ fn marked(path: &Path) -> Option<String> {
 }
 
 fn graph(plan: &Plan) -> String {
-    let mut text = format!("pipeline {}, seed {}, {} stages\n", plan.name, plan.seed, plan.stages.len());
+    let mut text = format!("pipeline {}, seed {}, {}\n", plan.name, plan.seed, counted(plan.stages.len(), "stage"));
     for stage in &plan.stages {
         let uses = if stage.id == stage.entry.name { String::new() } else { format!(" (uses {})", stage.entry.name) };
         text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));

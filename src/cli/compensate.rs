@@ -7,9 +7,11 @@ mod parquet;
 mod program;
 mod text;
 
-use super::identified::{Identified, ModelArguments};
+use super::model_arguments::ModelArguments;
 use crate::compensate::Arm;
 use crate::error::{Error, Fault, Result};
+use crate::identified::Identified;
+use crate::pipeline::Purpose;
 use crate::raw;
 use crate::robot::RobotModel;
 use crate::units::{Quantity, Unit};
@@ -104,7 +106,7 @@ const EXAMPLES: &str = "Examples:
 
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
-    let identified = arguments.model.load(command_line)?;
+    let identified = arguments.model.load(Purpose::Compensate, command_line)?;
     let arm = Arm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };

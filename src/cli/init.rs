@@ -5,7 +5,7 @@ mod names;
 mod robots;
 
 use super::emit;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use clap::Args;
 use columns::Found;
 use robots::Kind;
@@ -57,9 +57,9 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
                 return Err(Error::spec(
                     "--robot",
                     format!(
-                        "{} has {} joints, the recording {n}; choose another kind",
+                        "{} has {}, the recording {n}; choose another kind",
                         arguments.robot.name(),
-                        arguments.robot.joints()
+                        counted(arguments.robot.joints(), "joint")
                     ),
                 ));
             }

@@ -10,11 +10,11 @@ mod explain;
 mod export;
 mod fleet;
 mod gc;
-mod identified;
 mod init;
 mod lineage;
 mod log;
 mod means;
+mod model_arguments;
 mod panics;
 mod pipeline_arguments;
 mod poses;
@@ -31,7 +31,7 @@ mod tables;
 mod tag;
 mod verify;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
@@ -128,7 +128,9 @@ fn complain(error: &Error) -> u8 {
 /// One fault a line, and how many there are where there are several.
 fn message(error: &Error) -> String {
     match error {
-        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => format!("{error}\nerror: {} faults", faults.len()),
+        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => {
+            format!("{error}\nerror: {}", counted(faults.len(), "fault"))
+        }
         _ => format!("error: {error}"),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::pipeline_arguments::PipelineArguments;
 use super::{corrections, emit, emit_json, searches, tables};
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use clap::Args;
@@ -40,7 +40,7 @@ pub(super) struct RunArguments {
 const EXAMPLES: &str = "Examples:
   calib run pipelines/sr210d/pipeline.yaml
   calib run pipelines/case/pipeline.yaml --set case=recordings/robot-7
-  calib run pipeline.yaml --set seed=7 --set split.every=5 --dry-run
+  calib run pipeline.yaml --set seed=7 --set split.n=5 --dry-run
   calib run pipeline.yaml --from stiffness --force
   calib run pipeline.yaml --json --quiet > result.json";
 
@@ -84,11 +84,15 @@ fn closing(outcome: &Outcome, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
-        return format!("nothing to do: all {} stages are cached ({seconds:.1} s)\n", stages.len());
+        return format!("nothing to do: {} cached ({seconds:.1} s)\n", counted(stages.len(), "stage"));
     }
     let (executed, cached, not_run) = (count(StageStatus::Executed), count(StageStatus::Cached), count(StageStatus::NotRun));
     let not_run = if not_run > 0 { format!(", {not_run} not selected") } else { String::new() };
-    format!("done: {executed} stages run, {cached} cached{not_run} ({seconds:.1} s), run {}\n", outcome.manifest.run_id)
+    format!(
+        "done: {} run, {cached} cached{not_run} ({seconds:.1} s), run {}\n",
+        counted(executed, "stage"),
+        outcome.manifest.run_id
+    )
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {

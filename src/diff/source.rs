@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::raw;
 use crate::store::schema::{self, TableSchema, Version};
 
@@ -62,7 +62,7 @@ impl Source {
         let footer = metadata.metadata().file_metadata();
         let rows = usize::try_from(footer.num_rows()).unwrap_or(0);
         if u32::try_from(rows).is_err() {
-            return Err(Error::spec(place, format!("{rows} rows; a comparison takes up to {}", u32::MAX)));
+            return Err(Error::spec(place, format!("{}; a comparison takes up to {}", counted(rows, "row"), u32::MAX)));
         }
         let said: BTreeMap<String, String> = footer
             .key_value_metadata()

@@ -24,7 +24,7 @@ pub struct FleetFile {
     pub name: String,
     /// The pipeline's YAML file, relative to this one.
     pub pipeline: PathBuf,
-    /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.every: 4}`.
+    /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.n: 4}`.
     #[serde(default)]
     pub set: BTreeMap<String, Value>,
     /// What is known of all robots.

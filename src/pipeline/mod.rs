@@ -2,6 +2,7 @@
 
 mod desk;
 mod execute;
+mod history;
 mod identity;
 mod lock;
 mod manifest;
@@ -18,7 +19,8 @@ mod spec;
 mod tests;
 mod wiring;
 
-pub use manifest::{Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool};
+pub use history::find_run;
+pub use manifest::{Host, Manifest, OutputRecord, Purpose, RunStatus, StageReport, StageStatus, Surroundings, Tool};
 pub use overrides::Override;
 pub use plan::Plan;
 pub use preview::{Forecast, Prospect, preview};

@@ -125,7 +125,7 @@ fn faults(text: &str, sets: &[&str]) -> Vec<String> {
     }
 }
 fn options(force: Option<Vec<String>>) -> RunOptions {
-    RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1 }
+    RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1, purpose: Purpose::Run }
 }
 /// Runs and returns what was said and what came out of `count`.
 fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, Outcome)> {
@@ -192,7 +192,11 @@ fn forcing_runs_what_is_cached() {
 #[test]
 fn a_selected_stage_needs_its_inputs() {
     let folder = tempfile::tempdir().unwrap();
-    let only = |id: &str| RunOptions { selection: Selection { only: Some(id.into()), ..Default::default() }, jobs: 1 };
+    let only = |id: &str| RunOptions {
+        selection: Selection { only: Some(id.into()), ..Default::default() },
+        jobs: 1,
+        purpose: Purpose::Run,
+    };
     let plan = plan(TWO, &[]).unwrap();
     let error = go(folder.path(), &plan, &only("count")).err().unwrap();
     assert!(error.to_string().contains("stage `count` reads from `b`, which is not cached"), "{error}");

@@ -14,7 +14,7 @@ use super::reader;
 use super::seal::{seal, unseal};
 use super::table_ref::{TableRef, same_bytes};
 use super::writer::{FinishedFile, TableWriter};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 
 /// Bumped when older records can no longer be understood: all stages run again.
 const RECORD_FORMAT: u32 = 1;
@@ -118,7 +118,7 @@ impl Store {
                 Ok(length) if length == table.bytes && same_bytes(&path, table) => (),
                 _ if self.obtain(table, &path)? => (),
                 Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
-                Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
+                Ok(length) => return damaged(format!("table {port} has {} instead of {}", counted(length, "byte"), table.bytes)),
                 Err(e) => return damaged(format!("table {port}: {e}")),
             }
         }
@@ -165,6 +165,11 @@ impl Store {
     /// Reads a published table.
     pub fn load(&self, table: &TableRef) -> Result<Frame> {
         reader::load(&self.object(table)?, table)
+    }
+
+    /// Whether the file of a published table is there, byte for byte.
+    pub fn is_whole(&self, table: &TableRef) -> Result<bool> {
+        Ok(same_bytes(&self.object(table)?, table))
     }
 
     fn write_frame(&self, frame: &Frame) -> Result<FinishedFile> {

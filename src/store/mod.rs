@@ -6,10 +6,10 @@
 
 pub mod actions;
 mod bucket;
-pub(crate) mod bytes;
 mod cell;
 mod check;
 pub mod content;
+mod decode;
 mod disk;
 mod durable;
 pub mod frame;
@@ -34,7 +34,8 @@ pub use actions::{Account, ActionRecord, Lookup, Product, Published};
 pub use bucket::Bucket;
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
-pub use reader::read_table;
+pub(crate) use reader::table_of_bytes;
+pub use reader::{Loose, read_table};
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
 pub use table_ref::TableRef;

@@ -155,7 +155,10 @@ impl Node {
             Value::List(items) => {
                 let (index, rest) = split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
                 if index > items.len() {
-                    return Err(format!("the list has {} entries; index {index} is too large", items.len()));
+                    return Err(format!(
+                        "the list has {}; index {index} is too large",
+                        crate::error::counted(items.len(), "entry")
+                    ));
                 }
                 if index == items.len() {
                     items.push(Node::new(Value::Null, node.mark));

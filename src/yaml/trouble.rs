@@ -2,7 +2,7 @@
 
 use super::Mark;
 use super::path::join;
-use crate::error::{Fault, nearest};
+use crate::error::{Fault, counted, nearest};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;
 
@@ -118,7 +118,7 @@ fn wanted(expected: &str) -> String {
         other if other.starts_with("a nonzero ") => "a whole number other than 0".into(),
         other if other.starts_with("struct ") => "a block of keys".into(),
         other => match other.strip_prefix("an array of length ") {
-            Some(length) => format!("a list of {length} values"),
+            Some(length) => format!("a list of {}", counted(length, "value")),
             None => other.into(),
         },
     }

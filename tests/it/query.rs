@@ -1,7 +1,7 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
 use calib::audit::{self, QueryTables};
-use calib::pipeline::Manifest;
+use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Prediction, PredictionRow, Recording, Table};
 use serde_json::Value;
@@ -43,7 +43,7 @@ fn rows(sql: &str) -> Vec<Value> {
 }
 fn table<T: Table>(name: &str) -> T {
     let store = Store::open(STORE.path()).unwrap();
-    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
     T::from_frame(&store.load(&tables.find(name).unwrap().table).unwrap()).unwrap()
 }
 fn objects(store: &Path) -> Vec<PathBuf> {
@@ -251,7 +251,7 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
 fn of_a_store_in_a_bucket_the_tables_that_are_asked_are_fetched() {
     let folder = tempfile::tempdir().unwrap();
     let store = bucket_of(STORE.path(), &folder.path().join("cache"));
-    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
     let answer = audit::query(&store, &tables, "SELECT r.sequence FROM recording r JOIN split USING (sequence)").unwrap();
     assert_eq!((answer.rows(), objects(store.root()).len()), (80, 2));
 }

@@ -172,7 +172,7 @@ fn a_recording_without_joints_or_with_degrees_for_radians_is_refused() {
     assert_eq!(error.exit_code(), 10);
     assert_eq!(
         error.to_string(),
-        "table recording, column q1_rad, sequence 0: 90 rad is out of range; allowed: -20 to 20 rad (and 1 more rows)"
+        "table recording, column q1_rad, sequence 0: 90 rad is out of range; allowed: -20 to 20 rad (and 1 more row)"
     );
 }
 

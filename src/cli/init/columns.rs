@@ -2,7 +2,7 @@
 
 use super::names::{Name, joints, point};
 use super::quoted;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::raw;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -149,7 +149,12 @@ impl Found {
     pub fn account(&self) -> String {
         let mut parts = Vec::new();
         if !self.joints.is_empty() {
-            parts.push(format!("{} joints ({} to {})", self.joints.len(), self.joints[0], self.joints[self.joints.len() - 1]));
+            parts.push(format!(
+                "{} ({} to {})",
+                counted(self.joints.len(), "joint"),
+                self.joints[0],
+                self.joints[self.joints.len() - 1]
+            ));
         }
         if self.point.len() == 3 {
             parts.push(format!("the point ({})", self.point.join(", ")));

@@ -1,17 +1,14 @@
 //! Ranges on the command line, the robot file, and recordings to compare with.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
 use crate::raw;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements};
-use crate::store::frame::FrameBuilder;
-use crate::table::{Recording, Table};
+use crate::table::{Loose, Recording, from_file};
 use nalgebra::Vector3;
+use std::io::Write;
 use std::path::Path;
-
-/// Rows read at a time.
-const BATCH: usize = 1 << 16;
 
 /// Lower and upper ends; infinite where left empty.
 #[derive(Debug, Clone)]
@@ -50,9 +47,21 @@ pub(super) fn robot(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription
 /// Joints and payloads of a recording, as if measured with `sigma` (m) per axis.
 pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Result<Measurements> {
     let label = path.display().to_string();
-    let table = read(path).map_err(|message| {
-        Error::data(&label, format!("is not a `recording` table of calib ({message}); `ingest` makes one of any recording"))
+    let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
+        Error::Data(faults) => Error::Data(
+            faults
+                .into_iter()
+                .map(|fault| Fault {
+                    message: format!("{}; `ingest` makes a `recording` table of any recording", fault.message),
+                    ..fault
+                })
+                .collect(),
+        ),
+        other => other,
     })?;
+    if !vouched {
+        let _ = writeln!(std::io::stderr(), "warning: {label} carries no content hash: whether it was changed cannot be told");
+    }
     let prismatic: Vec<bool> = robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     if table.prismatic != prismatic {
         let message = format!("has {} joints of other number or kind than the robot file's {}", table.joints, prismatic.len());
@@ -64,18 +73,4 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
     let mut data = table.measurements(&Instrument::default());
     data.sigma = vec![Vector3::repeat(sigma); data.rows()];
     Ok(data)
-}
-
-fn read(path: &Path) -> Result<Recording, String> {
-    let file = raw::open(path).map_err(|error| error.to_string())?;
-    let batch = raw::parquet(file, BATCH)?.whole()?;
-    let mut frame = FrameBuilder::new(Recording::KIND);
-    for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
-        frame.push(field.name(), column.clone());
-    }
-    let named = |error: Error| match error {
-        Error::Bug(message) => message,
-        other => other.to_string(),
-    };
-    Recording::from_frame(&frame.finish().map_err(named)?).map_err(named)
 }
