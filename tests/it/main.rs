@@ -25,6 +25,7 @@ mod network;
 mod parameter_sets;
 mod pipelines;
 mod poses;
+mod program;
 mod query;
 mod readme;
 mod remedies;
