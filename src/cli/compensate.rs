@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 /// Joints that both languages of programs have targets for.
 const JOINTS_OF_PROGRAMS: usize = 6;
 
+/// Faults told of a program: more are of a file that is none.
+const MOST_FAULTS: usize = 500;
+
 /// Correct targets: joint commands that bring the real arm to where the nominal robot would have put the tool.
 ///
 /// The whole identified model is solved, with all accepted effects and the learned correction. A joint target stands for the point that the
@@ -215,7 +218,11 @@ fn language(targets: &Path) -> Option<Language> {
 fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
     let place = |note: &Note| format!("{}:{}:{}", layout.place, note.line, note.column);
     let refused = |refusal: Refusal| {
-        let mut faults: Vec<Fault> = refusal.faults.iter().map(|note| Fault::new(place(note), &note.message)).collect();
+        let told = refusal.faults.iter().take(MOST_FAULTS);
+        let mut faults: Vec<Fault> = told.map(|note| Fault::new(place(note), &note.message)).collect();
+        if refusal.faults.len() > MOST_FAULTS {
+            faults.push(Fault::new(layout.place, format!("and {} more", refusal.faults.len() - MOST_FAULTS)));
+        }
         if refusal.partial > 0 {
             faults.push(Fault::new(layout.place, "partial targets stay as they are with --leave-partial"));
         }
@@ -237,19 +244,39 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
     let rewritten = program.rewritten(answers).map_err(refused)?;
     let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", place(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
-    let (place, written) = match &arguments.out {
-        Some(out) => (out.display().to_string(), std::fs::write(out, rewritten.bytes)),
-        None => ("stdout".into(), std::io::stdout().write_all(&rewritten.bytes)),
+    let Some(out) = &arguments.out else {
+        return match std::io::stdout().write_all(&rewritten.bytes) {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Error::store("stdout", format!("cannot be written: {error}")))
+            }
+            _ => Ok(()),
+        };
     };
-    match written {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::store(place, format!("cannot be written: {error}")))
-        }
-        _ => Ok(()),
-    }
+    whole(out, |mut file| file.write_all(&rewritten.bytes).map_err(|error| unwritten(out, &error)))
 }
 
-/// Reads, corrects and writes; a file appears only when it is whole, a pipe or a device is written as it stands.
+fn unwritten(out: &Path, error: &std::io::Error) -> Error {
+    Error::store(out.display().to_string(), format!("cannot be written: {error}"))
+}
+
+/// A file appears only when it is whole; a pipe or a device is written as it stands.
+fn whole<T>(out: &Path, fill: impl FnOnce(File) -> Result<T>) -> Result<T> {
+    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return fill(File::options().write(true).open(out).map_err(|error| unwritten(out, &error))?);
+    }
+    let mut name = out.to_path_buf().into_os_string();
+    name.push(".part");
+    let aside = PathBuf::from(name);
+    let file = File::create(&aside).map_err(|error| unwritten(out, &error))?;
+    let result =
+        fill(file).and_then(|filled| std::fs::rename(&aside, out).map(|()| filled).map_err(|error| unwritten(out, &error)));
+    if result.is_err() {
+        let _ = std::fs::remove_file(&aside);
+    }
+    result
+}
+
+/// Reads, corrects and writes.
 fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
     if let Some(language) = language(&arguments.targets) {
         return rewritten(arguments, language, layout, corrector).map(|()| Unreached::default());
@@ -262,21 +289,7 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
         let message = "text stays text and Parquet stays Parquet: give --out the ending of the targets";
         return Err(Error::spec("--out", message));
     }
-    let refused = |error: &std::io::Error| Error::store(out.display().to_string(), format!("cannot be written: {error}"));
-    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        let open = File::options().write(true).open(out).map_err(|error| refused(&error))?;
-        return convert(&arguments.targets, open, columnar, layout, corrector);
-    }
-    let mut name = out.clone().into_os_string();
-    name.push(".part");
-    let aside = PathBuf::from(name);
-    let file = File::create(&aside).map_err(|error| refused(&error))?;
-    let result = convert(&arguments.targets, file, columnar, layout, corrector)
-        .and_then(|unreached| std::fs::rename(&aside, out).map(|()| unreached).map_err(|error| refused(&error)));
-    if result.is_err() {
-        let _ = std::fs::remove_file(&aside);
-    }
-    result
+    whole(out, |file| convert(&arguments.targets, file, columnar, layout, corrector))
 }
 
 fn convert(

@@ -176,13 +176,13 @@ impl<'a> Corrector<'a> {
         if turned {
             remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
         }
-        remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
-        if let Some(coverage) = &self.coverage {
-            remarks.extend(coverage.beyond(&found.q, &job.circumstance));
-        }
-        let share = reach.share();
-        if share < 1.0 {
-            remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+        if reached {
+            remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
+            remarks.extend(self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance)));
+            let share = reach.share();
+            if share < 1.0 {
+                remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+            }
         }
         Answer {
             q: reached.then_some(found.q),
@@ -218,7 +218,7 @@ impl Tally {
             self.residual_max = self.residual_max.max(answer.residual);
         }
         self.not_reached += u64::from(answer.q.is_none());
-        self.turned += u64::from(answer.remark.contains("orientation off"));
+        self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
         self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
         self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
     }

@@ -40,6 +40,9 @@ pub enum Partial {
     Left,
 }
 
+/// Brackets in brackets, at most: targets in arrays of three dimensions have six.
+const DEPTH: usize = 16;
+
 /// Something said of a place in a program; line and column count from 1, columns in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
@@ -159,6 +162,10 @@ impl<'p> Program<'p> {
             };
             for (span, text) in literal.replacements(&solved.values) {
                 bytes.extend_from_slice(&self.bytes[from..span.start]);
+                // `A1-0.1`: the sign parts the name from the number.
+                if bytes.last().is_some_and(u8::is_ascii_alphanumeric) && !text.starts_with('-') {
+                    bytes.push(b' ');
+                }
                 bytes.extend_from_slice(text.as_bytes());
                 from = span.end;
             }

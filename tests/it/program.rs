@@ -47,6 +47,15 @@ fn a_number_stays_as_it_was_written_where_nothing_is_to_be_corrected() {
 }
 
 #[test]
+fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
+    let text = "PTP {A1-0.1,A2-0.3,A3+0,A4 0,A5 0,A6-9}";
+    let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
+    assert_eq!(program.literals()[0].values, [-0.1, -0.3, 0.0, 0.0, 0.0, -9.0]);
+    let written = "PTP {A1 0.100000,A2-0.100000,A3 0.200000,A4 0.200000,A5 0.200000,A6-8.800000}";
+    assert_eq!(String::from_utf8_lossy(&moved(&program, 0.2)), written);
+}
+
+#[test]
 fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let text = "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 7}\n";
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
@@ -73,4 +82,11 @@ fn a_language_is_known_by_the_ending_of_a_file() {
         (of("SRC"), of("dat"), of("Mod"), of("csv")),
         (Some(Language::Krl), Some(Language::Krl), Some(Language::Rapid), None)
     );
+}
+
+#[test]
+fn brackets_without_end_are_a_fault_and_no_overflow() {
+    let deep = |open: &str, close: &str| format!("{}{}", open.repeat(200_000), close.repeat(200_000));
+    assert_eq!(refused(Language::Krl, &format!("X={}", deep("{", "}"))), ["1:18: brackets are nested too deep"]);
+    assert_eq!(refused(Language::Rapid, &format!("X:={};", deep("[", "]"))), ["1:19: brackets are nested too deep"]);
 }

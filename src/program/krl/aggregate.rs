@@ -2,7 +2,7 @@
 
 use super::super::token::{Sort, Source, Token};
 use super::super::{Found, Kind, Literal, quoted};
-use super::opens;
+use super::line::opens;
 use std::ops::Range;
 
 const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];

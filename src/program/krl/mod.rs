@@ -6,10 +6,13 @@
 //! absolute pose: such targets are refused, and so is every aggregate that may be a target and of which the file does not tell.
 
 mod aggregate;
+mod frames;
+mod line;
 
 use super::token::{Sort, Source, Token, tokens};
-use super::{Found, Language, quoted};
+use super::{DEPTH, Found, Language, quoted};
 use aggregate::{Aggregate, Type};
+use line::{closing, declared, member, opens, variable};
 use std::collections::BTreeMap;
 
 /// Motions, and how many positions each has.
@@ -20,9 +23,6 @@ const LEFT: [&str; 8] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL
 
 /// What may stand behind a position: how it is blended.
 const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
-
-/// Types that need no DECL.
-const PREDEFINED: [&str; 11] = ["INT", "REAL", "BOOL", "CHAR", "FRAME", "POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS"];
 
 const RELATIVE: &str = "the geometric operator `:` makes a relative pose of its operand; calib corrects absolute ones alone";
 
@@ -52,39 +52,6 @@ pub(super) fn read(bytes: &[u8]) -> Found {
     reader.found
 }
 
-/// The type and the names that a line declares, in capitals.
-fn declared(source: Source, line: &[Token]) -> Option<(String, Vec<String>)> {
-    let skipped = line.iter().take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"])).count();
-    let rest = &line[skipped..];
-    let [kind, first, ..] = rest else { return None };
-    let plain = rest.get(2).is_none_or(|next| next.is(b'=') || next.is(b'[') || next.is(b','));
-    if kind.sort != Sort::Word || first.sort != Sort::Word || !plain {
-        return None;
-    }
-    let kind = source.upper(kind);
-    if skipped == 0 && !PREDEFINED.contains(&kind.as_str()) {
-        return None;
-    }
-    let mut names = vec![source.upper(first)];
-    let mut depth = 0;
-    for pair in rest.windows(2) {
-        depth += opens(&pair[0]);
-        if depth == 0 && pair[0].is(b',') && pair[1].sort == Sort::Word {
-            names.push(source.upper(&pair[1]));
-        }
-    }
-    Some((kind, names))
-}
-
-/// +1 where a bracket opens, -1 where it closes.
-fn opens(token: &Token) -> i32 {
-    match token.sort {
-        Sort::Sign(b'{' | b'[' | b'(') => 1,
-        Sort::Sign(b'}' | b']' | b')') => -1,
-        _ => 0,
-    }
-}
-
 struct Reader<'p> {
     source: Source<'p>,
     /// Variable -> types it is declared with anywhere in the file.
@@ -97,7 +64,7 @@ impl Reader<'_> {
         if !self.braces_match(line) {
             return;
         }
-        self.system(line);
+        frames::set(self.source, line, &mut self.found);
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
             return;
@@ -117,6 +84,9 @@ impl Reader<'_> {
         for token in line {
             if token.is(b'{') {
                 open.push(token);
+                if open.len() == DEPTH {
+                    self.found.fault(token.span.start, "brackets are nested too deep");
+                }
             } else if token.is(b'}') && open.pop().is_none() {
                 self.found.fault(token.span.start, "`}` without `{`");
             }
@@ -125,22 +95,6 @@ impl Reader<'_> {
             self.found.fault(token.span.start, "`{` without `}` on its line");
         }
         self.found.faults.len() == before
-    }
-
-    /// What a line sets that calib takes for granted.
-    fn system(&mut self, line: &[Token]) {
-        for (k, token) in line.iter().enumerate() {
-            let names = ["$BASE", "$TOOL", "$IPO_MODE", "$ROBROOT"];
-            if self.source.is_word(token, &names) && member(self.source, &line[k + 1..]).is_some_and(|(_, rest)| rest.is_some()) {
-                let name = self.source.upper(token);
-                self.found.warn(token.span.start, assumed(&name));
-            }
-        }
-        let calls = line.windows(4).find(|w| self.source.is_word(&w[0], &["BAS"]) && w[1].is(b'(') && w[2].is(b'#'));
-        if let Some(call) = calls.filter(|call| self.source.is_word(&call[3], &["BASE", "TOOL", "EX_BASE", "FRAMES"])) {
-            let name = if self.source.is_word(&call[3], &["TOOL"]) { "$TOOL" } else { "$BASE" };
-            self.found.warn(call[0].span.start, assumed(name));
-        }
     }
 
     fn motion(&mut self, line: &[Token], positions: usize) {
@@ -246,7 +200,13 @@ impl Reader<'_> {
         while k < line.len() {
             if line[k].is(b'{') {
                 let close = closing(line, k);
+                let before = self.found.literals.len();
                 self.value(&line[..k], &line[k..=close], declares.as_deref());
+                let taken = self.found.literals.len() > before;
+                if let Some(stray) = line.get(close + 1).filter(|next| taken && !next.is(b',')) {
+                    let text = quoted(self.source.bytes, stray.span.clone());
+                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                }
                 k = close;
             }
             k += 1;
@@ -281,7 +241,7 @@ impl Reader<'_> {
             return;
         }
         if FRAME_TABLES.contains(&name.as_str()) {
-            self.found.warn(at, assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
+            self.found.warn(at, frames::assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
             return;
         }
         let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);
@@ -290,7 +250,7 @@ impl Reader<'_> {
                 Some(kind) => aggregate.take(kind, &mut self.found),
                 None => {
                     if kind == "FDAT" {
-                        self.frame_data(tokens);
+                        frames::of_point(self.source, tokens, &mut self.found);
                     } else if kind != "FRAME" && aggregate.may_be_target() {
                         self.found.warn(at, format!("left as it is: {kind} is no type of targets that calib knows"));
                     }
@@ -332,17 +292,6 @@ impl Reader<'_> {
         }
     }
 
-    /// The data of an inline form: which base its point is taught in.
-    fn frame_data(&mut self, tokens: &[Token]) {
-        let base = tokens.windows(2).find(|w| self.source.is_word(&w[0], &["BASE_NO"]));
-        if base.and_then(|w| self.source.number(&w[1..])).is_some_and(|(number, _)| number != 0.0) {
-            self.found.warn(tokens[0].span.start, assumed("$BASE"));
-        }
-        if tokens.windows(3).any(|w| self.source.is_word(&w[0], &["IPO_FRAME"]) && self.source.is_word(&w[2], &["TCP"])) {
-            self.found.warn(tokens[0].span.start, assumed("$IPO_MODE"));
-        }
-    }
-
     /// `XP1.Z = 50`: one number of a target.
     fn component(&mut self, line: &[Token], head: &str) {
         let Some((Some(member), Some(_))) = member(self.source, &line[1..]) else { return };
@@ -357,73 +306,6 @@ impl Reader<'_> {
                 .partial(at, format!("sets {member} of the target `{head}` alone; a target is corrected whole or not at all"));
         } else if types.is_empty() {
             self.found.warn(at, format!("left as it is: sets {member} of `{head}`, whose type this file does not state"));
-        }
-    }
-}
-
-/// What calib takes for granted where a program sets a frame of the system.
-fn assumed(name: &str) -> String {
-    match name {
-        "$TOOL" => "sets $TOOL: calib assumed that its frame is the tool of the robot file".into(),
-        "$IPO_MODE" => "sets $IPO_MODE: calib assumed that the robot carries the tool (#BASE)".into(),
-        name => format!("sets {name}: calib assumed that targets are in the robot's base, $BASE and $ROBROOT at zero"),
-    }
-}
-
-/// The place of the brace that closes the one at `open`.
-fn closing(line: &[Token], open: usize) -> usize {
-    let mut depth = 0;
-    for (k, token) in line.iter().enumerate().skip(open) {
-        match token.sort {
-            Sort::Sign(b'{') => depth += 1,
-            Sort::Sign(b'}') => depth -= 1,
-            _ => {}
-        }
-        if depth == 0 {
-            return k;
-        }
-    }
-    line.len() - 1
-}
-
-/// Behind a name: the last member of `[1].FRAME.X`, and what follows `=`; the second is none where nothing is set.
-fn member<'t>(source: Source, rest: &'t [Token]) -> Option<(Option<String>, Option<&'t [Token]>)> {
-    let mut member = None;
-    let mut k = 0;
-    loop {
-        match rest.get(k).map(|token| token.sort) {
-            Some(Sort::Sign(b'[')) => k += rest[k..].iter().position(|token| token.is(b']'))? + 1,
-            Some(Sort::Sign(b'.')) => {
-                member = Some(source.upper(rest.get(k + 1)?));
-                k += 2;
-            }
-            Some(Sort::Sign(b'=')) => return Some((member, Some(&rest[k + 1..]))),
-            _ => return Some((member, None)),
-        }
-    }
-}
-
-/// The variable that is set where `before` ends in `NAME[1].MEMBER =`: its name, and whether a member of it.
-fn variable(source: Source, before: &[Token]) -> Option<(String, Option<String>)> {
-    let (last, mut rest) = before.split_last()?;
-    if !last.is(b'=') {
-        return None;
-    }
-    let mut of = None;
-    loop {
-        let (last, front) = rest.split_last()?;
-        if last.is(b']') {
-            let open = front.iter().rposition(|token| token.is(b'['))?;
-            rest = &front[..open];
-        } else if last.sort == Sort::Word {
-            if front.last().is_some_and(|token| token.is(b'.')) {
-                of = of.or_else(|| Some(source.upper(last)));
-                rest = &front[..front.len() - 1];
-            } else {
-                return Some((source.upper(last), of));
-            }
-        } else {
-            return None;
         }
     }
 }

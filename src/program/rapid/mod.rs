@@ -8,7 +8,7 @@
 mod list;
 
 use super::token::{Sort, Source, Token, tokens};
-use super::{Found, Language, quoted};
+use super::{DEPTH, Found, Language, quoted};
 use list::{List, Want};
 use std::collections::BTreeMap;
 
@@ -159,6 +159,9 @@ impl Reader<'_> {
         for token in statement {
             if token.is(b'[') {
                 open.push(token);
+                if open.len() == DEPTH {
+                    self.found.fault(token.span.start, "brackets are nested too deep");
+                }
             } else if token.is(b']') && open.pop().is_none() {
                 self.found.fault(token.span.start, "`]` without `[`");
             }

@@ -69,7 +69,7 @@ fn all_faults_of_a_program_come_at_once() {
             "2:26: `x` is no number",
             "3:29: `orient1` in a robtarget, expected a list of 4 numbers",
             "4:30: the quaternion has length 1.4142, expected 1",
-            "5:83: `:` behind a target is not understood",
+            "5:85: `:` behind a target is not understood",
             "6:20: `[` without `]` in its statement",
             "6:21: `[` without `]` in its statement",
         ]
