@@ -38,6 +38,7 @@ mod network;
 mod parameter_sets;
 mod pipelines;
 mod poses;
+mod program;
 mod query;
 mod raw;
 mod readme;

@@ -217,6 +217,21 @@ fn a_urdf_fault_names_its_line() {
 }
 
 #[test]
+fn a_name_stands_for_one_joint() {
+    assert_eq!(
+        added("joints: [{name: A1}, {name: A1}]"),
+        "robot.yaml:8:29: joints[1].name: joint 1 is called `A1` too; expected a name of its own"
+    );
+    // The first joint's name is the one that the second has for want of another.
+    assert_eq!(
+        added("joints: [{name: J2}, null]"),
+        "robot.yaml:8:17: joints[0].name: joint 2 is called `J2` too; expected a name of its own"
+    );
+    let two = ARM.replace("\"j2\" type=\"fixed\"", "\"j1\" type=\"revolute\"");
+    assert_eq!(urdf(&two, "base_link", "tool0"), "arm.urdf:4: joint `j1` is there twice");
+}
+
+#[test]
 fn a_practice_robot_is_checked_too() {
     let case = |text: &str| read_case(Text { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
     assert_eq!(

@@ -119,6 +119,7 @@ fn describe(root: &Place, chain: Chain, units: Units) -> RobotDescription {
             drive(joint, value, units);
         }
     }
+    distinct(root, &joints);
     if let Some(list) = root.get("links").given() {
         for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
             if value.given().is_some() {
@@ -214,6 +215,20 @@ fn drive(joint: &mut JointDescription, value: Place, units: Units) {
     };
     joint.reduction_ratio = nonzero("reduction_ratio");
     joint.motor_constant = nonzero("motor_constant");
+}
+
+/// Columns of targets and recordings name joints: a name stands for one.
+fn distinct(root: &Place, joints: &[JointDescription]) {
+    for (k, joint) in joints.iter().enumerate() {
+        if let Some(other) = joints[..k].iter().position(|other| other.name == joint.name) {
+            let places = root.get("joints").given().map_or_else(Vec::new, Place::items);
+            let own = |k: usize| places.get(k).map(|value| value.get("name")).filter(|name| name.given().is_some());
+            // A name that was not given is `J` and the joint's number: the other one has taken it.
+            let (at, other) = own(k).map_or_else(|| (own(other), k), |at| (Some(at), other));
+            let message = format!("joint {} is called `{}` too; expected a name of its own", other + 1, joint.name);
+            at.unwrap_or_else(|| root.clone()).fault(message);
+        }
+    }
 }
 
 fn link(value: Place, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {

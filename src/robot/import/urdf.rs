@@ -9,7 +9,7 @@ use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 struct Joint<'a> {
     node: Node<'a, 'a>,
@@ -78,8 +78,12 @@ impl<'a> Reader<'a> {
     /// Every joint of the file, by the link it moves.
     fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, Joint<'a>>> {
         let mut joints = BTreeMap::new();
+        let mut names = BTreeSet::new();
         for node in root.children().filter(|node| node.has_tag_name("joint")) {
             let name = self.attribute(node, "name")?;
+            if !names.insert(name) {
+                self.fault(node, format!("joint `{name}` is there twice"));
+            }
             let parent = self.child(node, "parent").and_then(|end| self.attribute(end, "link"))?;
             let child = self.child(node, "child").and_then(|end| self.attribute(end, "link"))?;
             for end in [parent, child] {

@@ -1,13 +1,13 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
-use super::columns::{Columns, Role, Units};
-use super::correct::{Answer, Corrector, Target};
-use super::decimal;
+use super::columns::{Columns, Role};
+use super::{Layout, Unreached, decimal};
+use crate::compensate::{Answer, Corrector, Target, turns};
 use crate::error::{Error, Fault, Result};
 use crate::robot::Bound;
-use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::description::JointKind;
 use crate::units::{Quantity, Unit};
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::{BufRead, Read, Write};
@@ -28,17 +28,9 @@ const LONGEST: u64 = 16 << 20;
 /// Decimals of an angle in deg and of a length in mm: 1e-7 deg is 0.004 um at 2.5 m.
 const DECIMALS: usize = 7;
 
-pub(super) struct Layout<'a> {
-    pub place: &'a str,
-    pub robot: &'a RobotDescription,
-    pub units: Units,
-    /// Appends nothing: joints are replaced, all else stays.
-    pub plain: bool,
-    pub cartesian: bool,
-}
-
 /// Reads targets from `input` to its end and writes them corrected.
-pub(super) fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
+    let mut unreached = Unreached::default();
     let mut number = 0;
     let header = loop {
         let Some(line) = next(input, layout.place)? else {
@@ -69,7 +61,7 @@ pub(super) fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &L
         if lines.is_empty() {
             return match output.flush() {
                 Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(refused(&error)),
-                _ => Ok(()),
+                _ => Ok(unreached),
             };
         }
         let parsed: Vec<Result<Option<(Target, Spans)>, String>> =
@@ -93,10 +85,15 @@ pub(super) fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &L
             .zip(spans)
             .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
             .collect();
+        for (k, answer) in rows.iter().enumerate().filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1))) {
+            if answer.q.is_none() {
+                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark);
+            }
+        }
         let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
         for text in &written {
             if !put(output, text)? {
-                return Ok(());
+                return Ok(unreached);
             }
         }
     }
@@ -275,26 +272,30 @@ impl Sheet<'_> {
         let mut at = 0;
         for (range, (_, joint, unit)) in spans.joints.iter().zip(&self.joints) {
             out.push_str(&body[at..range.start]);
-            decimal::push(out, unit.from_si(answer.q[*joint]), decimals(*unit), point);
+            if let Some(q) = &answer.q {
+                decimal::push(out, unit.from_si(q[*joint]), decimals(*unit), point);
+            }
             at = range.end;
         }
         out.push_str(&body[at..]);
-        let mut append = |value: f64, decimals: usize| {
+        let mut append = |value: Option<f64>, decimals: usize| {
             out.push(self.delimiter);
-            decimal::push(out, value, decimals, point);
+            if let Some(value) = value {
+                decimal::push(out, value, decimals, point);
+            }
         };
         if self.columns.joints.is_empty() {
-            for (joint, q) in self.layout.robot.joints.iter().zip(&answer.q) {
+            for (j, joint) in self.layout.robot.joints.iter().enumerate() {
                 let unit = own_unit(joint.kind);
-                append(unit.from_si(*q), decimals(unit));
+                append(answer.q.as_ref().map(|q| unit.from_si(q[j])), decimals(unit));
             }
         }
         if !self.layout.plain {
-            append(answer.uncorrected * 1e3, 4);
-            append(answer.residual * 1e3, 6);
-            append(answer.iterations as f64, 0);
+            append(Some(answer.uncorrected * 1e3), 4);
+            append(Some(answer.residual * 1e3), 6);
+            append(Some(answer.iterations as f64), 0);
             if let Some(sigma) = answer.sigma {
-                append(sigma * 1e3, 4);
+                append(Some(sigma * 1e3), 4);
             }
             let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
             out.push(self.delimiter);
@@ -388,9 +389,4 @@ impl Row {
         }
         Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner())
     }
-}
-
-/// A about z, then B about the new y, then C about the new x (rad): KUKA's A, B, C.
-pub(super) fn turns(a: f64, b: f64, c: f64) -> Matrix3<f64> {
-    Rotation3::from_euler_angles(c, b, a).into_inner()
 }

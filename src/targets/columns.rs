@@ -22,7 +22,7 @@ pub(super) enum Role {
 
 /// Units of columns whose names do not end in one.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Units {
+pub struct Units {
     pub angle: Option<Unit>,
     pub length: Option<Unit>,
 }

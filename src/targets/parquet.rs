@@ -1,8 +1,9 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
 use super::columns::{Columns, Role};
-use super::correct::{Answer, Corrector, Target};
-use super::text::{Layout, Row};
+use super::text::Row;
+use super::{Layout, Unreached};
+use crate::compensate::{Answer, Corrector, Target};
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::robot::description::JointKind;
@@ -19,7 +20,7 @@ use std::sync::Arc;
 const BATCH: usize = 1 << 13;
 
 /// Reads targets from a Parquet file and writes them corrected as another.
-pub(super) fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
     let fault = |message: String| Error::data(layout.place, format!("not a readable Parquet file: {message}"));
     let reader = raw::parquet(input, BATCH).map_err(fault)?;
     let schema = reader.schema.clone();
@@ -27,17 +28,21 @@ pub(super) fn stream(input: File, output: impl Write + Send, layout: &Layout, co
     let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
     let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
     let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
+    let mut unreached = Unreached::default();
     let mut rows = 0;
     for batch in reader {
         let batch = batch.map_err(fault)?;
         let targets = targets(&batch, &columns, layout, rows)?;
         let answers = corrector.batch(targets);
+        for (k, answer) in answers.iter().enumerate().filter(|(_, answer)| answer.q.is_none()) {
+            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark);
+        }
         let columns = answered(&batch, &columns, layout, &answers);
         let batch = RecordBatch::try_new(out_schema.clone(), columns).map_err(|error| Error::Bug(error.to_string()))?;
         writer.write(&batch).map_err(|error| Error::store("output", error.to_string()))?;
         rows += batch.num_rows();
     }
-    writer.close().map(|_| ()).map_err(|error| Error::store("output", error.to_string()))
+    writer.close().map(|_| unreached).map_err(|error| Error::store("output", error.to_string()))
 }
 
 fn described(schema: &Schema, columns: &Columns, layout: &Layout, sigma: bool) -> Schema {
@@ -45,17 +50,18 @@ fn described(schema: &Schema, columns: &Columns, layout: &Layout, sigma: bool) -
     let mut fields: Vec<Arc<Field>> = Vec::new();
     for (index, field) in schema.fields().iter().enumerate() {
         fields.push(if joint(index) {
-            Arc::new(Field::new(field.name(), DataType::Float64, false).with_metadata(field.metadata().clone()))
+            // Null where a target is not reached.
+            Arc::new(Field::new(field.name(), DataType::Float64, true).with_metadata(field.metadata().clone()))
         } else {
             field.clone()
         });
     }
-    let mut append = |name: &str, kind: DataType| fields.push(Arc::new(Field::new(name, kind, false)));
     if columns.joints.is_empty() {
         for (j, joint) in layout.robot.joints.iter().enumerate() {
-            append(&format!("q{}_{}", j + 1, stored(joint.kind).symbol()), DataType::Float64);
+            fields.push(Arc::new(Field::new(format!("q{}_{}", j + 1, stored(joint.kind).symbol()), DataType::Float64, true)));
         }
     }
+    let mut append = |name: &str, kind: DataType| fields.push(Arc::new(Field::new(name, kind, false)));
     if !layout.plain {
         append("uncorrected_mm", DataType::Float64);
         append("residual_mm", DataType::Float64);
@@ -101,17 +107,20 @@ fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usiz
 
 fn answered(batch: &RecordBatch, columns: &Columns, layout: &Layout, answers: &[Answer]) -> Vec<ArrayRef> {
     let numbers = |of: &dyn Fn(&Answer) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
+    let joint_numbers = |joint: usize, unit: Unit| -> ArrayRef {
+        Arc::new(answers.iter().map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint]))).collect::<Float64Array>())
+    };
     let mut out: Vec<ArrayRef> = Vec::new();
     for (index, column) in batch.columns().iter().enumerate() {
         let joint = columns.joints.iter().position(|(column, _)| *column == index);
         out.push(match joint {
-            Some(joint) => numbers(&|answer| columns.joints[joint].1.from_si(answer.q[joint])),
+            Some(joint) => joint_numbers(joint, columns.joints[joint].1),
             None => column.clone(),
         });
     }
     if columns.joints.is_empty() {
         for (j, joint) in layout.robot.joints.iter().enumerate() {
-            out.push(numbers(&|answer| stored(joint.kind).from_si(answer.q[j])));
+            out.push(joint_numbers(j, stored(joint.kind)));
         }
     }
     if !layout.plain {

@@ -1,24 +1,27 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
-use crate::compensate::{
+use super::{
     Arm, Chain, Circumstance, Coverage, Found, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse, least_change,
     one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 
 /// m and rad: a target farther off is said to be not reached.
 const REACHED: f64 = 1e-6;
+
+/// rad: a stretched wrist turns a pose by less, 1 deg; a pose farther turned is another one.
+const TURNED_AWAY: f64 = std::f64::consts::PI / 180.0;
 
 /// rad or m: a smaller move has no direction.
 const STILL: f64 = 1e-9;
 
 /// A target as it was given, SI.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Target {
+pub struct Target {
     pub q: Option<Vec<f64>>,
     /// Base frame.
     pub point: Option<Vector3<f64>>,
@@ -32,7 +35,7 @@ pub(super) struct Target {
 
 /// How to correct, and what holds where a target does not say.
 #[derive(Debug, Clone)]
-pub(super) struct Manner {
+pub struct Manner {
     /// Cartesian columns are the targets though there are joints; these then say near which posture.
     pub cartesian: bool,
     /// Whether joint targets keep the nominal orientation.
@@ -48,8 +51,9 @@ pub(super) struct Manner {
 
 /// A command and what is known of it, SI.
 #[derive(Debug, Clone)]
-pub(super) struct Answer {
-    pub q: Vec<f64>,
+pub struct Answer {
+    /// None where the target is not reached: no joints are better than wrong ones.
+    pub q: Option<Vec<f64>>,
     /// How far the uncorrected command would be off by the model.
     pub uncorrected: f64,
     pub residual: f64,
@@ -57,11 +61,10 @@ pub(super) struct Answer {
     pub sigma: Option<f64>,
     /// What is wrong with it; empty if nothing.
     pub remark: String,
-    /// Whether the wanted point is reached.
-    pub reached: bool,
 }
 
-pub(super) struct Corrector<'a> {
+/// Corrects targets in their order: what a target does not say follows from the one before.
+pub struct Corrector<'a> {
     arm: &'a Arm,
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
@@ -74,10 +77,11 @@ pub(super) struct Corrector<'a> {
 
 /// What became of all targets.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tally {
+pub struct Tally {
     pub targets: u64,
     pub uncorrected_sum: f64,
     pub uncorrected_max: f64,
+    /// Of those that are reached.
     pub residual_max: f64,
     pub not_reached: u64,
     pub turned: u64,
@@ -160,32 +164,33 @@ impl<'a> Corrector<'a> {
         } else {
             Self::reached(reach, &wanted, &job.home)
         };
-        let turned = wanted.oriented && found.turn > REACHED;
+        let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
         let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
-        let reached = self.manner.one_step || found.residual < REACHED;
         let mut remarks = Vec::new();
+        let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
+        let faces = !turned || found.turn <= TURNED_AWAY;
+        let reached = off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
         if !reached {
-            remarks.push(format!("not reached, {:.3} mm off", found.residual * 1e3));
+            remarks.push(if faces { format!("not reached, {:.3} mm off", found.residual * 1e3) } else { "not reached".into() });
         }
         if turned {
             remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
         }
-        remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
-        if let Some(coverage) = &self.coverage {
-            remarks.extend(coverage.beyond(&found.q, &job.circumstance));
-        }
-        let share = reach.share();
-        if share < 1.0 {
-            remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+        if reached {
+            remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
+            remarks.extend(self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance)));
+            let share = reach.share();
+            if share < 1.0 {
+                remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+            }
         }
         Answer {
-            q: found.q,
+            q: reached.then_some(found.q),
             uncorrected: found.before,
             residual: found.residual,
             iterations: found.iterations,
             sigma,
             remark: remarks.join("; "),
-            reached,
         }
     }
 }
@@ -209,33 +214,22 @@ impl Tally {
         self.targets += 1;
         self.uncorrected_sum += answer.uncorrected;
         self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
-        self.residual_max = self.residual_max.max(answer.residual);
-        self.not_reached += u64::from(!answer.reached);
-        self.turned += u64::from(answer.remark.contains("orientation off"));
+        if answer.q.is_some() {
+            self.residual_max = self.residual_max.max(answer.residual);
+        }
+        self.not_reached += u64::from(answer.q.is_none());
+        self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
         self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
         self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
     }
+}
 
-    /// For a person, on one or several lines.
-    pub fn text(&self) -> String {
-        let mean = self.uncorrected_sum / self.targets.max(1) as f64;
-        let mut text = format!(
-            "{} targets; uncorrected they would be off by {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
-            self.targets,
-            mean * 1e3,
-            self.uncorrected_max * 1e3,
-            self.residual_max * 1e3
-        );
-        for (count, what) in [
-            (self.not_reached, "could not be reached"),
-            (self.turned, "are reached but for their orientation: the wrist is stretched"),
-            (self.beyond_limits, "leave the joint limits"),
-            (self.beyond_measured, "are outside of what was measured: the model extrapolates there"),
-        ] {
-            if count > 0 {
-                text.push_str(&format!("warning: {count} of them {what} (column `remark`)\n"));
-            }
-        }
-        text
-    }
+/// How far (m) the nominal robot stays away from a Cartesian target: one step does not say whether there is a way.
+fn left_by_nominal(nominal: &mut Nominal, job: &Job) -> f64 {
+    job.wanted.map_or(0.0, |wanted| (nominal.place(&job.home).translation - wanted.pose.translation).norm())
+}
+
+/// A about z, then B about the new y, then C about the new x (rad): KUKA's A, B, C.
+pub fn turns(a: f64, b: f64, c: f64) -> Matrix3<f64> {
+    Rotation3::from_euler_angles(c, b, a).into_inner()
 }
