@@ -2,6 +2,7 @@
 
 mod arms;
 mod bucket;
+mod check;
 mod cmd;
 mod compensate;
 mod conceal;
