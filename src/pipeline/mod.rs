@@ -4,6 +4,7 @@ mod desk;
 mod execute;
 mod identity;
 mod lock;
+mod look;
 mod manifest;
 mod overrides;
 pub mod plan;
@@ -18,6 +19,7 @@ mod spec;
 mod tests;
 mod wiring;
 
+pub use look::look;
 pub use manifest::{Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool};
 pub use overrides::Override;
 pub use plan::Plan;

@@ -1,7 +1,6 @@
 //! `check` reads what it reports on: the robot file, the headers of the data files, and the marks that `init` left.
 
 use crate::compensate::calib;
-use std::path::Path;
 
 const ROBOT: &str = "calib_robot: 1
 name: arm
@@ -37,8 +36,9 @@ stages:
 /// Exit code, stdout and stderr of `check` with these files.
 fn checked(robot: &str, pipeline: &str, arm: &str, points: &str) -> (i32, String, String) {
     let folder = tempfile::tempdir().expect("a folder");
-    let write = |name: &str, text: &str| std::fs::write(Path::join(folder.path(), name), text).expect("a file");
-    [("robot.yaml", robot), ("pipeline.yaml", pipeline), ("arm.csv", arm), ("points.csv", points)].map(|(a, b)| write(a, b));
+    for (name, text) in [("robot.yaml", robot), ("pipeline.yaml", pipeline), ("arm.csv", arm), ("points.csv", points)] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
     let output = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(!folder.path().join(".calib").exists(), "check writes nothing");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
@@ -69,7 +69,8 @@ fn a_broken_robot_file_is_a_fault_with_its_place() {
 fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q3\n", "name,x,y,z_mm\n");
     assert_eq!(code, 10, "{err}");
-    for part in ["arm.csv:1: no column `q2`", "did you mean `q1`", "points.csv:1: no column `id`", "points.csv:1: no column `z`"] {
+    for part in ["arm.csv:1: no column `q2`", "did you mean `q1`", "points.csv:1: no column `id`", "points.csv:1: no column `z`"]
+    {
         assert!(err.contains(part), "{part} in {err}");
     }
     let (code, _, err) = checked(&ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool"), PIPELINE, ARM, "id,x,y,Z\n");

@@ -22,10 +22,7 @@ fn a_point_is_its_target_and_the_difference_from_it() {
         assert!((found - expected).abs() < 1e-15, "{found} for {expected}");
     }
     let details: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.as_str()).collect();
-    assert_eq!(
-        details,
-        ["xd is blank", "xd: `ten` is not a number", "xt - xd: `1000` - `4e5`; allowed: -200000 to 200000 mm"]
-    );
+    assert_eq!(details, ["xd is blank", "xd: `ten` is not a number", "xt - xd: `1000` - `4e5`; allowed: -200000 to 200000 mm"]);
     let missing = Desk::default().with("a.csv", "q1,q2,xt,yt,zt,xdif,yd,zd\n");
     let message = refusal(&missing, DIFFERENCES, robot("rr", 1.0));
     assert!(message.starts_with("a.csv:1: no column `xd`, mapped to `x`; did you mean `xdif`?"), "{message}");
@@ -52,7 +49,10 @@ fn a_difference_goes_with_a_column_of_lengths() {
 
 #[test]
 fn a_header_inside_a_comment_names_the_columns() {
-    let yaml = TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: whitespace\n    comment: \"//\"\n    header_in_comment: true\n    skip: 1\n");
+    let yaml = TWO.replace(
+        "  - file: a.csv\n",
+        "  - file: a.csv\n    delimiter: whitespace\n    comment: \"//\"\n    header_in_comment: true\n    skip: 1\n",
+    );
     let text = "// made by a program\n// id q1 q2   x y z\nA 1 2 3 4 5\n// a comment\nB 2 3 4 5 6\n";
     let taken = take(&Desk::default().with("a.csv", text), &yaml, robot("rr", 1.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["A", "B"]);
@@ -73,5 +73,8 @@ fn texts_that_are_not_utf_8_are_windows_1252() {
     file.extend(b"no\x81ne,1,2,3,4,5\n");
     let taken = take(&Desk::default().with("a.csv", file), &yaml, robot("rr", 1.0)).unwrap();
     let rejected = &taken.rejected.0[0];
-    assert_eq!((rejected.reason.as_str(), rejected.detail.as_str()), ("not_text", "point_id is neither UTF-8 nor Windows-1252 text"));
+    assert_eq!(
+        (rejected.reason.as_str(), rejected.detail.as_str()),
+        ("not_text", "point_id is neither UTF-8 nor Windows-1252 text")
+    );
 }

@@ -191,7 +191,9 @@ fn of_rows_that_are_copies_of_each_other_one_is_used() {
         let lines = taken.rejected.0.iter().map(|row| (row.line, row.reason.clone(), row.detail.clone())).collect::<Vec<_>>();
         (taken.recording.sequence, lines)
     };
-    let copy = |line: i64, other: i64| (line, "duplicate_row".to_string(), format!("a copy of line {other}: the same id, the same values"));
+    let copy = |line: i64, other: i64| {
+        (line, "duplicate_row".to_string(), format!("a copy of line {other}: the same id, the same values"))
+    };
     let twin = |line: i64, other: i64| (line, "duplicate_id".to_string(), format!("point id `C` also stands on line {other}"));
     assert_eq!(used("reject"), (vec![1, 2], vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)]));
     assert_eq!(used("first"), (vec![1, 2, 4], vec![copy(4, 2), twin(6, 5), copy(7, 5)]));

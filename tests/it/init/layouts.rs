@@ -229,7 +229,7 @@ fn a_target_with_its_difference_is_never_the_measured_point() {
     made.has(&["x: {column: \"x_t\", minus: \"x_dif\", unit: mm}   # CHECK", "z: {column: \"z_t\", minus: \"z_dif\", unit: mm}"]);
     made.has(&["q: {column: \"joint_{j}\", unit: deg}"]).runs(30);
     let plain = one(table("x,y,z,dx,dy,dz,q1,q2,q3,q4,q5,q6", |k| format!("{},0.1,0.2,0.3,{}", point(k, ","), joints(k, ","))));
-    plain.has(&["x: {column: \"x\", unit: mm}   # CHECK"]).says(&["# x: {column: \"x\", minus: \"dx\", unit: mm}"]).runs(30);
+    plain.has(&["x: {column: \"x\", unit: mm}   # CHECK"]).says(&["# x: {column: \"x\", plus: \"dx\", unit: mm}"]).runs(30);
 }
 
 #[test]
@@ -308,18 +308,22 @@ fn units_in_a_row_of_their_own_and_micrometres_in_latin_1_are_read() {
         format!("P{k},{},{metres}", joints(k, ","))
     }));
     below.has(&["skip_below_header: 1", "q: {column: \"A{j}\", unit: deg}", "x: {column: \"X\", unit: m}"]).runs(30);
-    let micro = table("Point;A1 [\u{b0}];A2 [\u{b0}];A3 [\u{b0}];A4 [\u{b0}];A5 [\u{b0}];A6 [\u{b0}];X [\u{b5}m];Y [\u{b5}m];Z [\u{b5}m]", |k| {
-        let micrometres = cells(3, ";", |axis| format!("{:.1}", coordinate(k, axis) * 1e3));
-        format!("P{k};{};{micrometres}", joints(k, ";"))
-    });
+    let micro = table(
+        "Point;A1 [\u{b0}];A2 [\u{b0}];A3 [\u{b0}];A4 [\u{b0}];A5 [\u{b0}];A6 [\u{b0}];X [\u{b5}m];Y [\u{b5}m];Z [\u{b5}m]",
+        |k| {
+            let micrometres = cells(3, ";", |axis| format!("{:.1}", coordinate(k, axis) * 1e3));
+            format!("P{k};{};{micrometres}", joints(k, ";"))
+        },
+    );
     one(latin(&micro)).has(&["q: {column: \"A{j} [\u{b0}]\", unit: deg}", "x: {column: \"X [\u{b5}m]\", unit: um}"]).runs(30);
 }
 
 #[test]
 fn french_and_spanish_headers_are_read() {
-    let french = table("Nom;Axe1 (deg);Axe2 (deg);Axe3 (deg);Axe4 (deg);Axe5 (deg);Axe6 (deg);Charge utile (kg);Temp\u{e9}rature (\u{b0}C);Temps (s);X mesur\u{e9};Y mesur\u{e9};Z mesur\u{e9}", |k| {
-        comma(&format!("P{k};{};10.5;20.1;{k};{}", joints(k, ";"), point(k, ";")))
-    });
+    let french = table(
+        "Nom;Axe1 (deg);Axe2 (deg);Axe3 (deg);Axe4 (deg);Axe5 (deg);Axe6 (deg);Charge utile (kg);Temp\u{e9}rature (\u{b0}C);Temps (s);X mesur\u{e9};Y mesur\u{e9};Z mesur\u{e9}",
+        |k| comma(&format!("P{k};{};10.5;20.1;{k};{}", joints(k, ";"), point(k, ";"))),
+    );
     one(latin(&french))
         .has(&[
             "point_id: {column: \"Nom\"}",
