@@ -67,10 +67,14 @@ fn a_broken_robot_file_is_a_fault_with_its_place() {
 
 #[test]
 fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
-    let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q3\n", "name,x,y,z_mm\n");
+    let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q_2\n", "ids,x,y,z_mm\n");
     assert_eq!(code, 10, "{err}");
-    for part in ["arm.csv:1: no column `q2`", "did you mean `q1`", "points.csv:1: no column `id`", "points.csv:1: no column `z`"]
-    {
+    for part in [
+        "arm.csv:1: no column `q2`",
+        "did you mean `q_2`",
+        "points.csv:1: no column `id`, mapped to `point_id`; did you mean `ids`?",
+        "points.csv:1: no column `z`",
+    ] {
         assert!(err.contains(part), "{part} in {err}");
     }
     let (code, _, err) = checked(&ROBOT.replace("[0, 0, 400]}\ntool", "[0, 0]}\ntool"), PIPELINE, ARM, "id,x,y,Z\n");

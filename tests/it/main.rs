@@ -5,6 +5,7 @@ mod bucket;
 mod check;
 mod cmd;
 mod compensate;
+mod computed;
 mod conceal;
 mod desk;
 mod diagnose;

@@ -33,7 +33,9 @@ impl Name {
     /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
     pub fn is(&self, listed: &[&str]) -> bool {
         let listed = |text: &str| listed.contains(&text);
-        listed(&self.stem()) || [self.words.first(), self.words.last()].into_iter().flatten().any(|word| listed(word))
+        // A letter alone says little beside other words: `x_t` is no time.
+        let mut ends = [self.words.first(), self.words.last()].into_iter().flatten().filter(|word| word.len() > 1);
+        listed(&self.stem()) || ends.any(|word| listed(word))
     }
 
     /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.

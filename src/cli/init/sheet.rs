@@ -11,6 +11,9 @@ use std::path::Path;
 const LOOKED: u64 = 16 << 20;
 const LINES: usize = 20_000;
 
+/// So many lines say what separates fields.
+const ENOUGH: usize = 500;
+
 /// How comments begin.
 const COMMENTS: [&str; 4] = ["//", "#", "%", "!"];
 
@@ -195,7 +198,7 @@ fn comment(lines: &[String]) -> Option<&'static str> {
 /// What separates fields: what makes most lines rows of one width with most numbers in them.
 fn delimiter(content: &[Content]) -> char {
     let worth = |delimiter: char| {
-        let rows: Vec<Vec<String>> = content.iter().map(|line| cells(line.text, delimiter)).collect();
+        let rows: Vec<Vec<String>> = content.iter().take(ENOUGH).map(|line| cells(line.text, delimiter)).collect();
         let mut widths = std::collections::BTreeMap::new();
         rows.iter().for_each(|row| *widths.entry(row.len()).or_insert(0) += 1);
         let usual = widths.into_iter().filter(|(width, _)| *width >= NARROWEST).max_by_key(|(_, rows)| *rows);

@@ -284,7 +284,7 @@ pub enum Join {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Duplicates {
-    /// None is used: nobody can say which is right.
+    /// None is used, since nobody can say which is right; of rows that are copies of each other the first.
     #[default]
     Reject,
     /// The first usable one is used.

@@ -99,17 +99,22 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: u
         return None;
     }
     let twins = fate.twins.len() as u64;
+    let copies = fate.twins.values().filter(|twin| twin.copied).count() as u64;
     let unmatched = scan.used() - accepted - twins;
     // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
     let partner = scans.iter().enumerate().filter(|(other, _)| *other != index && (index == 0 || *other == 0));
     let partner = partner.map(|(_, other)| other).min_by_key(|other| other.used());
     let cut = partner.filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
     let mut counts = scan.tally.clone();
-    let first_twin = fate.twins.values().map(|twin| u64::from(twin.line)).min().unwrap_or_default();
+    let first = |copied: bool| {
+        let of_kind = fate.twins.values().filter(|twin| twin.copied == copied);
+        of_kind.map(|twin| u64::from(twin.line)).min().unwrap_or_default()
+    };
     let lonely =
         partner.map_or_else(|| "no partner in another file".to_string(), |other| format!("no partner in {}", other.label));
     for (reason, rows, first_line, detail) in [
-        (Reason::DuplicateId, twins, first_twin, "point ids that occur more than once".to_string()),
+        (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
+        (Reason::DuplicateRow, copies, first(true), "rows that are there once more".to_string()),
         (Reason::Unmatched, unmatched, 0, lonely),
     ] {
         if rows > 0 {

@@ -23,9 +23,9 @@ fn a_point_is_its_target_and_the_difference_from_it() {
     }
     let details: Vec<&str> = taken.rejected.0.iter().map(|row| row.detail.as_str()).collect();
     assert_eq!(details, ["xd is blank", "xd: `ten` is not a number", "xt - xd: `1000` - `4e5`; allowed: -200000 to 200000 mm"]);
-    let missing = Desk::default().with("a.csv", "q1,q2,xt,yt,zt,xdif,yd,zd\n");
+    let missing = Desk::default().with("a.csv", "q1,q2,xt,yt,zt,xdd,yd,zd\n");
     let message = refusal(&missing, DIFFERENCES, robot("rr", 1.0));
-    assert!(message.starts_with("a.csv:1: no column `xd`, mapped to `x`; did you mean `xdif`?"), "{message}");
+    assert!(message.starts_with("a.csv:1: no column `xd`, mapped to `x`; did you mean `xdd`?"), "{message}");
 }
 
 #[test]
