@@ -5,6 +5,7 @@ mod execute;
 mod history;
 mod identity;
 mod lock;
+mod look;
 mod manifest;
 mod overrides;
 pub mod plan;
@@ -20,6 +21,7 @@ mod tests;
 mod wiring;
 
 pub use history::find_run;
+pub use look::look;
 pub use manifest::{Host, Manifest, OutputRecord, Purpose, RunStatus, StageReport, StageStatus, Surroundings, Tool};
 pub use overrides::Override;
 pub use plan::Plan;

@@ -1,7 +1,7 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
 use crate::error::{Error, Result};
-use crate::stage::{Context, Labelled, Stage, reads, writes};
+use crate::stage::{Context, Labelled, Stage, computed, reads, writes};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
@@ -65,6 +65,7 @@ impl Stage for Validate {
             ));
         }
         let mut statistics = Statistics::default();
+        let mut suspicion = None;
         for (order, step) in (0..).zip(&reads.prediction) {
             let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
             let value =
@@ -77,6 +78,9 @@ impl Stage for Validate {
                 (1.0 + free / (values - free - 1.0).max(1.0)).sqrt()
             });
             for ((name, set, held_out), rows) in groups(step)? {
+                let whole = rows.iter().filter(|row| held_out && row.measured.is_none() && !row.suspect);
+                let suspected = computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
+                suspicion = suspicion.or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
                 let row = describe(order, name, &set, held_out, &rows);
                 let row = StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row };
                 statistics.0.push(cross_validated(row, &rows, inflation));
@@ -104,6 +108,7 @@ impl Stage for Validate {
                 row.reference_max_mm = reference.max_mm;
             }
         }
+        suspicion.into_iter().for_each(|line| context.services.warn(line));
         if !statistics.0.iter().any(|row| row.held_out) {
             context.services.warn("no held-out rows: only the training error can be stated, and it flatters".into());
         }

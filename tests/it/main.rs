@@ -11,9 +11,11 @@
 mod alone;
 mod arms;
 mod bucket;
+mod check;
 mod circles;
 mod cmd;
 mod compensate;
+mod computed;
 mod conceal;
 mod desk;
 mod diagnose;
