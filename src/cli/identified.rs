@@ -1,6 +1,7 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::means::Means;
+use super::standing::{Candidate, stands};
 use crate::compensate::{Arm, Coverage, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result, nearest};
@@ -13,12 +14,13 @@ use crate::robot::{Instrument, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::FrameBuilder;
 use crate::store::{Store, TableRef};
-use crate::table::{Network, Parameters, Recording, Robot, Table, standing};
+use crate::table::{Network, Parameters, Prediction, Recording, Robot, Standing, Table};
 use clap::Args;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde::Deserialize;
 use std::ffi::OsString;
 use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Where the model comes from.
@@ -28,7 +30,8 @@ pub(super) struct ModelArguments {
     /// table `parameters` (Parquet)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some]
+    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some; before one that is worse on
+    /// held-out points, the one that it is worse than]
     #[arg(long, value_name = "STAGE")]
     step: Option<String>,
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
@@ -93,16 +96,14 @@ impl ModelArguments {
             let plan = self.means.plan(&self.model)?;
             let stages = &plan.stages;
             let writes = |at: usize, kind: &str| stages[at].outputs.iter().any(|port| port.kind == kind);
-            let steps = || (0..stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND));
-            let own = || steps().map(|at| (stages[at].id.as_str(), writes(at, Parameters::KIND)));
-            let diagnosed = stages.iter().rfind(|stage| stage.entry.name == Diagnose::NAME && self.step.is_none());
-            let stands = diagnosed.and_then(|stage| standing(own(), &stage.id));
-            let last = steps().rfind(|at| stands.is_none_or(|id| stages[*at].id == id));
-            let Some(last) = last else {
+            // Which one stands is known once all have predicted.
+            let steps: Vec<usize> =
+                (0..stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
+            if steps.is_empty() {
                 let message = "identifies nothing; put a stage `identify` after the split";
                 return Err(Error::spec(self.model.display().to_string(), message));
-            };
-            let plan = plan.needed_for(last);
+            }
+            let plan = plan.needed_for_all(&steps);
             let outcome = self.means.run(&plan, &store, Selection::default(), self.quiet, command_line)?;
             serde_json::to_value(&outcome.manifest).map_err(|error| Error::Bug(error.to_string()))?
         } else {
@@ -139,6 +140,7 @@ impl ModelArguments {
         let with =
             |stage: &StageRecord| stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|o| o.table.clone());
         let found: Vec<(&StageRecord, TableRef)> = record.stages.iter().filter_map(|stage| Some((stage, with(stage)?))).collect();
+        let stands = if self.step.is_none() { standing_of(record, store)? } else { None };
         let chosen = match &self.step {
             Some(step) => found.iter().find(|(stage, _)| stage.id == *step).ok_or_else(|| {
                 let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
@@ -147,16 +149,23 @@ impl ModelArguments {
             })?,
             None => {
                 let diagnosed = found.iter().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
-                diagnosed.or(found.last()).ok_or_else(|| Error::spec(&record.run_id, "the run identified nothing"))?
+                let of_standing =
+                    stands.as_ref().and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model)).or(diagnosed);
+                of_standing.or(found.last()).ok_or_else(|| Error::spec(&record.run_id, "the run identified nothing"))?
             }
         };
         let (stage, table) = chosen;
+        let withdrawn: Vec<String> =
+            stands.iter().flat_map(|stands| &stands.withdrawn).map(|gone| format!("warning: {gone}\n")).collect();
+        let _ = std::io::stderr().write_all(withdrawn.concat().as_bytes());
         let robot = last(Robot::KIND).ok_or_else(|| Error::spec(&record.run_id, "the run has no table `robot`"))?;
         let robot = Robot::from_frame(&store.load(&robot.table)?)?.to_description()?;
         let parameters = Parameters::from_frame(&store.load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.
         let learned = record.stages.iter().rfind(|stage| {
-            stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
+            let is_withdrawn = stands.as_ref().is_some_and(|stands| stands.withdrawn.iter().any(|gone| gone.step == stage.id));
+            !is_withdrawn
+                && stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
                 && stage.outputs.iter().any(|output| output.kind == Network::KIND)
         });
         let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
@@ -179,6 +188,17 @@ impl ModelArguments {
         let parameters: Parameters = read_table(&self.model)?;
         identified(read_robot(robot)?, parameters, None, None, format!("table {}", self.model.display()))
     }
+}
+
+/// The step that stands for a run.
+fn standing_of(record: &Record, store: &Store) -> Result<Option<Standing>> {
+    let candidate = |stage| {
+        let StageRecord { id, uses, outputs, .. }: &StageRecord = stage;
+        let of = |kind: &str| outputs.iter().find(|output| output.kind == kind).map(|output| &output.table);
+        Some(Candidate { id, uses, parameters: of(Parameters::KIND), prediction: of(Prediction::KIND)? })
+    };
+    let candidates: Vec<Candidate> = record.stages.iter().filter_map(candidate).collect();
+    stands(&candidates, store)
 }
 
 fn identified(

@@ -25,6 +25,7 @@ mod searches;
 mod shell;
 mod show;
 mod simulate;
+mod standing;
 mod surroundings;
 mod tables;
 mod tag;

@@ -64,6 +64,10 @@ pub struct Diagnosis {
     pub held_out: bool,
     /// Strongest first.
     pub findings: Vec<Finding>,
+    /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
+    pub withdrawn: Vec<String>,
+    /// Whether the recording has a clock; else times in the model count rows from 0.
+    pub clock: bool,
     pub screening: Screening,
     /// What these data cannot show, a sentence each.
     pub not_observable: Vec<String>,
@@ -96,6 +100,8 @@ pub(crate) struct Looked<'a, 'b> {
     pub first: f64,
     pub last: f64,
     pub worths: Vec<Worth>,
+    /// What was found and taken back, a sentence each.
+    pub withdrawn: Vec<String>,
     /// Where the residual of the base model sits.
     pub located: Located,
     pub survey: &'b Survey<'a>,
@@ -193,6 +199,8 @@ pub(crate) fn conclude(
         after: Errors::of(data, &predicted, rows),
         held_out,
         findings,
+        withdrawn: looked.withdrawn,
+        clock: data.has_clock(),
         screening: last.screening.clone(),
         not_observable,
         signature,

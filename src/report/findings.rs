@@ -22,6 +22,8 @@ pub(super) struct Section {
     not_observable: Vec<String>,
     next: Vec<String>,
     signature: Option<String>,
+    /// Findings that were taken back.
+    withdrawn: Vec<String>,
     suspects: Vec<[String; 5]>,
 }
 
@@ -53,7 +55,7 @@ impl Section {
                 "explained" | "nothing_missing" => "better",
                 _ => "unknown",
             },
-            sentence: sentence(verdict),
+            sentence: sentence(verdict, tables),
             errors: vec![
                 errors(
                     "before: geometry, zeros and ratios identified",
@@ -78,6 +80,7 @@ impl Section {
             not_observable: lines(&verdict.not_observable),
             next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
             signature: verdict.signature.clone(),
+            withdrawn: verdict.withdrawn.as_deref().map(lines).unwrap_or_default(),
             suspects: suspects
                 .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
                 .collect(),
@@ -85,11 +88,16 @@ impl Section {
     }
 }
 
-fn sentence(verdict: &VerdictRow) -> String {
-    match verdict.verdict.as_str() {
-        "explained" => "What was found brings the error of held-out points down to the noise.".into(),
-        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.".into(),
-        _ => "Something is left that the findings do not explain.".into(),
+fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
+    let said = match verdict.verdict.as_str() {
+        "explained" => "What was found brings the error of held-out points down to the noise.",
+        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.",
+        "not_asked" => "Too few rows were fitted to ask what the simulation lacks.",
+        _ => "Something is left that the findings do not explain.",
+    };
+    match tables.withdrawn.iter().find(|gone| gone.step == verdict.step) {
+        Some(gone) => format!("This model does not stand for the run: {gone}. {said}"),
+        None => said.into(),
     }
 }
 
