@@ -30,8 +30,8 @@ pub(super) struct ModelArguments {
     /// table `parameters` (Parquet)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some; before one that is worse on
-    /// held-out points, the one that it is worse than]
+    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some; the one before it where
+    /// held-out points are worse after it]
     #[arg(long, value_name = "STAGE")]
     step: Option<String>,
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)

@@ -20,6 +20,7 @@ mod sense;
 mod separate;
 mod state;
 mod statement;
+mod unasked;
 mod unseen;
 mod verdict;
 mod withdraw;
@@ -101,10 +102,13 @@ struct Chosen {
     known: Vec<Prior>,
 }
 
-/// Diagnoses a recording. `tell` hears what is going on.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` hears what is going on.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     let robot = question.robot;
     let mut data = question.data.clone();
+    if question.fit.len() < unasked::FEWEST {
+        return unasked::not_asked(question);
+    }
     let base = base_model(robot, &data, question.fit);
     let rigid = base.stack.effects().count();
     let mut now = fitted((&base, rigid), None, &[], &data, question);

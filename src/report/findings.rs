@@ -65,17 +65,7 @@ impl Section {
                 ),
                 errors("after: with the findings", verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
             ],
-            facts: vec![
-                ("noise of one point, rms", format!("{} mm", mm(verdict.noise_floor_mm))),
-                ("left over at fitted rows, rms", format!("{} mm", mm(verdict.leftover_rms_mm))),
-                ("chance that what is left is noise", significant(verdict.p_after, 2)),
-                ("chance that what the simulation leaves is noise", significant(verdict.p_before, 2)),
-                (
-                    "repeatability of the joints",
-                    format!("{} arcsec", significant(Unit::Arcsecond.from_si(verdict.repeatability_rad), 2)),
-                ),
-                ("rows fitted", count(verdict.points)),
-            ],
+            facts: facts(verdict),
             findings: tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect(),
             not_observable: lines(&verdict.not_observable),
             next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
@@ -86,6 +76,19 @@ impl Section {
                 .collect(),
         })
     }
+}
+
+fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
+    let repeatability = Unit::Arcsecond.from_si(verdict.repeatability_rad);
+    let facts = [
+        ("noise of one point, rms", Some(format!("{} mm", mm(verdict.noise_floor_mm)))),
+        ("left over at fitted rows, rms", Some(format!("{} mm", mm(verdict.leftover_rms_mm)))),
+        ("chance that what is left is noise", verdict.p_after.map(|p| significant(p, 2))),
+        ("chance that what the simulation leaves is noise", verdict.p_before.map(|p| significant(p, 2))),
+        ("repeatability of the joints", verdict.p_after.map(|_| format!("{} arcsec", significant(repeatability, 2)))),
+        ("rows fitted", Some(count(verdict.points))),
+    ];
+    facts.into_iter().filter_map(|(name, figure)| Some((name, figure?))).collect()
 }
 
 fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {

@@ -20,9 +20,9 @@ crate::table::rows! { "verdict",
         leftover_rms_mm: f64,
         /// Squared whitened residual per degree of freedom.
         chi_square: f64,
-        /// Probability that what the base model leaves, and what is left in the end, is noise.
-        p_before: f64,
-        p_after: f64,
+        /// Probability that what the base model leaves, and what is left in the end, is noise; null where it was not asked.
+        p_before: Option<f64>,
+        p_after: Option<f64>,
         /// Standard deviation of every joint from move to move.
         repeatability_rad: f64,
         /// Immediate repeats of a pose that it rests on.
