@@ -1,7 +1,7 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
-use crate::error::Result;
 use super::standing::{Candidate, stands};
+use crate::error::Result;
 use crate::pipeline::{Outcome, OutputRecord, StageReport};
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;

@@ -1,8 +1,8 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::Course;
-use super::judge::Worth;
 use super::group::{groups, ranges};
+use super::judge::Worth;
 use super::pool::Pool;
 use super::rivals::{exact, rivals};
 use super::state::solve;
@@ -79,9 +79,8 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     if let Some(offset) = last.screening.apart {
         let rows = counted(offset.unsigned_abs() as usize, "row");
         let how = if offset < 0 { "before" } else { "behind" };
-        let text = format!(
-            "the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then"
-        );
+        let text =
+            format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
         return vec![of_the_recording("joint_log_lag", text)];
     }
     let pool = looked.pool;

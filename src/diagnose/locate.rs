@@ -52,7 +52,8 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
         let form = &pool.hypotheses[*h].form;
         let (gain, numbers) = state.gain(pool, *h);
         let share = gain / state.square.max(f64::MIN_POSITIVE);
-        let names = std::iter::once(("place", form.place().to_string())).chain(variables(form, clock).map(|name| ("variable", name)));
+        let names =
+            std::iter::once(("place", form.place().to_string())).chain(variables(form, clock).map(|name| ("variable", name)));
         for (by, name) in names {
             // Falls come largest first: the first one stands.
             best.entry((by, name.clone())).or_insert(Share {

@@ -120,11 +120,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         now = fitted((&base, rigid), Some(&free), &[], &data, question);
     }
     let before = now.model.predict(&data);
-    tell(format!(
-        "{}, {} of the base model estimated",
-        counted(now.screening.kept.len(), "row"),
-        counted(free.len(), "number")
-    ));
+    tell(format!("{}, {} of the base model estimated", counted(now.screening.kept.len(), "row"), counted(free.len(), "number")));
     let mut asked_residual = false;
     let mut first = None;
     let mut located = None;
@@ -190,7 +186,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             let rest = if set == found.set { found.last } else { search.gate(&set) };
             let first = first.unwrap_or(1.0);
             let located = located.unwrap_or_default();
-            let looked = verdict::Looked { pool: search.pool, set, first, last: rest, survey: &survey, worths, withdrawn, located };
+            let looked =
+                verdict::Looked { pool: search.pool, set, first, last: rest, survey: &survey, worths, withdrawn, located };
             return verdict::conclude(question, &data, &before, &last, repeatability, looked);
         }
         drop(pool);

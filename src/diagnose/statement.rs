@@ -20,7 +20,8 @@ pub(crate) fn sentence(told: &Told) -> String {
     let Told { effect, place, forms, numbers, rms, clock } = *told;
     let first = numbers.first();
     let value = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit));
-    let arcsec = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit));
+    let arcsec =
+        |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit));
     let text = match effect {
         "joint_compliance" => format!("{place} winds up under its load by {}", value(first)),
         "joint_hardening" => {
@@ -157,7 +158,9 @@ fn goes_with(unknown: &Unknown, clock: Clock) -> String {
     match (unknown.signature(), clock) {
         (Signature::Sway { period_s, .. }, _) => format!("{} with a period of {}", unknown.signature(), clock.span(period_s)),
         (Signature::Time { .. }, Clock::Rows) => "function of the row".into(),
-        (Signature::Creep { .. }, Clock::Rows) => unknown.signature().to_string().replace("with time", "over the recording's rows"),
+        (Signature::Creep { .. }, Clock::Rows) => {
+            unknown.signature().to_string().replace("with time", "over the recording's rows")
+        }
         (signature, _) => signature.to_string(),
     }
 }
@@ -255,7 +258,9 @@ fn masses(survey: &Survey) -> Option<String> {
         some => {
             let (own, all) = (all.len() - some, all.len());
             let bare = bare.join(", ");
-            Some(format!("gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"))
+            Some(format!(
+                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+            ))
         }
     }
 }

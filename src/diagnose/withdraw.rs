@@ -21,12 +21,7 @@ pub(crate) struct Court<'a, 'b> {
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the chosen causes' positions in the pool
 /// in their order, `worths` what held-out rows say of them.
-pub(crate) fn withdraw(
-    mut now: Course,
-    set: &mut Vec<usize>,
-    worths: &mut Vec<Worth>,
-    court: &Court,
-) -> (Course, Vec<String>) {
+pub(crate) fn withdraw(mut now: Course, set: &mut Vec<usize>, worths: &mut Vec<Worth>, court: &Court) -> (Course, Vec<String>) {
     let mut said = Vec::new();
     if now.screening.apart.is_some() {
         return (now, said);
@@ -101,4 +96,123 @@ fn without(now: &Course, members: &[usize], court: &Court) -> Course {
     let all = start_of(now).into_iter().enumerate();
     let rest: Vec<Chosen> = all.filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause).collect();
     (court.refit)(now, &rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lens::Lens;
+    use super::super::{base_model, fitted, pool_of};
+    use super::*;
+    use crate::effect::{EffectStack, Form, GearCyclic};
+    use crate::estimate::Model;
+    use crate::robot::import::{Text, read_calib};
+    use crate::robot::{Measurements, RobotModel};
+    use crate::spatial::Pose;
+    use nalgebra::Vector3;
+
+    const ROBOT: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+    - {axis: [0, 1, 0], point: [0, 0, 900]}
+    - {axis: [1, 0, 0], point: [500, 0, 900]}
+    - {axis: [0, 1, 0], point: [700, 0, 900]}
+    - {axis: [1, 0, 0], point: [700, 0, 900]}
+tool: {point: [830, 140, 930]}
+joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
+";
+    const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+    const ROWS: usize = 200;
+    const FITTED: usize = 140;
+
+    /// Numbers in [0, 1) without a pattern that a model could follow.
+    fn dice(k: usize) -> f64 {
+        (k as f64 * 0.618_033_988_749_895 + (k as f64 * 0.317).sin() * 41.7).rem_euclid(1.0)
+    }
+
+    /// Poses of which gears make points: order 2 of joint 2 by 60 arcsec everywhere, order 3 of joint 4 in fitted rows by `passing`.
+    fn recorded(robot: &RobotModel, passing: f64) -> Measurements {
+        let forms = [GearCyclic::new(1, 2), GearCyclic::new(3, 3)];
+        let effects = forms.into_iter().map(|gear| Box::new(Form::from(gear)) as _).collect();
+        let mut truth = Model::nominal(robot.clone(), EffectStack::new(robot, Pose::identity(), effects));
+        let mut data = Measurements {
+            joints: 6,
+            q: (0..6 * ROWS).map(|k| 3.0 * dice(k + 7) - 1.5).collect(),
+            position: vec![Vector3::zeros(); ROWS],
+            sigma: vec![Vector3::repeat(2e-5); ROWS],
+            payload: (0..ROWS).map(|row| if row % 7 < 3 { 10.0 } else { 0.0 }).collect(),
+            ..Measurements::default()
+        };
+        let predicted = |x: [f64; 4], truth: &mut Model| {
+            truth.x = x.map(|size| size * ARCSEC).to_vec();
+            truth.predict(&data)
+        };
+        let (seen, held) = (predicted([60.0, 0.0, passing, 0.0], &mut truth), predicted([60.0, 0.0, 0.0, 0.0], &mut truth));
+        let noise = |row: usize| Vector3::from_fn(|axis, _| 7e-5 * (dice(3 * row + axis + 5000) - 0.5));
+        data.position = (0..ROWS).map(|row| if row < FITTED { seen[row] } else { held[row] } + noise(row)).collect();
+        data
+    }
+
+    /// What stays of the chosen causes, and what is said of the others.
+    fn left(passing: f64, keys: &[&str]) -> (Vec<String>, Vec<String>) {
+        let text = Text { label: "robot.yaml", text: ROBOT };
+        let robot = RobotModel::new(read_calib(text, None).expect("a robot").robot);
+        let data = recorded(&robot, passing);
+        let rows: Vec<usize> = (0..ROWS).collect();
+        let (fit, validate) = rows.split_at(FITTED);
+        let question = Question { robot: &robot, data: &data, fit, validate, set: &[0; ROWS], seed: 1 };
+        let base = base_model(&robot, &data, fit);
+        let rigid = base.stack.effects().count();
+        let now = fitted((&base, rigid), None, &[], &data, &question);
+        let free: Vec<usize> = (0..now.fitted.fates.len()).filter(|k| matches!(now.fitted.fates[*k], Fate::Free(_))).collect();
+        let lens = Lens::new(&now.model, &data, fit, false);
+        // So that a payload is proposed at all.
+        let (torque, yielding) = (lens.torques(), vec![1e-6; 6]);
+        let survey = Survey::new(&robot, &data, fit, &torque, &yielding);
+        let pool = pool_of(&lens, &now, &free, &survey);
+        let at = |key: &&str| pool.keys.iter().position(|other| other == key).unwrap_or_else(|| panic!("{key}: {:?}", pool.keys));
+        let mut set: Vec<usize> = keys.iter().map(at).collect();
+        let chosen: Vec<Chosen> = (set.iter())
+            .map(|k| {
+                let form = pool.hypotheses[*k].form.clone();
+                Chosen { coefficients: vec![0.0; form.parameters(&robot).len()], form, known: Vec::new() }
+            })
+            .collect();
+        let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(&free), chosen, &data, &question);
+        let court = Court { pool: &pool, survey: &survey, data: &data, question: &question, refit: &refit };
+        let (last, said) = withdraw(refit(&now, &chosen), &mut set, &mut Vec::new(), &court);
+        let kept: Vec<String> = set.iter().map(|k| pool.keys[*k].clone()).collect();
+        let in_model: Vec<String> = last.model.stack.effects().filter_map(|(effect, _)| effect.form()).map(Form::key).collect();
+        assert_eq!(kept, in_model);
+        (kept, said)
+    }
+
+    const TRUE: &str = "gear_cyclic@joint 2#order2";
+    const PASSING: &str = "gear_cyclic@joint 4#order3";
+    const PAYLOAD: &str = "payload_error@tool#";
+
+    #[test]
+    fn what_the_data_do_not_tell_from_the_rest_is_taken_back() {
+        // Without a joint that yields a payload moves nothing.
+        let (kept, said) = left(0.0, &[TRUE, PAYLOAD]);
+        assert_eq!(kept, [TRUE]);
+        assert_eq!(said, ["payload_error at tool: these data do not tell it from the rest of the model"]);
+    }
+
+    #[test]
+    fn what_makes_held_out_rows_worse_is_taken_back() {
+        let (kept, said) = left(90.0, &[TRUE, PASSING]);
+        assert_eq!(
+            (kept, said),
+            (vec![TRUE.to_string()], vec!["gear_cyclic at joint 4: held-out points are better without it".to_string()])
+        );
+    }
+
+    #[test]
+    fn what_is_there_stays() {
+        assert_eq!(left(0.0, &[TRUE]), (vec![TRUE.to_string()], Vec::new()));
+    }
 }

@@ -43,8 +43,7 @@ impl Covariance {
             parameters.iter().map(|parameter| self.free.iter().position(|free| free == parameter)).collect();
         let rows = rows?;
         let sigma: Vec<f64> = rows.iter().map(|row| self.sigma(*row)).collect();
-        let correlation =
-            DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b]) / (sigma[a] * sigma[b]));
+        let correlation = DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b]) / (sigma[a] * sigma[b]));
         let scaled = DVector::from_iterator(rows.len(), values.iter().zip(&sigma).map(|(value, sigma)| value / sigma));
         Some(scaled.dot(&correlation.cholesky()?.solve(&scaled)))
     }

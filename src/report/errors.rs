@@ -278,10 +278,7 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
             ("rms", mm(after.rms_mm)),
             ("rms of measurement noise alone", mm(after.noise_rms_mm)),
         ],
-        others: (withdrawn.iter().map(|gone| format!("{gone}.")))
-            .chain(uneven)
-            .chain(last.iter().skip(1).map(other))
-            .collect(),
+        others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
     }
 }
 

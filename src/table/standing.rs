@@ -160,7 +160,10 @@ mod tests {
         let [gone] = found.withdrawn.as_slice() else { panic!("{:?}", found.withdrawn) };
         assert_eq!((gone.step.as_str(), gone.than.as_str(), gone.points), ("diagnose", "geometry", 40));
         // Of errors m (1, 1.1, 1.2) in turn, 14, 13 and 13 of them, the mean square is 1.21125 m2.
-        assert!((gone.rms_mm - 0.498 * 1.21125f64.sqrt()).abs() < 1e-9 && (gone.than_rms_mm / gone.rms_mm - 0.232 / 0.498).abs() < 1e-9);
+        assert!(
+            (gone.rms_mm - 0.498 * 1.21125f64.sqrt()).abs() < 1e-9
+                && (gone.than_rms_mm / gone.rms_mm - 0.232 / 0.498).abs() < 1e-9
+        );
         // What was learned on it and is no worse stands all the same.
         let mended = steps(&[("geometry", true, 0.232, 0), ("diagnose", true, 0.498, 0), ("network", false, 0.2, 0)]);
         let found = standing(&mended, Some("diagnose")).expect("a step");
