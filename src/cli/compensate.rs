@@ -7,7 +7,7 @@ use crate::identified::Identified;
 use crate::pipeline::Purpose;
 use crate::program::{self, Language, Note, Partial, Program, Refusal};
 use crate::raw;
-use crate::robot::RobotModel;
+use crate::robot::{Measurements, RobotModel};
 use crate::targets::{Layout, Units, Unreached, parquet, text};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
@@ -69,7 +69,7 @@ pub(super) struct CompensateArguments {
     /// Temperature where the targets do not say, C [default: that at the start of the recording]
     #[arg(long, value_name = "C", allow_hyphen_values = true)]
     temperature: Option<f64>,
-    /// Time on the recording's clock, s [default: long after it: steps have happened, the arm is warm]
+    /// Time on the recording's clock, s, where it has one [default: long after it: steps have happened, the arm is warm]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Side from which all joints come to rest, 1 or -1 [default: by the order of the targets]
@@ -197,6 +197,10 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
         }
         None => None,
     };
+    let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
+    if arguments.time.is_some() && !clock {
+        return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
+    }
     Ok(Manner {
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == Orientation::Keep,
@@ -204,6 +208,7 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
         payload: arguments.payload,
         temperature: arguments.temperature,
         time: arguments.time,
+        clock,
         direction: arguments.direction,
         start,
     })

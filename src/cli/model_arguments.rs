@@ -2,7 +2,7 @@
 
 use super::means::{Means, Task};
 use crate::error::{Error, Result};
-use crate::identified::{Files, Identified, stage_of};
+use crate::identified::{Files, Identified, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
 use crate::store::Store;
 use clap::Args;
@@ -17,7 +17,8 @@ pub(super) struct ModelArguments {
     /// table `parameters` (Parquet)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some]
+    /// The stage whose parameters to take [default: the last `diagnose`, else the last that writes some; the one before it where
+    /// held-out points are worse after it]
     #[arg(long, value_name = "STAGE")]
     step: Option<String>,
     /// The robot, where MODEL is a table: calib's YAML, a practice robot.json, or a table `robot` (Parquet)
@@ -61,9 +62,9 @@ impl ModelArguments {
             return Identified::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step);
         }
         let plan = self.means.plan(&self.model)?;
-        let stage = stage_of(&plan, step)?;
+        let steps = steps_of(&plan)?;
         let task = Task { purpose, selection: Selection::default(), quiet: self.quiet };
-        let outcome = self.means.run(&plan.needed_for(stage), &store, task, command_line)?;
+        let outcome = self.means.run(&plan.needed_for_all(&steps), &store, task, command_line)?;
         Identified::of_run(&store, &outcome.manifest, step)
     }
 

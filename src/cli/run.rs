@@ -3,6 +3,7 @@
 use super::pipeline_arguments::PipelineArguments;
 use super::{corrections, emit, emit_json, searches, tables};
 use crate::error::{Result, counted};
+use crate::identified::standing_of;
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use clap::Args;
@@ -68,11 +69,12 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     if shared.json {
         return emit_json(&document(&outcome, &store)?);
     }
-    let mut text = tables::statistics(&outcome, &store)?;
+    let standing = standing_of(&outcome.manifest, &store)?;
+    let mut text = tables::statistics(&outcome, standing.as_ref(), &store)?;
     text.push_str(&corrections::corrections(&outcome, &store)?);
     text.push_str(&searches::searches(&outcome, &store)?);
     text.push_str(&tables::rejected(&outcome));
-    text.push_str(&tables::headline(&outcome, &store)?);
+    text.push_str(&tables::headline(&outcome, standing.as_ref(), &store)?);
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }
@@ -112,6 +114,12 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 /// The result of a run for other programs.
 fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
+    let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
+        let withdrawn = stands.withdrawn.iter().map(|gone| {
+            json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
+        });
+        json!({ "step": stands.step, "model": stands.model, "withdrawn": withdrawn.collect::<Vec<_>>() })
+    });
     let stages: Vec<serde_json::Value> = manifest
         .stages
         .iter()
@@ -135,6 +143,7 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "pipeline": manifest.pipeline.name,
         "seed": manifest.seed,
         "stages": stages,
+        "standing": standing,
         "statistics": tables::statistics_json(outcome, store)?,
         "corrections": corrections::corrections_json(outcome, store)?,
         "searches": searches::searches_json(outcome, store)?,

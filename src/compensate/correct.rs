@@ -44,6 +44,8 @@ pub struct Manner {
     pub payload: f64,
     pub temperature: Option<f64>,
     pub time: Option<f64>,
+    /// Whether the model knows times: one of a recording without a clock knows rows.
+    pub clock: bool,
     pub direction: Option<f64>,
     /// Where the first Cartesian target is searched from.
     pub start: Option<Vec<f64>>,
@@ -149,7 +151,7 @@ impl<'a> Corrector<'a> {
         let circumstance = Circumstance {
             payload: target.payload.unwrap_or(self.manner.payload),
             temperature: target.temperature.or(self.manner.temperature),
-            time: target.time.or(self.manner.time).unwrap_or(LONG_AFTER),
+            time: target.time.or(self.manner.time).filter(|_| self.manner.clock).unwrap_or(LONG_AFTER),
             direction: target.direction.or(fixed).unwrap_or_else(|| self.direction.clone()),
             current: target.current,
         };

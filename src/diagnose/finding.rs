@@ -1,16 +1,17 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::Course;
+use super::group::{groups, ranges};
 use super::judge::Worth;
 use super::pool::Pool;
 use super::rivals::{exact, rivals};
 use super::state::solve;
-use super::statement::sentence;
+use super::statement::{Told, sentence};
 use super::verdict::Looked;
-use crate::effect::{Effect, Form, ParameterSpec, Place, Placed, ReductionRatio, Signature};
+use super::words::{Clock, counted};
+use crate::effect::{Effect, Form, ParameterSpec, Place, Placed, ReductionRatio};
 use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
 use crate::units::Unit;
-use std::collections::BTreeMap;
 
 /// A number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,11 +77,10 @@ impl Finding {
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     if let Some(offset) = last.screening.apart {
-        let rows = offset.abs();
+        let rows = counted(offset.unsigned_abs() as usize, "row");
         let how = if offset < 0 { "before" } else { "behind" };
-        let text = format!(
-            "the joints of a point stand {rows} rows {how} it: join the two logs anew, nothing else can be said until then"
-        );
+        let text =
+            format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
         return vec![of_the_recording("joint_log_lag", text)];
     }
     let pool = looked.pool;
@@ -88,31 +88,10 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     let set = &looked.set;
     let mut sorted = set.clone();
     sorted.sort_unstable();
-    let ranges = last.model.stack.effects().count() - last.chosen.len();
-    let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
-    let mut groups: BTreeMap<(&'static str, String), Vec<usize>> = BTreeMap::new();
-    for (i, k) in set.iter().enumerate() {
-        let form = &pool.hypotheses[*k].form;
-        let values = &last.model.x[ranges[i].clone()];
-        let name = match form {
-            Form::JointTable(_) if is_wavy(values) => "gear_cyclic",
-            Form::JointHardening(law) if law.is_lost_motion(values, looked.survey.load(law.joint())) => "backlash",
-            Form::Unknown(unknown) if unknown.is_hose() => "cable_drag",
-            _ => form.name(),
-        };
-        groups.entry((name, form.place().to_string())).or_default().push(i);
-    }
-    refine(pool, &mut groups, set);
-    both_angles(pool, &mut groups, set);
-    wobbles(pool, &mut groups, set);
-    // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
-    let hard: Vec<String> = groups.keys().filter(|key| key.0 == "joint_hardening").map(|key| key.1.clone()).collect();
-    for place in hard {
-        if let Some(more) = groups.remove(&("joint_compliance", place.clone())) {
-            groups.entry(("joint_hardening", place)).or_default().extend(more);
-        }
-    }
+    let ranges = ranges(last);
+    let groups = groups(last, set, pool, looked.survey);
     let whole = solve(pool, &sorted);
+    let clock = Clock::of(looked.survey.data);
     let bic = pool.bic(&sorted);
     let mut out = Vec::new();
     for ((effect, place), members) in groups {
@@ -164,7 +143,8 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             Place::Joint(joint) => Some((joint, table.unwrap_or(looked.survey.range[joint]))),
             _ => None,
         };
-        let statement = sentence(effect, &place, &forms, &numbers, effect_rms);
+        let told = Told { effect, place: &place, forms: &forms, numbers: &numbers, rms: effect_rms, clock };
+        let statement = sentence(&told);
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
     let data = looked.survey.data;
@@ -189,99 +169,6 @@ fn worth_of(forms: &[Form], place: &str, worths: &[Worth]) -> Option<f64> {
     own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|worth| worth.gain)
 }
 
-/// Cosines of a curve up to this one make at most two periods over its range.
-const SMOOTH: usize = 4;
-
-/// Whether a curve has most of its variance in waves of more than two periods over its range: a gear or an encoder.
-fn is_wavy(coefficients: &[f64]) -> bool {
-    let square = |some: &[f64]| some.iter().map(|c| c * c).sum::<f64>();
-    2.0 * square(&coefficients[SMOOTH.min(coefficients.len())..]) > square(coefficients)
-}
-
-/// What else an effect's own shape may leave at the same joint where it is not quite that of the library.
-fn leaves(main: &str) -> &'static [&'static str] {
-    match main {
-        "counterbalance" | "cable_drag" => &["gear_cyclic", "unknown", "joint_table", "backlash"],
-        "joint_hardening" => &["backlash", "unknown"],
-        "joint_compliance" => &["unknown"],
-        "backlash" => &["joint_hardening", "joint_compliance", "unknown"],
-        "viscous_windup" => &["backlash", "gear_cyclic", "unknown"],
-        "gear_cyclic" | "joint_table" => &["unknown"],
-        "unknown" => &["gear_cyclic", "joint_table"],
-        _ => &[],
-    }
-}
-
-/// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
-fn refine(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
-    let mut sorted = set.to_vec();
-    sorted.sort_unstable();
-    let whole = solve(pool, &sorted).gain;
-    let gain = |members: &[usize]| {
-        let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
-        let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
-        whole - solve(pool, &rest).gain
-    };
-    let gains: BTreeMap<(&'static str, String), f64> = groups.iter().map(|(key, members)| (key.clone(), gain(members))).collect();
-    for (small, own) in &gains {
-        let main = gains
-            .iter()
-            .filter(|(main, gain)| {
-                let finer = main.1 == small.1 && *own < REFINEMENT * **gain && leaves(main.0).contains(&small.0);
-                // Both go with the side of the last move.
-                finer || (main.0 == "joint_log_lag" && small.0 == "backlash" && *own < TRACE * **gain)
-            })
-            .max_by(|a, b| a.1.total_cmp(b.1));
-        if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
-            let members = groups.remove(small).unwrap_or_default();
-            groups.entry(main.clone()).or_default().extend(members);
-        }
-    }
-}
-
-/// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
-fn both_angles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
-    let form = |i: &usize| &pool.hypotheses[set[*i]].form;
-    let main = groups.iter().find_map(|(key, members)| {
-        let angles =
-            members.iter().find_map(|i| if let Form::Unknown(unknown) = form(i) { unknown.two_angles() } else { None })?;
-        let Place::Joint(joint) = form(&members[0]).place() else { return None };
-        Some((key.clone(), joint, angles))
-    });
-    let Some((main, joint, angles)) = main else { return };
-    let is_part = |i: &usize| match form(i) {
-        Form::GearCyclic(gear) => gear.joint() == joint && angles.contains(&joint) && gear.order() <= SLOW,
-        other => matches!(other.place(), Place::Coupled(by, moved) if moved == joint && angles.contains(&by)),
-    };
-    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| key.clone()).collect();
-    for part in parts {
-        let members = groups.remove(&part).unwrap_or_default();
-        groups.entry(main.clone()).or_default().extend(members);
-    }
-}
-
-/// Orders that a smooth function of an angle may have, too.
-const SLOW: u32 = 2;
-
-/// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
-fn wobbles(pool: &Pool, groups: &mut BTreeMap<(&'static str, String), Vec<usize>>, set: &[usize]) {
-    let by = |i: &usize| match &pool.hypotheses[set[*i]].form {
-        Form::Unknown(unknown) => match unknown.signature() {
-            Signature::Periodic { by, .. } => Some(("axis_wobble", Place::Joint(by).to_string())),
-            _ => None,
-        },
-        _ => None,
-    };
-    let unknown: Vec<(&'static str, String)> = groups.keys().filter(|key| key.0 == "unknown").cloned().collect();
-    for key in unknown {
-        let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
-        if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {
-            let members = groups.remove(&key).unwrap_or_default();
-            groups.entry(wobble).or_default().extend(members);
-        }
-    }
-}
-
 /// Joints that turn the other way than the robot file says.
 fn reversals(last: &Course) -> Vec<Finding> {
     let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.fates);
@@ -301,10 +188,6 @@ fn reversals(last: &Course) -> Vec<Finding> {
 /// A reversed joint's ratio is -1 to this.
 const REVERSED_WITHIN: f64 = 0.1;
 
-/// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
-const REFINEMENT: f64 = 0.1;
-const TRACE: f64 = 0.05;
-
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     // What has no other explanation than that it is far out must be farther than this noise reaches.
@@ -316,21 +199,22 @@ fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
         let more = rows.len().saturating_sub(20);
-        format!("{}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+        let noun = if rows.len() == 1 { "row" } else { "rows" };
+        format!("{noun} {}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
     };
     let mut out = Vec::new();
     let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
     if !swapped.is_empty() {
-        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: rows {}", list(&swapped))));
+        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped))));
     }
     let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
     if !shifted.is_empty() {
-        let text = format!("joints and points are rows apart in the recording: rows {}", list(&shifted));
+        let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
         out.push(of_the_recording("joint_log_lag", text));
     }
     let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
     if !wrong.is_empty() {
-        out.push(of_the_recording("outlier", format!("single wrong points: rows {}", list(&wrong))));
+        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong))));
     }
     out
 }

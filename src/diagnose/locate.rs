@@ -2,6 +2,7 @@
 
 use super::pool::Pool;
 use super::state::State;
+use super::words::Clock;
 use crate::effect::{Course, Effect, Form, Placed, Side, Signature, Survey, Warmth};
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use std::collections::BTreeMap;
 pub struct Share {
     /// `place` or `variable`.
     pub by: &'static str,
-    /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time`.
+    /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
     pub name: String,
     /// Of the squared residual that the base model leaves, in standard deviations.
     pub share: f64,
@@ -46,11 +47,13 @@ pub struct Located {
 pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
     let mut best: BTreeMap<(&'static str, String), Share> = BTreeMap::new();
     let mut spectrum = Vec::new();
+    let clock = Clock::of(survey.data);
     for (fall, h) in state.falls(pool) {
         let form = &pool.hypotheses[*h].form;
         let (gain, numbers) = state.gain(pool, *h);
         let share = gain / state.square.max(f64::MIN_POSITIVE);
-        let names = std::iter::once(("place", form.place().to_string())).chain(variables(form).map(|name| ("variable", name)));
+        let names =
+            std::iter::once(("place", form.place().to_string())).chain(variables(form, clock).map(|name| ("variable", name)));
         for (by, name) in names {
             // Falls come largest first: the first one stands.
             best.entry((by, name.clone())).or_insert(Share {
@@ -80,10 +83,11 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
 }
 
 /// What a form goes with.
-fn variables(form: &Form) -> impl Iterator<Item = String> {
+fn variables(form: &Form, clock: Clock) -> impl Iterator<Item = String> {
+    let time = clock.name();
     let warmth = |by: Warmth| match by {
         Warmth::Temperature { .. } => "temperature",
-        Warmth::Time { .. } => "time",
+        Warmth::Time { .. } => time,
     };
     let number = match form.place() {
         crate::effect::Place::Joint(joint) => joint + 1,
@@ -97,11 +101,11 @@ fn variables(form: &Form) -> impl Iterator<Item = String> {
         Form::Backlash(_) => own("approach of joint"),
         Form::GearMotorCyclic(_) => own("motor"),
         Form::GearCyclic(_) | Form::JointTable(_) | Form::AxisWobble(_) | Form::Counterbalance(_) => vec![format!("q{number}")],
-        Form::ZeroShift(_) | Form::FrameShift(_) => vec!["time".into()],
+        Form::ZeroShift(_) | Form::FrameShift(_) => vec![time.into()],
         Form::ThermalGrowth(growth) => vec![warmth(growth.by()).into()],
         Form::TrackerDrift(drift) => match drift.course() {
             Course::Warming(by) => vec![warmth(by).into()],
-            _ => vec!["time".into()],
+            _ => vec![time.into()],
         },
         Form::PayloadError(_) => vec!["payload".into()],
         Form::JointLogLag(lag) if lag.is_time() => vec!["speed".into()],
@@ -113,7 +117,7 @@ fn variables(form: &Form) -> impl Iterator<Item = String> {
             Signature::Angle { by, .. } | Signature::Hinge { by, .. } | Signature::Periodic { by, .. } => vec![angle(by)],
             Signature::Bump { .. } | Signature::Step { .. } => vec![format!("q{number}")],
             Signature::Product { a, b } | Signature::Surface { a, b, .. } => vec![format!("{} and {}", angle(a), angle(b))],
-            Signature::Sway { .. } | Signature::Time { .. } | Signature::Creep { .. } => vec!["time".into()],
+            Signature::Sway { .. } | Signature::Time { .. } | Signature::Creep { .. } => vec![time.into()],
             Signature::Side { .. } | Signature::Sag => vec!["direction of gravity".into()],
             Signature::Warming(by) => vec![warmth(by).into()],
             Signature::Payload { .. } => vec!["payload".into()],

@@ -1,22 +1,36 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
 use super::finding::Number;
-use crate::effect::{Course, Form, GearCyclic, Law, Placed, Side, Survey, Warmth};
+use super::words::{Clock, figure};
+use crate::effect::{Course, Form, GearCyclic, Law, Placed, Side, Signature, Survey, Unknown, Warmth};
 
-/// The sentence of a finding from its forms and numbers; `rms` is the size of the whole effect at the measured points, m.
-pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Number], rms: f64) -> String {
+/// What a sentence is made of.
+pub(crate) struct Told<'a> {
+    pub effect: &'a str,
+    pub place: &'a str,
+    pub forms: &'a [Form],
+    pub numbers: &'a [Number],
+    /// Size of the whole effect at the measured points, m.
+    pub rms: f64,
+    pub clock: Clock,
+}
+
+/// The sentence of a finding from its forms and numbers.
+pub(crate) fn sentence(told: &Told) -> String {
+    let Told { effect, place, forms, numbers, rms, clock } = *told;
     let first = numbers.first();
     let value = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit));
-    let arcsec = |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{:.0} {}", n.value.abs(), n.unit));
+    let arcsec =
+        |number: Option<&Number>| number.map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit));
     let text = match effect {
         "joint_compliance" => format!("{place} winds up under its load by {}", value(first)),
         "joint_hardening" => {
             let shape = match forms.iter().find_map(|form| if let Form::JointHardening(h) = form { Some(h.law()) } else { None })
             {
-                Some(Law::Saturating { at_nm }) => format!("it stiffens above about {at_nm:.0} Nm"),
-                Some(Law::SoftZone { at_nm }) => format!("it is soft below about {at_nm:.0} Nm"),
-                Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {at_nm:.0} Nm"),
-                Some(Law::Power { exponent, .. }) => format!("it goes with the load to the power of {exponent:.1}"),
+                Some(Law::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
+                Some(Law::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
+                Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
+                Some(Law::Power { exponent, .. }) => format!("it goes with the load to the power of {}", figure(exponent, 1)),
                 _ => "its shape is a free curve of the load".to_string(),
             };
             format!("{place} winds up under its load, but not in proportion: {shape}")
@@ -35,17 +49,13 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             let by = match side {
                 Some(Side::Load { .. }) => "to the side that the load pushes it".to_string(),
                 Some(Side::Mixed { threshold_nm, .. }) => {
-                    let friction = threshold_nm.abs();
-                    format!(
-                        "by the direction from which it came, above about {friction:.0} Nm to the side that the load pushes it"
-                    )
+                    let friction = figure(threshold_nm.abs(), 0);
+                    format!("by the direction from which it came, above about {friction} Nm to the side that the load pushes it")
                 }
                 Some(Side::Approach) => "by the direction from which it came".to_string(),
                 None => {
-                    return format!(
-                        "{place} has lost motion to the side that its load pushes it ({:.0} um rms at the tool).",
-                        rms * 1e6
-                    );
+                    let size = figure(rms * 1e6, 0);
+                    return format!("{place} has lost motion to the side that its load pushes it ({size} um rms at the tool).");
                 }
             };
             format!("{place} has lost motion: half a gap of {} {by}", arcsec(first))
@@ -54,12 +64,13 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
             let by = forms.iter().find_map(|form| if let Form::ThermalGrowth(t) = form { Some(t.by()) } else { None });
             match (by, first) {
                 (Some(Warmth::Temperature { .. }), Some(n)) => {
-                    format!("{place} grows by {:.1} um/m for each kelvin", n.value * 1e6)
+                    format!("{place} grows by {} um/m for each kelvin", figure(n.value * 1e6, 1))
                 }
                 (Some(Warmth::Time { constant_s, .. }), Some(n)) => {
                     format!(
-                        "{place} grows as the robot warms up, {:.0} um/m in the end with a time constant of {constant_s:.0} s",
-                        n.value * 1e6
+                        "{place} grows as the robot warms up, {} um/m in the end with a time constant of {}",
+                        figure(n.value * 1e6, 0),
+                        clock.span(constant_s)
                     )
                 }
                 _ => format!("{place} grows with warmth"),
@@ -67,18 +78,21 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
         }
         "counterbalance" => format!("a balancer (spring or gas) acts on {place} and is missing from the torque model"),
         "cable_drag" => match forms.iter().find_map(|form| if let Form::Unknown(shape) = form { Some(shape) } else { None }) {
-            Some(shape) => format!("something pulls on {place} as a hose package does: {}", shape.signature()),
+            Some(shape) => format!("something pulls on {place} as a hose package does: {}", goes_with(shape, clock)),
             None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
         },
         "link_mass" => format!("the mass or centre of {place} in the torque model is wrong"),
         "payload_error" => match first {
-            Some(n) => format!("the payload is {:+.1} % of what was declared off", n.value * 100.0),
+            Some(n) => {
+                let how = if n.value < 0.0 { "lighter" } else { "heavier" };
+                format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
+            }
             None => "the payload is not what was declared".to_string(),
         },
         "axis_wobble" => format!("the axis of {place} tilts as the joint turns"),
-        "zero_shift" => format!("the zero of {place} steps by {}{}", arcsec(first), when(forms)),
-        "tool_shift" => format!("the target on the tool has moved{}", when(forms)),
-        "base_shift" => format!("the base (or the tracker) has moved{}", when(forms)),
+        "zero_shift" => format!("the zero of {place} steps by {}{}", arcsec(first), when(forms, clock)),
+        "tool_shift" => format!("the target on the tool has moved{}", when(forms, clock)),
+        "base_shift" => format!("the base (or the tracker) has moved{}", when(forms, clock)),
         "tracker_drift" => {
             let course = forms.iter().find_map(|form| if let Form::TrackerDrift(d) = form { Some(d.course()) } else { None });
             let how = match course {
@@ -88,59 +102,81 @@ pub(crate) fn sentence(effect: &str, place: &str, forms: &[Form], numbers: &[Num
                 Some(Course::Warming(_)) => "with the warm-up",
                 _ => "slowly",
             };
-            format!("the tracker's frame drifts {how}")
+            let over = if clock == Clock::Rows { " over the recording's rows" } else { "" };
+            format!("the tracker's frame drifts {how}{over}")
         }
-        "coupling_ratio" => format!("{place}: the second moves with the first by {} of its angle", value(first)),
+        "coupling_ratio" => {
+            let share = match first {
+                Some(n) if n.unit == PLAIN => format!("{} % of its angle", figure(n.value * 100.0, 2)),
+                other => value(other),
+            };
+            format!("{place}: the second moves with the first by {share}")
+        }
         "joint_log_lag" if forms.iter().any(|form| matches!(form, Form::JointLogLag(lag) if lag.is_time())) => {
             let ms = first.map_or(0.0, |n| n.value);
             let (how, when) = if ms < 0.0 { ("early", "before") } else { ("late", "after") };
             format!(
-                "the tracker's clock is {:.2} ms {how} against the controller's: points were measured that much {when} the joints beside them",
-                ms.abs()
+                "the tracker's clock is {} ms {how} against the controller's: points were measured that much {when} the joints beside them",
+                figure(ms.abs(), 2)
             )
         }
         "viscous_windup" => format!("{place} trails behind in proportion to its speed, by {}", value_short(first)),
         "joint_log_lag" => match first {
             Some(n) if numbers.len() == 1 => format!(
-                "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
-                n.value * 100.0
+                "joints were logged before the arm had settled: {} % of the last move was still to come",
+                figure(n.value * 100.0, 2)
             ),
             Some(_) => {
                 let shares = numbers.iter().filter(|n| n.name.contains("share"));
                 let most = shares.max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
                 format!(
-                    "joints were logged before the arm had settled, each by a share of its own: up to {:.3} % of the last move was \
+                    "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
                      still to come",
-                    most.map_or(0.0, |n| n.value * 100.0)
+                    figure(most.map_or(0.0, |n| n.value * 100.0), 3)
                 )
             }
             None => "joints and points do not belong to the same moment".to_string(),
         },
         _ => {
             let signature =
-                forms.iter().find_map(|form| if let Form::Unknown(u) = form { Some(u.signature().to_string()) } else { None });
+                forms.iter().find_map(|form| if let Form::Unknown(u) = form { Some(goes_with(u, clock)) } else { None });
             format!("{place} has an error that no entry of the library explains: {}", signature.unwrap_or_default())
         }
     };
-    format!("{text} ({:.0} um rms at the tool).", rms * 1e6)
+    format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
 }
+
+/// The unit of a plain number.
+const PLAIN: &str = "1";
 
 fn value_short(number: Option<&Number>) -> String {
-    number.map_or_else(String::new, |n| format!("{:.2} {}", n.value, n.unit))
+    number.map_or_else(String::new, |n| format!("{} {}", figure(n.value, 2), n.unit))
 }
 
-fn when(forms: &[Form]) -> String {
+/// What something unknown depends on, in the recording's own time.
+fn goes_with(unknown: &Unknown, clock: Clock) -> String {
+    match (unknown.signature(), clock) {
+        (Signature::Sway { period_s, .. }, _) => format!("{} with a period of {}", unknown.signature(), clock.span(period_s)),
+        (Signature::Time { .. }, Clock::Rows) => "function of the row".into(),
+        (Signature::Creep { .. }, Clock::Rows) => {
+            unknown.signature().to_string().replace("with time", "over the recording's rows")
+        }
+        (signature, _) => signature.to_string(),
+    }
+}
+
+fn when(forms: &[Form], clock: Clock) -> String {
     let time = forms.iter().find_map(|form| match form {
         Form::ZeroShift(shift) => Some(shift.time_s()),
         Form::FrameShift(shift) => Some(shift.time_s()),
         _ => None,
     });
-    time.map_or_else(String::new, |time| format!(" at {time:.0} s"))
+    time.map_or_else(String::new, |time| clock.since(time))
 }
 
 fn amplitude(pair: Option<&[Number]>) -> String {
     match pair {
-        Some([a, b]) => format!("{:.0} {}", a.value.hypot(b.value), a.unit),
+        Some([a, b]) => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
         _ => String::new(),
     }
 }
@@ -192,11 +228,14 @@ pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
             if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
         out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
     }
-    if !survey.robot.has_masses() {
-        out.push("gravity effects: the robot file gives no link masses".into());
+    out.extend(masses(survey));
+    let clock = Clock::of(survey.data);
+    if clock == Clock::Rows {
+        out.push("time: none was recorded; the order of the rows stands for it".into());
     }
     if survey.data.temperature.is_none() {
-        out.push("temperature: none was recorded; growth is told from drift by time alone".into());
+        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
+        out.push(format!("temperature: none was recorded; growth is told from drift by {by} alone"));
     }
     if survey.data.current.is_none() {
         out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
@@ -206,6 +245,24 @@ pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     }
     out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
     out
+}
+
+/// Links whose weight the robot file does not give.
+fn masses(survey: &Survey) -> Option<String> {
+    let all = &survey.robot.description().joints;
+    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
+    match bare.len() {
+        0 => None,
+        none if none == all.len() => Some("gravity effects: the robot file gives no link masses".into()),
+        some => {
+            let (own, all) = (all.len() - some, all.len());
+            let bare = bare.join(", ");
+            Some(format!(
+                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+            ))
+        }
+    }
 }
 
 /// Where nothing else is needed.

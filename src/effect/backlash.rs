@@ -31,6 +31,8 @@ pub struct Backlash {
 
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
+/// Smallest and largest threshold and blur, as shares of the joint's largest load: there the load or the approach decides alone.
+const THRESHOLDS: [f64; 2] = [1e-3, 1.5];
 
 impl Backlash {
     pub fn side(&self) -> Side {
@@ -94,11 +96,16 @@ impl Placed for Backlash {
         Place::Joint(self.joint)
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let Side::Mixed { threshold_nm, width_nm } = self.side else { return Vec::new() };
         let power = libm::exp2(-0.5 * f64::from(level));
         let factors = [1.6, 1.25, 0.8, 0.625].map(|factor| libm::pow(factor, power));
-        let with = |threshold_nm, width_nm| Self { joint: self.joint, side: Side::Mixed { threshold_nm, width_nm } }.into();
+        let [least, most] = THRESHOLDS.map(|share| share * survey.load(self.joint));
+        let within = |torque: f64| libm::copysign(torque.abs().clamp(least, most), torque);
+        let with = |threshold_nm: f64, width_nm: f64| {
+            let width_nm = if width_nm > 0.0 { within(width_nm) } else { 0.0 };
+            Self { joint: self.joint, side: Side::Mixed { threshold_nm: within(threshold_nm), width_nm } }.into()
+        };
         let wider = factors.into_iter().filter(|_| width_nm > 0.0).map(|factor| with(threshold_nm, width_nm * factor));
         factors.into_iter().map(|factor| with(threshold_nm * factor, width_nm)).chain(wider).collect()
     }

@@ -30,6 +30,10 @@ pub struct JointHardening {
 
 /// Cosines of a free curve.
 const CURVE: usize = 6;
+/// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
+/// largest a knee is never seen and what saturates there is a straight line.
+const BENDS: [f64; 2] = [0.01, 10.0];
+const LAST_KNEE: f64 = 0.98;
 /// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
 const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
@@ -133,12 +137,14 @@ impl Placed for JointHardening {
         Place::Joint(self.joint)
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
+        let most = survey.load(self.joint);
+        let within = |at_nm: f64, largest: f64| at_nm.clamp(BENDS[0] * most, largest * most);
         let scaled = |factor: f64| match self.law {
-            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: at_nm * factor }),
-            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: at_nm * factor }),
-            Law::Knee { at_nm } => Some(Law::Knee { at_nm: at_nm * factor }),
+            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
+            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
+            Law::Knee { at_nm } => Some(Law::Knee { at_nm: within(at_nm * factor, LAST_KNEE) }),
             Law::Power { exponent, at_nm } => Some(Law::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm }),
             Law::Curve { .. } => None,
         };

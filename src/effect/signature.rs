@@ -59,9 +59,8 @@ impl fmt::Display for Signature {
             Self::Periodic { by, order } => write!(f, "periodic in q{}, {order} a turn", by + 1),
             Self::Product { a, b } => write!(f, "product of functions of q{} and q{}", a + 1, b + 1),
             Self::Surface { a, b, .. } => write!(f, "function of q{} and q{}", a + 1, b + 1),
-            Self::Sway { period_s, turns } => {
-                write!(f, "{} with a period of {period_s:.0} s", if *turns { "rocks" } else { "sways" })
-            }
+            // Whether the period is in seconds only the recording knows.
+            Self::Sway { turns, .. } => write!(f, "{} slowly", if *turns { "rocks" } else { "sways" }),
             Self::Time { .. } => f.write_str("function of time"),
             Self::Creep { power, .. } if (power - 1.0).abs() < 0.3 => f.write_str("creeps steadily with time"),
             Self::Creep { power, .. } => {

@@ -20,6 +20,8 @@ pub enum Warmth {
 
 /// Time constants as shares of the recording.
 const WARM_UPS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.5];
+/// Shortest and longest time constant, in the same shares: the one is a step at the start, the other a straight line.
+const CONSTANTS: [f64; 2] = [0.02, 10.0];
 
 impl Warmth {
     /// What the recording offers, and of how many of its kind each is one: its temperature, and warm-ups of several time
@@ -41,11 +43,13 @@ impl Warmth {
         }
     }
 
-    /// The same with time constants around its own.
-    pub fn near(&self, level: i32) -> Vec<Self> {
+    /// The same with time constants around its own, within bounds.
+    pub fn near(&self, survey: &Survey, level: i32) -> Vec<Self> {
         let Self::Time { start_s, constant_s } = *self else { return Vec::new() };
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
-        [step, 1.0 / step].map(|factor| Self::Time { start_s, constant_s: constant_s * factor }).to_vec()
+        let [shortest, longest] = CONSTANTS.map(|share| share * (survey.time[1] - survey.time[0]));
+        let within = |constant_s: f64| Self::Time { start_s, constant_s: constant_s.clamp(shortest, longest) };
+        [step, 1.0 / step].map(|factor| within(constant_s * factor)).to_vec()
     }
 }
 
@@ -105,7 +109,7 @@ impl Placed for ThermalGrowth {
         Place::Links(self.first, self.last)
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
-        self.by.near(level).into_iter().map(|by| Self { by, ..self.clone() }.into()).collect()
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
+        self.by.near(survey, level).into_iter().map(|by| Self { by, ..self.clone() }.into()).collect()
     }
 }

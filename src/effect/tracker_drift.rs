@@ -108,14 +108,14 @@ impl Placed for TrackerDrift {
         Place::Tracker
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let courses: Vec<Course> = match self.course {
             Course::Steady { start_s, end_s, power } => {
                 let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
                 let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
                 powers.map(|power| Course::Steady { start_s, end_s, power }).collect()
             }
-            Course::Warming(by) => by.near(level).into_iter().map(Course::Warming).collect(),
+            Course::Warming(by) => by.near(survey, level).into_iter().map(Course::Warming).collect(),
             Course::Slow { .. } => Vec::new(),
         };
         courses.into_iter().map(|course| Self { course, ..self.clone() }.into()).collect()

@@ -31,6 +31,8 @@ const POWERS: std::ops::RangeInclusive<f64> = 0.3..=3.0;
 const CREEPING: f64 = 2.0;
 /// Periods of a sway as shares of the recording.
 const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
+/// Shortest and longest period, in the same shares: beyond one period a sway is a drift.
+const PERIODS: [f64; 2] = [0.05, 1.0];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
 /// What goes with another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
@@ -303,14 +305,16 @@ impl Placed for Unknown {
             }
             Signature::Sway { period_s, turns } => {
                 let step = libm::pow(1.15, libm::exp2(-0.7 * f64::from(level)));
-                [step, 1.0 / step].map(|factor| with(Signature::Sway { period_s: period_s * factor, turns })).to_vec()
+                let [shortest, longest] = PERIODS.map(|share| share * (survey.time[1] - survey.time[0]));
+                let within = |period_s: f64| Signature::Sway { period_s: period_s.clamp(shortest, longest), turns };
+                [step, 1.0 / step].map(|factor| with(within(period_s * factor))).to_vec()
             }
             Signature::Creep { start_s, end_s, power } => {
                 let step = libm::pow(1.5, libm::exp2(-0.7 * f64::from(level)));
                 let powers = [power * step, power / step].into_iter().filter(|power| POWERS.contains(power));
                 powers.map(|power| with(Signature::Creep { start_s, end_s, power })).collect()
             }
-            Signature::Warming(by) => by.near(level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
+            Signature::Warming(by) => by.near(survey, level).into_iter().map(|by| with(Signature::Warming(by))).collect(),
             _ => Vec::new(),
         }
     }

@@ -82,10 +82,15 @@ impl Plan {
     }
 
     /// The plan of a stage and those that it reads from, directly or not.
-    pub fn needed_for(mut self, stage: usize) -> Self {
+    pub fn needed_for(self, stage: usize) -> Self {
+        self.needed_for_all(&[stage])
+    }
+
+    /// The plan of some stages and those that they read from, directly or not.
+    pub fn needed_for_all(mut self, stages: &[usize]) -> Self {
         let mut needed = vec![false; self.stages.len()];
-        needed[stage] = true;
-        for at in (0..=stage).rev().filter(|at| *at < self.stages.len()) {
+        stages.iter().for_each(|stage| needed[*stage] = true);
+        for at in (0..self.stages.len()).rev() {
             if needed[at] {
                 let origins: Vec<usize> = self.stages[at].inputs.iter().flat_map(|input| &input.from).map(|o| o.stage).collect();
                 origins.into_iter().for_each(|origin| needed[origin] = true);

@@ -17,7 +17,7 @@ pub struct Measurements {
     pub payload: Vec<f64>,
     /// A.
     pub current: Option<Vec<f64>>,
-    /// s; without it the number of the row stands for it.
+    /// s; where no row has one, the number of the row stands for it.
     pub time: Option<Vec<f64>>,
     /// Of the arm, C.
     pub temperature: Option<Vec<f64>>,
@@ -64,15 +64,19 @@ impl Measurements {
         }
     }
 
-    /// s from some start; the number of the row where the recording has no clock or the row no time.
+    /// Whether any row has a time: else [`Measurements::time`] counts rows.
+    pub fn has_clock(&self) -> bool {
+        self.time.as_ref().is_some_and(|all| all.iter().any(|time| time.is_finite()))
+    }
+
+    /// s from some start, that of the last row that has one where this row has none; without a clock the number of the row, from 0.
     pub fn time(&self, row: usize) -> f64 {
-        self.time.as_ref().map(|all| all[row]).filter(|time| time.is_finite()).unwrap_or(row as f64)
+        self.time.as_ref().and_then(|all| nearest(all, row)).unwrap_or(row as f64)
     }
 
     /// C; that of the last row that has one where this row has none.
     pub fn temperature(&self, row: usize) -> Option<f64> {
-        let all = self.temperature.as_ref()?;
-        (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
+        nearest(self.temperature.as_ref()?, row)
     }
 
     /// What joint `joint` moved (rad or m) from the row before to this one; 0 in the first row.
@@ -148,6 +152,11 @@ impl Measurements {
         let near = |(x, y): (&f64, &f64)| (x - y).abs() < SAME_JOINT;
         self.payload[a] == self.payload[b] && self.q(a).iter().zip(self.q(b)).all(near)
     }
+}
+
+/// The value of a row, of the last one that has one, or of the next.
+fn nearest(all: &[f64], row: usize) -> Option<f64> {
+    (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
 }
 
 /// Joint positions (rad or m) closer than this are one command: below any controller's resolution.

@@ -1,5 +1,6 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
+mod standing;
 mod true_error;
 
 use calib::compensate::{Chain, Nominal, SETTLED, Wanted, inverse, least_change};

@@ -1,5 +1,9 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
+mod standing;
+
+pub use standing::standing_of;
+
 use crate::compensate::{Arm, Coverage, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
@@ -13,7 +17,7 @@ use crate::robot::{Instrument, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
-use crate::table::{Loose, Network, Parameters, Recording, Robot, Table, from_file, standing};
+use crate::table::{Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
 use std::path::{Path, PathBuf};
 
 /// What was identified, and from what.
@@ -38,34 +42,34 @@ pub struct Files {
     pub unchecked: bool,
 }
 
-/// The stage of a plan whose model is taken: `step`, else the last diagnosis as far as it stands, else the last that identifies.
-pub fn stage_of(plan: &Plan, step: Option<&str>) -> Result<usize> {
-    let stages = &plan.stages;
-    let writes = |at: usize, kind: &str| stages[at].outputs.iter().any(|port| port.kind == kind);
-    let steps = || (0..stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND));
-    let own = || steps().map(|at| (stages[at].id.as_str(), writes(at, Parameters::KIND)));
-    let diagnosed = stages.iter().rfind(|stage| stage.entry.name == Diagnose::NAME && step.is_none());
-    let stands = diagnosed.and_then(|stage| standing(own(), &stage.id));
-    let last = steps().rfind(|at| stands.is_none_or(|id| stages[*at].id == id));
-    last.ok_or_else(|| Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"))
+/// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
+pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
+    let writes = |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
+    let steps: Vec<usize> = (0..plan.stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
+    if steps.is_empty() {
+        return Err(Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"));
+    }
+    Ok(steps)
 }
 
 impl Identified {
-    /// The model of a run that is done: of `step`, else of its last diagnosis, else of the last stage that writes parameters.
+    /// The model of a run that is done: of `step`, else of the step that stands for it, else of the last stage that writes parameters.
     pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
         let run = &manifest.run_id;
         if manifest.status != RunStatus::Done {
             let status = if manifest.status == RunStatus::Failed { "failed" } else { "running or was killed" };
             return Err(Error::spec(run, format!("the run {status}, it is not done")));
         }
-        let (stage, table) = chosen(manifest, step)?;
+        let stands = if step.is_none() { standing_of(manifest, store)? } else { None };
+        let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let load = |table: &TableRef| load(store, table, manifest);
         let last = |kind: &str| manifest.stages.iter().flat_map(|stage| &stage.outputs).rfind(|output| output.kind == kind);
         let robot = last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
         let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
         let parameters = Parameters::from_frame(&load(table)?)?;
         // A correction was learned on top of one model and belongs to no other.
-        let learned = manifest.stages.iter().rfind(|stage| {
+        let withdrawn = |id: &str| stands.iter().flat_map(|stands| &stands.withdrawn).any(|gone| gone.step == id);
+        let learned = manifest.stages.iter().filter(|stage| !withdrawn(&stage.id)).rfind(|stage| {
             stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
                 && stage.outputs.iter().any(|output| output.kind == Network::KIND)
         });
@@ -79,7 +83,8 @@ impl Identified {
         };
         let data = recording.map(|table| table.measurements(&Instrument::default()));
         let origin = format!("run {run}, stage {}", stage.id);
-        Ok(Self { correction, data, ..Self::of(robot, parameters, origin)? })
+        let warnings = stands.iter().flat_map(|stands| &stands.withdrawn).map(ToString::to_string).collect();
+        Ok(Self { correction, data, warnings, ..Self::of(robot, parameters, origin)? })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -128,14 +133,19 @@ impl Identified {
 }
 
 /// The stage whose parameters are taken, and the parameters.
-fn chosen<'m>(manifest: &'m Manifest, step: Option<&str>) -> Result<(&'m StageReport, &'m TableRef)> {
+fn chosen<'m>(
+    manifest: &'m Manifest,
+    step: Option<&str>,
+    stands: Option<&Standing>,
+) -> Result<(&'m StageReport, &'m TableRef)> {
     let with = |stage: &'m StageReport| {
         stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|output| (stage, &output.table))
     };
     let found: Vec<(&StageReport, &TableRef)> = manifest.stages.iter().filter_map(with).collect();
     let Some(step) = step else {
+        let standing = stands.and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model));
         let diagnosed = found.iter().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
-        let taken = diagnosed.or(found.last()).copied();
+        let taken = standing.or(diagnosed).or(found.last()).copied();
         return taken.ok_or_else(|| Error::spec(&manifest.run_id, "the run identified nothing"));
     };
     found.iter().find(|(stage, _)| stage.id == *step).copied().ok_or_else(|| {
