@@ -28,12 +28,13 @@
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
-//! 1. Below `cli` nothing prints, exits, reads the environment or the clock.
+//! 1. Below `cli` nothing prints, exits, reads the environment or the clock (clippy.toml).
 //! 2. A stage never sees a path or the store.
 //! 3. `estimate` never sees a frame, `store` never a robot.
 //! 4. Randomness enters only as a seed.
 //! 5. SI inside; a stored column's name ends in its unit, one unit per quantity (lengths mm, angles rad).
 //! 6. A table once committed is never changed.
+//! 7. No file uses, by whatever detour, a file that uses it, but for a room's own file and its members (tests/it/circles.rs).
 //!
 //! # Adding things
 //! | add | new | touch |
