@@ -135,13 +135,10 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         assert!(std::env::var_os("CI").is_none(), "nothing may be skipped in CI");
         return println!("skipped: {} is not here", data.display());
     }
-    let thinned = |a: usize, c: usize| {
-        rayon::join(
-            || series("Series_A/measurements_grid.csv", a).unwrap(),
-            || series("Series_C/measurements_random_poses.csv", c).unwrap(),
-        )
-    };
-    let (a, c) = thinned(16, 3);
+    let (a, c) = rayon::join(
+        || series("Series_A/measurements_grid.csv", 16).unwrap(),
+        || series("Series_C/measurements_random_poses.csv", 3).unwrap(),
+    );
     for (name, series) in [("A", &a), ("C", &c)] {
         let [before, after] = series.own;
         println!(
@@ -155,8 +152,6 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         assert!(after[0] <= 1.001 * before[0], "{name}: {before:?} -> {after:?}");
     }
     // Named causes carry over between random poses and the grid: there is more in them than the points they were found in.
-    // A search over many causes takes its time: half the rows are enough for it.
-    let (a, c) = thinned(32, 6);
     let ways = [("A to C", &a, &c), ("C to A", &c, &a)];
     let errors = |(_, from, to): &(_, &Series, &Series)| {
         (transferred(&from.geometry, to).unwrap(), transferred(&diagnosed(from).unwrap(), to).unwrap())
