@@ -64,6 +64,19 @@ fn join(faults: &[Fault]) -> String {
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// A count with its noun: `1 row`, `2 rows`, `0 copies`. Of several words the last one changes.
+pub fn counted(count: impl fmt::Display, noun: &str) -> String {
+    let count = count.to_string();
+    let last = |back: usize| noun.chars().rev().nth(back).unwrap_or_default();
+    match last(0) {
+        _ if count == "1" => format!("{count} {noun}"),
+        'y' if !"aeiou".contains(last(1)) => format!("{count} {}ies", &noun[..noun.len() - 1]),
+        's' | 'x' => format!("{count} {noun}es"),
+        'h' if "cs".contains(last(1)) => format!("{count} {noun}es"),
+        _ => format!("{count} {noun}s"),
+    }
+}
+
 /// The nearest of `allowed` to `given`, for "did you mean".
 pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     allowed
@@ -73,4 +86,17 @@ pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
         .filter(|(distance, name)| *distance <= 1 + name.len() / 3 && *distance < given.len().max(name.len()))
         .min()
         .map(|(_, name)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counted;
+
+    #[test]
+    fn one_of_a_thing_is_named_as_one() {
+        let said =
+            [(1, "row"), (2, "row"), (0, "fault"), (1, "copy"), (3, "copy"), (2, "key"), (2, "class"), (5, "action record")];
+        let said = said.map(|(count, noun)| counted(count, noun));
+        assert_eq!(said, ["1 row", "2 rows", "0 faults", "1 copy", "3 copies", "2 keys", "2 classes", "5 action records"]);
+    }
 }

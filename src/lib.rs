@@ -8,32 +8,37 @@
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
-//! | [`error`], [`units`] | errors by reader, units of stored columns | - |
+//! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
+//! | [`program`] | programs of controllers (KRL, RAPID), read strictly and rewritten in the numbers of their targets | compensate, robot |
+//! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
-//! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | - |
-//! | [`diff`] | two tables or two runs compared | store |
+//! | [`store`] | schemas, checked frames, content-addressed objects, runs; knows no robot | raw |
+//! | [`diff`] | two tables or two runs compared | raw, store |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | report, table, numerics, twin, yaml |
-//! | [`pipeline`] | the YAML, the plan, the run | stage, store, yaml |
-//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, report, stage, store, table, yaml |
+//! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
+//! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
+//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
-//! 1. Below `cli` nothing prints, exits, reads the environment or the clock.
+//! 1. Below `cli` nothing prints, exits, reads the environment or the clock (clippy.toml).
 //! 2. A stage never sees a path or the store.
 //! 3. `estimate` never sees a frame, `store` never a robot.
 //! 4. Randomness enters only as a seed.
 //! 5. SI inside; a stored column's name ends in its unit, one unit per quantity (lengths mm, angles rad).
 //! 6. A table once committed is never changed.
+//! 7. No file uses, by whatever detour, a file that uses it, but for a room's own file and its members (tests/it/circles.rs).
 //!
 //! # Adding things
 //! | add | new | touch |
@@ -46,7 +51,10 @@
 #![forbid(unsafe_code)]
 
 pub mod error;
+pub mod statistics;
 pub mod units;
+
+pub mod raw;
 pub mod yaml;
 
 pub mod spatial;
@@ -58,6 +66,10 @@ pub mod effect;
 pub mod estimate;
 
 pub mod compensate;
+
+pub mod program;
+
+pub mod targets;
 
 pub mod diagnose;
 
@@ -77,7 +89,10 @@ pub mod pipeline;
 
 pub mod audit;
 pub mod fleet;
+pub mod identified;
 
+#[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;
 
+#[expect(clippy::disallowed_methods, reason = "reads the environment and the clock for all others, and prints")]
 pub mod cli;

@@ -103,10 +103,10 @@ impl Observer for Progress {
         let rows = rows.join(", ");
         match report.status {
             StageStatus::Cached => {
-                self.line(&report.id, &format!("cached (rows: {rows})"));
-                // The lines of an executed stage came while it ran.
-                report.notes.iter().for_each(|line| self.line(&report.id, &format!("  {line}")));
-                report.warnings.iter().for_each(|line| self.print(&report.id, &format!("  warning: {line}")));
+                // One line: what the stage noted was said when it ran, and `calib show` says it again. What it warned of still holds.
+                let warnings: String = report.warnings.iter().map(|line| format!("; warning: {line}")).collect();
+                let text = format!("cached (rows: {rows}){warnings}");
+                if warnings.is_empty() { self.line(&report.id, &text) } else { self.print(&report.id, &text) }
             }
             _ => self.line(&report.id, &format!("done in {:.1} s (rows: {rows})", report.wall_seconds.unwrap_or_default())),
         }

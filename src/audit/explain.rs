@@ -10,7 +10,8 @@ use crate::store::Store;
 pub struct Explanation {
     pub run: String,
     pub stage: StageReport,
-    /// The run that the stage is compared with: the last one before of this pipeline that had it.
+    /// The run that the stage is compared with: the last one before of this pipeline that had it, of a complete run a
+    /// complete one.
     pub before: Option<String>,
     pub changes: Vec<Change>,
     /// For every input that changed: the stage that wrote it.
@@ -32,7 +33,8 @@ pub fn explain(store: &Store, run: &str, stage: &str) -> Result<Explanation> {
     for id in store.runs()?.into_iter().rev().filter(|id| id.as_str() < run) {
         // A manifest that cannot be read explains nothing.
         let Ok(earlier) = Manifest::of(store, &id) else { continue };
-        if earlier.pipeline.name != manifest.pipeline.name {
+        let alike = !manifest.is_complete() || earlier.is_complete();
+        if earlier.pipeline.name != manifest.pipeline.name || !alike {
             continue;
         }
         if let Some(before) = earlier.stage(stage).and_then(|stage| stage.key.as_ref()) {

@@ -1,13 +1,18 @@
-//! `calib check`: reads and wires a pipeline and prints its graph, or every fault at once.
+//! `calib check`: reads and wires a pipeline, reads its robot file and the headers of its data, and prints its graph, or every fault at once.
 
 use super::emit;
-use crate::error::Result;
-use crate::pipeline::{Override, Plan};
+use crate::error::{Result, counted};
+use crate::pipeline::{Override, Plan, look};
+use crate::raw;
 use crate::stage::STAGES;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
 /// Check a pipeline: print the graph of its stages and tables, or every fault with its line.
+///
+/// The robot file is read, and the headers of the data files: columns that are mapped and not there are named. Exit code 2 for faults of
+/// the YAML or of the robot file, 10 for those of the data files alone. Lines that `calib init` marked CHECK (look at it) or REPLACE (put
+/// your own there) are listed behind the graph; they are no faults, and a run does not wait for them.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib check pipelines/ur10/pipeline.yaml
@@ -25,22 +30,40 @@ pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
     let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
     let files = plan.stages.iter().filter(|stage| stage.entry.name == "robot").flat_map(|stage| &stage.files);
     let described = files.map(|file| file.path.as_path()).chain(std::iter::once(arguments.pipeline.as_path()));
-    let marks: String = described.filter_map(marked).collect();
-    emit(&(graph(&plan) + &marks))
+    let marks: String = described.flat_map(|path| MARKS.map(|mark| marked(path, mark))).collect();
+    match look(&plan) {
+        Ok(warnings) => {
+            let warnings: String = warnings.iter().map(|line| format!("\nwarning: {line}\n")).collect();
+            emit(&(graph(&plan) + &warnings + &marks))
+        }
+        Err(error) => {
+            emit(marks.trim_start_matches('\n'))?;
+            Err(error)
+        }
+    }
 }
 
-/// A warning where lines are left that `calib init` marked for the user to fill in.
-fn marked(path: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?;
-    let lines = text.lines().filter(|line| line.split_once('#').is_some_and(|(_, comment)| comment.contains("REPLACE"))).count();
-    let line = if lines == 1 { "a line is" } else { "lines are" };
-    let path = path.display();
-    (lines > 0)
-        .then(|| format!("\nwarning: {path}: {lines} {line} still marked REPLACE; put your own there and delete the mark\n"))
+/// What `calib init` writes behind lines to look at, and what is to be done there.
+const MARKS: [(&str, &str); 2] =
+    [("REPLACE", "put your own there and delete the mark"), ("CHECK", "look whether it is so and delete the mark")];
+
+/// A warning where lines are left that `calib init` marked, with the lines. A line that is a comment all over sets nothing.
+fn marked(path: &Path, (mark, what): (&str, &str)) -> String {
+    let text = raw::text(path).unwrap_or_default();
+    let has_mark = |line: &str| line.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == mark);
+    let counts = |line: &str| !line.trim_start().starts_with('#') && has_mark(line);
+    let lines: Vec<(usize, &str)> = (1..).zip(text.lines()).filter(|(_, line)| counts(line)).collect();
+    if lines.is_empty() {
+        return String::new();
+    }
+    let many = if lines.len() == 1 { "a line is".into() } else { format!("{} lines are", lines.len()) };
+    let mut out = format!("\nwarning: {}: {many} still marked {mark}; {what}\n", path.display());
+    lines.iter().for_each(|(number, line)| out.push_str(&format!("  {number}: {}\n", line.trim())));
+    out
 }
 
 fn graph(plan: &Plan) -> String {
-    let mut text = format!("pipeline {}, seed {}, {} stages\n", plan.name, plan.seed, plan.stages.len());
+    let mut text = format!("pipeline {}, seed {}, {}\n", plan.name, plan.seed, counted(plan.stages.len(), "stage"));
     for stage in &plan.stages {
         let uses = if stage.id == stage.entry.name { String::new() } else { format!(" (uses {})", stage.entry.name) };
         text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));

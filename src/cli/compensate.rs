@@ -1,26 +1,26 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
-mod columns;
-mod correct;
-mod decimal;
-mod parquet;
-mod program;
-mod text;
-
-use super::identified::{Identified, ModelArguments};
-use crate::compensate::Arm;
+use super::model_arguments::ModelArguments;
+use crate::compensate::{Arm, Corrector, Manner, Tally};
 use crate::error::{Error, Fault, Result};
-use crate::robot::RobotModel;
+use crate::identified::Identified;
+use crate::pipeline::Purpose;
+use crate::program::{self, Language, Note, Partial, Program, Refusal};
+use crate::raw;
+use crate::robot::{Measurements, RobotModel};
+use crate::targets::{Layout, Units, Unreached, parquet, text};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
-use columns::Units;
-use correct::{Corrector, Manner};
-use program::Language;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use text::Layout;
+
+/// Joints that both languages of programs have targets for.
+const JOINTS_OF_PROGRAMS: usize = 6;
+
+/// Faults told of a program: more are of a file that is none.
+const MOST_FAULTS: usize = 500;
 
 /// Correct targets: joint commands that bring the real arm to where the nominal robot would have put the tool.
 ///
@@ -28,11 +28,15 @@ use text::Layout;
 /// nominal robot reaches with it; a Cartesian target is a point, or a pose, in the robot's base frame. Columns are known by name: q1_deg (or
 /// _rad, _mm), the robot's joint names; x_mm, y_mm, z_mm, with qw, qx, qy, qz or a_deg, b_deg, c_deg (about z, y', x''); payload_kg, temp_c,
 /// time_s, dir1 (+1: the joint comes from below), i1_a. Joints are replaced in place, all other columns stay byte for byte, and what is
-/// known of each target is appended.
+/// known of each target is appended. A target that is not reached gets no joints: their cells are empty (null in Parquet), `remark` says why,
+/// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
 /// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
 /// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, near the
-/// posture of the target before (or --start); status and turn are not read.
+/// posture of the target before (or --start); status and turn are not read. A target that is not understood exactly, not reached, or that
+/// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program
+/// computes, Offs and RelTool of RAPID among them (the controller adds the offset to the corrected target, so that the shifted point
+/// gets the correction of the unshifted one). Warnings also name the lines that set $BASE or $TOOL, name a work object, or move external axes.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CompensateArguments {
@@ -56,13 +60,16 @@ pub(super) struct CompensateArguments {
     /// Replaces the joints and appends nothing
     #[arg(long)]
     plain: bool,
+    /// Leaves targets of a program that state some of their numbers as they are (`LIN {X 10}`), with a warning for each, instead of refusing it
+    #[arg(long)]
+    leave_partial: bool,
     /// Payload where the targets do not say, kg
     #[arg(long, value_name = "KG", default_value_t = 0.0)]
     payload: f64,
     /// Temperature where the targets do not say, C [default: that at the start of the recording]
     #[arg(long, value_name = "C", allow_hyphen_values = true)]
     temperature: Option<f64>,
-    /// Time on the recording's clock, s [default: long after it: steps have happened, the arm is warm]
+    /// Time on the recording's clock, s, where it has one [default: long after it: steps have happened, the arm is warm]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time: Option<f64>,
     /// Side from which all joints come to rest, 1 or -1 [default: by the order of the targets]
@@ -103,7 +110,7 @@ const EXAMPLES: &str = "Examples:
 
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
-    let identified = arguments.model.load(command_line)?;
+    let identified = arguments.model.load(Purpose::Compensate, command_line)?;
     let arm = Arm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
@@ -116,12 +123,36 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let units = Units { angle: unit(arguments.angle.as_deref()), length: unit(arguments.length.as_deref()) };
     let cartesian = arguments.target == What::Pose;
     let layout = Layout { place: &place, robot: &identified.robot, units, plain: arguments.plain, cartesian };
-    threads.install(|| corrected(arguments, &layout, &mut corrector))?;
+    let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
+    let mut text = String::new();
     if !arguments.model.quiet {
-        let text = format!("model: {}\n{}", identified.origin, corrector.tally.text());
-        let _ = std::io::stderr().write_all(text.as_bytes());
+        text = format!("model: {}\n{}", identified.origin, summary(&corrector.tally));
     }
-    Ok(())
+    let remarks = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
+    text.extend(warnings(&corrector.tally, remarks));
+    let _ = std::io::stderr().write_all(text.as_bytes());
+    if unreached.faults.is_empty() { Ok(()) } else { Err(Error::Data(unreached.faults)) }
+}
+
+fn summary(tally: &Tally) -> String {
+    format!(
+        "{} targets; uncorrected they would be off by {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
+        tally.targets,
+        tally.uncorrected_sum / tally.targets.max(1) as f64 * 1e3,
+        tally.uncorrected_max * 1e3,
+        tally.residual_max * 1e3
+    )
+}
+
+fn warnings(tally: &Tally, remarks: &str) -> impl Iterator<Item = String> {
+    let all = [
+        (tally.not_reached, "could not be reached and have no joints"),
+        (tally.turned, "are reached but for their orientation: the wrist is stretched"),
+        (tally.beyond_limits, "leave the joint limits"),
+        (tally.beyond_measured, "are outside of what was measured: the model extrapolates there"),
+    ];
+    let said = all.into_iter().filter(|(count, _)| *count > 0);
+    said.map(move |(count, what)| format!("warning: {count} of them {what}{remarks}\n"))
 }
 
 fn check(arguments: &CompensateArguments) -> Result<()> {
@@ -166,6 +197,10 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
         }
         None => None,
     };
+    let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
+    if arguments.time.is_some() && !clock {
+        return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
+    }
     Ok(Manner {
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == Orientation::Keep,
@@ -173,6 +208,7 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
         payload: arguments.payload,
         temperature: arguments.temperature,
         time: arguments.time,
+        clock,
         direction: arguments.direction,
         start,
     })
@@ -183,33 +219,75 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 }
 
 fn language(targets: &Path) -> Option<Language> {
-    Language::of(&targets.extension()?.to_str()?.to_ascii_lowercase())
+    Language::of_ending(targets.extension()?.to_str()?)
 }
 
 /// A controller's program, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
-    let program =
-        std::fs::read(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
-    let robot = RobotModel::new(layout.robot.clone());
-    let (text, warnings) = program::corrected(layout.place, &program, language, &robot, corrector)?;
-    let warnings: String = warnings.iter().map(|warning| format!("warning: {warning}\n")).collect();
-    let _ = std::io::stderr().write_all(warnings.as_bytes());
-    let (place, written) = match &arguments.out {
-        Some(out) => (out.display().to_string(), std::fs::write(out, text)),
-        None => ("stdout".into(), std::io::stdout().write_all(&text)),
-    };
-    match written {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::store(place, format!("cannot be written: {error}")))
+    let place = |note: &Note| format!("{}:{}:{}", layout.place, note.line, note.column);
+    let refused = |refusal: Refusal| {
+        let told = refusal.faults.iter().take(MOST_FAULTS);
+        let mut faults: Vec<Fault> = told.map(|note| Fault::new(place(note), &note.message)).collect();
+        if refusal.faults.len() > MOST_FAULTS {
+            faults.push(Fault::new(layout.place, format!("and {} more", refusal.faults.len() - MOST_FAULTS)));
         }
-        _ => Ok(()),
+        if refusal.partial > 0 {
+            faults.push(Fault::new(layout.place, "partial targets stay as they are with --leave-partial"));
+        }
+        Error::Data(faults)
+    };
+    let robot = RobotModel::new(layout.robot.clone());
+    if robot.joints() != JOINTS_OF_PROGRAMS {
+        let message = format!("programs have targets of {JOINTS_OF_PROGRAMS} joints, the robot has {}", robot.joints());
+        return Err(Error::spec(layout.place, message));
     }
+    let text =
+        raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
+    let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
+    let program = Program::parse(&text, language, partial).map_err(refused)?;
+    if program.literals().is_empty() {
+        return Err(Error::data(layout.place, "has no targets"));
+    }
+    let answers = program::solve(program.literals(), &robot, corrector);
+    let rewritten = program.rewritten(answers).map_err(refused)?;
+    let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", place(note), note.message));
+    let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
+    let Some(out) = &arguments.out else {
+        return match std::io::stdout().write_all(&rewritten.bytes) {
+            Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+                Err(Error::store("stdout", format!("cannot be written: {error}")))
+            }
+            _ => Ok(()),
+        };
+    };
+    whole(out, |mut file| file.write_all(&rewritten.bytes).map_err(|error| unwritten(out, &error)))
 }
 
-/// Reads, corrects and writes; a file appears only when it is whole, a pipe or a device is written as it stands.
-fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+fn unwritten(out: &Path, error: &std::io::Error) -> Error {
+    Error::store(out.display().to_string(), format!("cannot be written: {error}"))
+}
+
+/// A file appears only when it is whole; a pipe or a device is written as it stands.
+fn whole<T>(out: &Path, fill: impl FnOnce(File) -> Result<T>) -> Result<T> {
+    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return fill(File::options().write(true).open(out).map_err(|error| unwritten(out, &error))?);
+    }
+    let mut name = out.to_path_buf().into_os_string();
+    name.push(".part");
+    let aside = PathBuf::from(name);
+    let file = File::create(&aside).map_err(|error| unwritten(out, &error))?;
+    let result =
+        fill(file).and_then(|filled| std::fs::rename(&aside, out).map(|()| filled).map_err(|error| unwritten(out, &error)));
+    if result.is_err() {
+        let _ = std::fs::remove_file(&aside);
+    }
+    result
+}
+
+/// Reads, corrects and writes.
+fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
     if let Some(language) = language(&arguments.targets) {
-        return rewritten(arguments, language, layout, corrector);
+        return rewritten(arguments, language, layout, corrector).map(|()| Unreached::default());
     }
     let Some(out) = &arguments.out else {
         return convert(&arguments.targets, std::io::stdout(), has_ending(&arguments.targets, "parquet"), layout, corrector);
@@ -219,26 +297,18 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
         let message = "text stays text and Parquet stays Parquet: give --out the ending of the targets";
         return Err(Error::spec("--out", message));
     }
-    let refused = |error: &std::io::Error| Error::store(out.display().to_string(), format!("cannot be written: {error}"));
-    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        let open = File::options().write(true).open(out).map_err(|error| refused(&error))?;
-        return convert(&arguments.targets, open, columnar, layout, corrector);
-    }
-    let mut name = out.clone().into_os_string();
-    name.push(".part");
-    let aside = PathBuf::from(name);
-    let file = File::create(&aside).map_err(|error| refused(&error))?;
-    let result = convert(&arguments.targets, file, columnar, layout, corrector)
-        .and_then(|()| std::fs::rename(&aside, out).map_err(|error| refused(&error)));
-    if result.is_err() {
-        let _ = std::fs::remove_file(&aside);
-    }
-    result
+    whole(out, |file| convert(&arguments.targets, file, columnar, layout, corrector))
 }
 
-fn convert(targets: &Path, output: impl Write + Send, columnar: bool, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+fn convert(
+    targets: &Path,
+    output: impl Write + Send,
+    columnar: bool,
+    layout: &Layout,
+    corrector: &mut Corrector,
+) -> Result<Unreached> {
     let open =
-        || File::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
+        || raw::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
     let mut output = BufWriter::new(output);
     if columnar {
         return parquet::stream(open()?, &mut output, layout, corrector);

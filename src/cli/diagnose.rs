@@ -2,11 +2,11 @@
 
 mod told;
 
-use super::means::Means;
+use super::means::{Means, Task};
 use super::pipeline_arguments::told_as;
 use super::{emit, emit_json, shell};
 use crate::error::{Error, Result, nearest};
-use crate::pipeline::{Manifest, Selection, StageReport, StageStatus};
+use crate::pipeline::{Manifest, Purpose, Selection, StageReport, StageStatus, find_run};
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use clap::Args;
@@ -60,7 +60,8 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         };
         let id = id.to_string();
         let plan = plan.needed_for(at);
-        let outcome = arguments.means.run(&plan, &store, Selection::default(), arguments.quiet, command_line)?;
+        let task = Task { purpose: Purpose::Diagnose, selection: Selection::default(), quiet: arguments.quiet };
+        let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
         Told::read(&outcome.manifest.run_id, stage, &store)?
     } else {
@@ -87,7 +88,7 @@ fn is_pipeline(what: &Path) -> bool {
 
 /// A run by its name, and its stage `diagnose`: `step` where it has several. Fails with what to type where there is none.
 pub(super) fn diagnosis(store: &Store, run: &str, step: Option<&str>) -> Result<(Manifest, StageReport)> {
-    let manifest = Manifest::of(store, &store.find_run(run)?)?;
+    let manifest = Manifest::of(store, &find_run(store, run)?)?;
     let place = format!("run {}", manifest.run_id);
     let own = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME);
     let own: Vec<(&StageReport, &str)> = own.map(|stage| (stage, stage.id.as_str())).collect();

@@ -5,7 +5,7 @@ use super::{complain, emit, emit_json, run_diff};
 use crate::audit::{Place, compare_runs};
 use crate::diff::{self, Detail, Options, TableDiff};
 use crate::error::{Error, Result};
-use crate::pipeline::Manifest;
+use crate::pipeline::{Manifest, find_run};
 use crate::store::{Store, TableRef};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -146,7 +146,7 @@ fn code(same: bool, duplicates: u64, arguments: &DiffArguments) -> u8 {
 /// `RUN`, `RUN/STAGE`, `RUN/STAGE/PORT`.
 fn place(store: &Store, text: &str) -> Result<Place> {
     let mut parts = text.split('/').map(String::from);
-    let run = store.find_run(&parts.next().unwrap_or_default())?;
+    let run = find_run(store, &parts.next().unwrap_or_default())?;
     let place = Place { run, stage: parts.next(), port: parts.next() };
     if parts.next().is_some() {
         return Err(Error::spec(text, "expected a Parquet file, RUN, RUN/STAGE or RUN/STAGE/PORT"));

@@ -4,7 +4,7 @@ use super::surroundings::open_store;
 use super::{emit, emit_json, show};
 use crate::audit::{Explanation, explain};
 use crate::error::{Error, Result};
-use crate::pipeline::StageStatus;
+use crate::pipeline::{StageStatus, find_run};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub(super) struct ExplainArguments {
 
 pub(super) fn main(arguments: &ExplainArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
-    let explanation = explain(&store, &store.find_run(&arguments.run)?, &arguments.stage)?;
+    let explanation = explain(&store, &find_run(&store, &arguments.run)?, &arguments.stage)?;
     if arguments.json {
         return emit_json(&serde_json::to_value(&explanation).map_err(|error| Error::Bug(error.to_string()))?);
     }

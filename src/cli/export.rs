@@ -4,9 +4,11 @@ mod table;
 mod urdf;
 
 use super::emit;
-use super::identified::{Identified, ModelArguments};
+use super::model_arguments::ModelArguments;
 use crate::compensate::{LeftOut, distance, left_out, rigid};
 use crate::error::{Error, Result};
+use crate::identified::Identified;
+use crate::pipeline::Purpose;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::{Measurements, RobotModel};
 use clap::{Args, ValueEnum};
@@ -65,7 +67,7 @@ struct Export {
 }
 
 pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
-    let identified = arguments.model.load(command_line)?;
+    let identified = arguments.model.load(Purpose::Export, command_line)?;
     let recorded = identified.data.as_ref().is_some_and(|data| data.rows() > 0);
     let data = identified.data.clone().filter(|data| data.rows() > 0).unwrap_or_else(|| spread(&identified.model.robot));
     let corrected = rigid(&identified.model);

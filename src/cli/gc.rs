@@ -3,7 +3,7 @@
 use super::surroundings::{now, open_store};
 use super::{emit, emit_json};
 use crate::audit::kept_actions;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use std::time::Duration;
   calib gc --dry-run
   calib gc --keep-runs 3 --grace-hours 1")]
 pub(super) struct GcArguments {
-    /// Runs of every pipeline whose tables are kept, beside tagged ones
+    /// Complete runs of every pipeline whose tables are kept, and as many others since; tagged ones always are
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     keep_runs: u32,
     /// Leaves what was written within so many hours
@@ -44,14 +44,18 @@ pub(super) fn main(arguments: &GcArguments) -> Result<()> {
     }
     let verb = if arguments.dry_run { "would take away" } else { "took away" };
     let mut text = format!(
-        "{verb} {} tables and {} action records, {:.1} MB; {} tables stay\n",
-        sweep.objects,
-        sweep.actions,
+        "{verb} {} and {}, {:.1} MB; left: {}\n",
+        counted(sweep.objects, "table"),
+        counted(sweep.actions, "action record"),
         sweep.bytes as f64 / 1e6,
-        sweep.kept_objects
+        counted(sweep.kept_objects, "table")
     );
     if sweep.young > 0 {
-        text.push_str(&format!("{} files that nothing keeps are younger than {} hours\n", sweep.young, arguments.grace_hours));
+        text.push_str(&format!(
+            "younger than {}, and left though nothing keeps them: {}\n",
+            counted(arguments.grace_hours, "hour"),
+            counted(sweep.young, "file")
+        ));
     }
     emit(&text)
 }

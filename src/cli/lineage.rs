@@ -4,8 +4,8 @@ use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::{Node, lineage};
 use crate::diff::table_hash;
-use crate::error::{Error, Result};
-use crate::pipeline::Manifest;
+use crate::error::{Error, Result, counted};
+use crate::pipeline::{Manifest, find_run};
 use crate::store::Store;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ fn hash(store: &Store, table: &str) -> Result<String> {
     }
     let parts: Vec<&str> = table.split('/').collect();
     let [run, stage, port] = parts[..] else { return Ok(table.into()) };
-    let manifest = Manifest::of(store, &store.find_run(run)?)?;
+    let manifest = Manifest::of(store, &find_run(store, run)?)?;
     let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| output.port == port));
     match output {
         Some(output) => Ok(output.table.table_hash.to_string()),
@@ -65,7 +65,7 @@ fn lines(node: &Node, port: &str, depth: usize, text: &mut String) {
         text.push_str(&format!("{indent}{port}{hash}: the store has no record of who made it\n"));
         return;
     };
-    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {} rows", made.stage, made.port, made.rows));
+    text.push_str(&format!("{indent}{port}{}.{}  {hash}  {}", made.stage, made.port, counted(made.rows, "row")));
     if made.told_before {
         text.push_str("  (as above)\n");
         return;

@@ -3,18 +3,21 @@
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::error::Result;
-use crate::pipeline::{Manifest, RunStatus, StageStatus};
+use crate::pipeline::{Manifest, RunStatus, StageStatus, find_run};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// List the runs, the last first: when, which pipeline, what became of it.
+/// List the runs, the last first: when, what for, which pipeline, what became of it.
+///
+/// A `run` is a complete one: `calib run` with the tables of every stage. A `partial` one stopped short of that by --only or --until, `failed`
+/// and `unfinished` ones did not end; `compensate`, `export`, `diagnose`, `simulate` and `fleet` ran what that verb needed.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib log
   calib log --pipeline sr210d --limit 5
 
-Other verbs take a run as its id, the beginning or end of one, a tag, HEAD for the last, HEAD~2 for two before it.")]
+Other verbs take a run as its id, the beginning or end of one, a tag, HEAD for the\nlast complete one, HEAD~2 for the complete one two before it.")]
 pub(super) struct LogArguments {
     /// Runs of this pipeline only
     #[arg(long, value_name = "NAME")]
@@ -33,6 +36,8 @@ pub(super) struct LogArguments {
 pub(super) fn main(arguments: &LogArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let tags = store.tags()?;
+    // Where there is none, or a manifest is damaged, the list says so in its lines.
+    let head = find_run(&store, "HEAD").ok();
     let (mut text, mut rows, mut shown) = (String::new(), Vec::new(), 0);
     for run in store.runs()?.into_iter().rev() {
         if arguments.limit > 0 && shown == arguments.limit {
@@ -40,14 +45,16 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
             break;
         }
         let own: Vec<&str> = tags.iter().filter(|(_, tagged)| **tagged == run).map(|(tag, _)| tag.as_str()).collect();
+        let is_head = head.as_ref() == Some(&run);
         match Manifest::of(&store, &run) {
             Ok(manifest) if arguments.pipeline.as_ref().is_some_and(|name| name != &manifest.pipeline.name) => continue,
             Ok(manifest) => {
-                text.push_str(&line(&manifest, &own));
+                let names: Vec<&str> = is_head.then_some("HEAD").into_iter().chain(own.iter().copied()).collect();
+                text.push_str(&line(&manifest, &names));
                 rows.push(json!({
-                    "run": run, "started": manifest.started, "pipeline": manifest.pipeline.name, "status": manifest.status,
+                    "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name, "status": manifest.status,
                     "wall_seconds": manifest.wall_seconds, "executed": count(&manifest, StageStatus::Executed),
-                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "error": manifest.error,
+                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "head": is_head, "error": manifest.error,
                 }));
             }
             Err(error) => {
@@ -69,8 +76,11 @@ fn line(manifest: &Manifest, tags: &[&str]) -> String {
     let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
     let tags = if tags.is_empty() { String::new() } else { format!("  [{}]", tags.join(", ")) };
     format!(
-        "{}  {:.16}  {}  {status}, {executed} run, {cached} cached{seconds}{tags}\n",
-        manifest.run_id, manifest.started, manifest.pipeline.name
+        "{}  {:.16}  {:10}  {}  {status}, {executed} run, {cached} cached{seconds}{tags}\n",
+        manifest.run_id,
+        manifest.started,
+        manifest.what(),
+        manifest.pipeline.name
     )
 }
 

@@ -3,7 +3,7 @@
 use super::shell::quoted;
 use super::surroundings::{cores, open_store, surroundings};
 use crate::error::Result;
-use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::stage::STAGES;
 use crate::store::Store;
@@ -22,6 +22,13 @@ pub(super) struct Means {
     /// Worker threads; no result depends on it [default: all cores]
     #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
+}
+
+/// What a pipeline is run for, how much of it, and whether progress is shown.
+pub(super) struct Task {
+    pub purpose: Purpose,
+    pub selection: Selection,
+    pub quiet: bool,
 }
 
 impl Means {
@@ -47,18 +54,12 @@ impl Means {
         self.jobs.map_or_else(cores, usize::from)
     }
 
-    /// Runs the selected stages; with progress unless `quiet`.
-    pub fn run(
-        &self,
-        plan: &Plan,
-        store: &Store,
-        selection: Selection,
-        quiet: bool,
-        command_line: &[OsString],
-    ) -> Result<Outcome> {
+    /// Runs the selected stages; with progress unless the task is a quiet one.
+    pub fn run(&self, plan: &Plan, store: &Store, task: Task, command_line: &[OsString]) -> Result<Outcome> {
+        let Task { purpose, selection, quiet } = task;
         let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
         let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-        let options = RunOptions { selection, jobs: self.jobs() };
+        let options = RunOptions { selection, jobs: self.jobs(), purpose };
         let result = run(plan, store, &options, &surroundings(command_line), &progress);
         progress.finish();
         result

@@ -10,11 +10,12 @@ mod explain;
 mod export;
 mod fleet;
 mod gc;
-mod identified;
 mod init;
 mod lineage;
 mod log;
 mod means;
+mod model_arguments;
+mod panics;
 mod pipeline_arguments;
 mod poses;
 mod query;
@@ -30,7 +31,7 @@ mod tables;
 mod tag;
 mod verify;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
@@ -84,15 +85,19 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
             return code;
         }
     };
-    let result = match parsed.verb {
-        Verb::Run(verb) => run::main(&verb, &arguments),
+    panics::guarded(|| done(parsed.verb, &arguments))
+}
+
+fn done(verb: Verb, arguments: &[OsString]) -> u8 {
+    let result = match verb {
+        Verb::Run(verb) => run::main(&verb, arguments),
         Verb::Check(verb) => check::main(&verb),
-        Verb::Compensate(verb) => compensate::main(&verb, &arguments),
+        Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),
-        Verb::Diagnose(verb) => diagnose::main(&verb, &arguments),
+        Verb::Diagnose(verb) => diagnose::main(&verb, arguments),
         Verb::Diff(verb) => return diff::main(&verb),
-        Verb::Fleet(verb) => fleet::main(&verb, &arguments),
-        Verb::Export(verb) => export::main(&verb, &arguments),
+        Verb::Fleet(verb) => fleet::main(&verb, arguments),
+        Verb::Export(verb) => export::main(&verb, arguments),
         Verb::Init(verb) => init::main(&verb),
         Verb::Explain(verb) => explain::main(&verb),
         Verb::Gc(verb) => gc::main(&verb),
@@ -104,7 +109,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),
         Verb::Show(verb) => show::main(&verb),
-        Verb::Simulate(verb) => simulate::main(&verb, &arguments),
+        Verb::Simulate(verb) => simulate::main(&verb, arguments),
         Verb::Tag(verb) => tag::main(&verb),
         Verb::Verify(verb) => return verify::main(&verb),
     };
@@ -123,7 +128,9 @@ fn complain(error: &Error) -> u8 {
 /// One fault a line, and how many there are where there are several.
 fn message(error: &Error) -> String {
     match error {
-        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => format!("{error}\nerror: {} faults", faults.len()),
+        Error::Spec(faults) | Error::Data(faults) if faults.len() > 1 => {
+            format!("{error}\nerror: {}", counted(faults.len(), "fault"))
+        }
         _ => format!("error: {error}"),
     }
 }

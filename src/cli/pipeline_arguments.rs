@@ -1,9 +1,9 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::means::Means;
+use super::means::{Means, Task};
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{Outcome, Plan, Selection};
+use crate::pipeline::{Outcome, Plan, Purpose, Selection};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;
@@ -36,7 +36,8 @@ impl PipelineArguments {
 
     /// Runs the selected stages with progress.
     pub fn run(&self, plan: &Plan, store: &Store, selection: Selection, command_line: &[OsString]) -> Result<Outcome> {
-        self.means.run(plan, store, selection, self.quiet, command_line)
+        let task = Task { purpose: Purpose::Run, selection, quiet: self.quiet };
+        self.means.run(plan, store, task, command_line)
     }
 
     /// The result, whose failure is also a document where one is asked for.

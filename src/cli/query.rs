@@ -8,7 +8,7 @@ use super::emit;
 use super::surroundings::open_store;
 use crate::audit::{QueryTables, query};
 use crate::error::{Error, Result};
-use crate::pipeline::Manifest;
+use crate::pipeline::{Manifest, find_run};
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -55,19 +55,14 @@ pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
         return Err(Error::spec("RUN", "the run comes before the SQL: calib query HEAD \"SELECT ...\""));
     }
     let store = open_store(arguments.store.as_deref())?;
-    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run(run)?)?);
+    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, run)?)?);
     let Some(sql) = arguments.sql.as_deref().map(str::trim) else {
         return list::tell(&store, &tables.iter().collect::<Vec<_>>(), arguments.json);
     };
     if !sql.is_empty() && !sql.contains(char::is_whitespace) && !arguments.csv {
         return list::tell(&store, &[tables.find(sql)?], arguments.json);
     }
-    // Where polars gives up in the middle, the error that follows says enough.
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(|_| ()));
-    let answer = query(&store, &tables, sql);
-    std::panic::set_hook(hook);
-    let answer = answer?;
+    let answer = query(&store, &tables, sql)?;
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&lines::csv(&answer)?),
         (_, true) => emit(&lines::json(&answer)?),

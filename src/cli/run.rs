@@ -2,7 +2,8 @@
 
 use super::pipeline_arguments::PipelineArguments;
 use super::{corrections, emit, emit_json, searches, tables};
-use crate::error::Result;
+use crate::error::{Result, counted};
+use crate::identified::standing_of;
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use clap::Args;
@@ -40,7 +41,7 @@ pub(super) struct RunArguments {
 const EXAMPLES: &str = "Examples:
   calib run pipelines/sr210d/pipeline.yaml
   calib run pipelines/case/pipeline.yaml --set case=recordings/robot-7
-  calib run pipeline.yaml --set seed=7 --set split.every=5 --dry-run
+  calib run pipeline.yaml --set seed=7 --set split.n=5 --dry-run
   calib run pipeline.yaml --from stiffness --force
   calib run pipeline.yaml --json --quiet > result.json";
 
@@ -68,11 +69,12 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     if shared.json {
         return emit_json(&document(&outcome, &store)?);
     }
-    let mut text = tables::statistics(&outcome, &store)?;
+    let standing = standing_of(&outcome.manifest, &store)?;
+    let mut text = tables::statistics(&outcome, standing.as_ref(), &store)?;
     text.push_str(&corrections::corrections(&outcome, &store)?);
     text.push_str(&searches::searches(&outcome, &store)?);
     text.push_str(&tables::rejected(&outcome));
-    text.push_str(&tables::headline(&outcome, &store)?);
+    text.push_str(&tables::headline(&outcome, standing.as_ref(), &store)?);
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }
@@ -84,11 +86,15 @@ fn closing(outcome: &Outcome, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
-        return format!("nothing to do: all {} stages are cached ({seconds:.1} s)\n", stages.len());
+        return format!("nothing to do: {} cached ({seconds:.1} s)\n", counted(stages.len(), "stage"));
     }
     let (executed, cached, not_run) = (count(StageStatus::Executed), count(StageStatus::Cached), count(StageStatus::NotRun));
     let not_run = if not_run > 0 { format!(", {not_run} not selected") } else { String::new() };
-    format!("done: {executed} stages run, {cached} cached{not_run} ({seconds:.1} s), run {}\n", outcome.manifest.run_id)
+    format!(
+        "done: {} run, {cached} cached{not_run} ({seconds:.1} s), run {}\n",
+        counted(executed, "stage"),
+        outcome.manifest.run_id
+    )
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {
@@ -108,6 +114,12 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 /// The result of a run for other programs.
 fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
+    let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
+        let withdrawn = stands.withdrawn.iter().map(|gone| {
+            json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
+        });
+        json!({ "step": stands.step, "model": stands.model, "withdrawn": withdrawn.collect::<Vec<_>>() })
+    });
     let stages: Vec<serde_json::Value> = manifest
         .stages
         .iter()
@@ -131,6 +143,7 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "pipeline": manifest.pipeline.name,
         "seed": manifest.seed,
         "stages": stages,
+        "standing": standing,
         "statistics": tables::statistics_json(outcome, store)?,
         "corrections": corrections::corrections_json(outcome, store)?,
         "searches": searches::searches_json(outcome, store)?,

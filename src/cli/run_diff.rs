@@ -2,6 +2,7 @@
 
 use crate::audit::{RunDiff, TableChange};
 use crate::diff::{ColumnDiff, TableDiff, headline, short};
+use crate::error::counted;
 
 /// Tables that are told one by one.
 const TABLES: usize = 6;
@@ -22,7 +23,7 @@ pub(super) fn text(diff: &RunDiff, stat: bool) -> String {
         text.push_str(&format!("{} {place}: {} -> {}\n", change.what, value(&change.before), value(&change.now)));
     }
     if diff.causes.len() > shown {
-        text.push_str(&format!("and {} more settings and files\n", diff.causes.len() - shown));
+        text.push_str(&format!("and {} of settings and files\n", counted(diff.causes.len() - shown, "more change")));
     }
     if diff.causes.is_empty() {
         text.push_str("settings, files and seeds are the same\n");
@@ -30,7 +31,7 @@ pub(super) fn text(diff: &RunDiff, stat: bool) -> String {
     let same = diff.tables.iter().filter(|table| table.status == "same").count();
     let mut differing: Vec<&TableChange> = diff.tables.iter().filter(|table| table.status != "same").collect();
     if differing.is_empty() {
-        return text + &format!("same: all {same} tables\n");
+        return text + &format!("same: {}\n", counted(same, "table"));
     }
     // What people ask for first; within one kind the order of the pipeline.
     let rank =
@@ -47,7 +48,7 @@ pub(super) fn text(diff: &RunDiff, stat: bool) -> String {
         text.push_str(&format!("also changed: {} (--stat tells each)\n", list(&rest)));
     }
     if same > 0 {
-        text.push_str(&format!("{same} tables are the same\n"));
+        text.push_str(&format!("same: {}\n", counted(same, "table")));
     }
     text
 }
@@ -65,8 +66,11 @@ fn summary(table: &TableChange) -> String {
     let Some(diff) = &table.diff else { return table.status.into() };
     let rows = &diff.rows;
     let all = rows.same + rows.within_tolerance + rows.changed;
-    let mut parts =
-        vec![if rows.changed == 0 { table.status.to_string() } else { format!("{} of {all} rows changed", rows.changed) }];
+    let mut parts = vec![if rows.changed == 0 {
+        table.status.to_string()
+    } else {
+        format!("{} of {} changed", rows.changed, counted(all, "row"))
+    }];
     for (count, what) in [(rows.only_a, "only in A"), (rows.only_b, "only in B"), (diff.duplicates(), "with duplicate keys")] {
         if count > 0 {
             parts.push(format!("{count} {what}"));

@@ -1,11 +1,11 @@
 //! `calib schema`: the tables with their columns and units, and the JSON Schema of the pipeline's YAML.
 
 use super::emit;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, counted, nearest};
 use crate::pipeline;
 use crate::stage::STAGES;
-use crate::store::read_table;
 use crate::store::schema::{self, TableSchema};
+use crate::store::{Loose, read_table};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 
@@ -57,8 +57,9 @@ pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
 
 fn check(file: &Path, kind: Option<&str>) -> Result<()> {
     let kind = kind.map(find).transpose()?.map(|schema| schema.name.as_str());
-    let frame = read_table(file, kind)?;
-    emit(&format!("{}: sound, {} rows, {}\n", frame.schema().id(), frame.rows(), frame.table_hash()))
+    let Loose { table, vouched } = read_table(file, kind)?;
+    let hash = if vouched { "" } else { " (the file carries no content hash: whether it was changed cannot be told)" };
+    emit(&format!("{}: sound, {}, {}{hash}\n", table.schema().id(), counted(table.rows(), "row"), table.table_hash()))
 }
 
 fn list() -> String {

@@ -2,8 +2,8 @@
 
 use super::surroundings::open_store;
 use super::{emit, emit_json, log};
-use crate::error::{Error, Result};
-use crate::pipeline::{Manifest, StageReport};
+use crate::error::{Error, Result, counted};
+use crate::pipeline::{Manifest, StageReport, find_run};
 use crate::store::TableRef;
 use clap::Args;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
         Some((run, stage)) => (run, Some(stage)),
         None => (arguments.run.as_str(), None),
     };
-    let run = store.find_run(run)?;
+    let run = find_run(&store, run)?;
     let manifest = Manifest::of(&store, &run)?;
     let Some(id) = stage else {
         return match (arguments.yaml, arguments.json) {
@@ -56,7 +56,7 @@ pub(super) fn main(arguments: &ShowArguments) -> Result<()> {
 }
 
 fn whole(manifest: &Manifest) -> String {
-    let mut text = format!("run {}, {}\n", manifest.run_id, log::status(manifest));
+    let mut text = format!("run {}, {}, {}\n", manifest.run_id, manifest.what(), log::status(manifest));
     text.push_str(&manifest.error.as_ref().map_or_else(String::new, |error| format!("error: {error}\n")));
     let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!(", {seconds:.1} s"));
     let memory = manifest.peak_memory_bytes.map_or_else(String::new, |bytes| format!(", {:.0} MB at most", bytes as f64 / 1e6));
@@ -68,8 +68,13 @@ fn whole(manifest: &Manifest) -> String {
     let (tool, host) = (&manifest.tool, &manifest.host);
     let user = manifest.user.as_ref().map_or_else(String::new, |user| format!("{user} on "));
     text.push_str(&format!(
-        "{} {} on {user}{}, {} {}, {} jobs\n",
-        tool.name, tool.version, host.name, host.os, host.architecture, manifest.jobs
+        "{} {} on {user}{}, {} {}, {}\n",
+        tool.name,
+        tool.version,
+        host.name,
+        host.os,
+        host.architecture,
+        counted(manifest.jobs, "job")
     ));
     if let Some(previous) = &manifest.previous {
         text.push_str(&format!("after run {}\n", previous.run));
@@ -108,7 +113,7 @@ fn one(stage: &StageReport) -> String {
         ));
     }
     let mut table = |verb: &str, what: String, table: &TableRef| {
-        text.push_str(&format!("{verb:7} {what}, {} rows, {:.12}\n", table.rows, table.table_hash.as_str()));
+        text.push_str(&format!("{verb:7} {what}, {}, {:.12}\n", counted(table.rows, "row"), table.table_hash.as_str()));
     };
     stage.inputs.iter().for_each(|input| table("reads", format!("{} <- {}", input.port, input.from), &input.table));
     stage.outputs.iter().for_each(|output| table("writes", format!("{} ({})", output.port, output.table.schema), &output.table));

@@ -1,10 +1,10 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
 use crate::error::Result;
-use crate::pipeline::{Outcome, StageReport};
+use crate::pipeline::Outcome;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
-use crate::table::{Parameters, Prediction, Statistics, StatisticsRow, Table, standing};
+use crate::table::{Standing, Statistics, StatisticsRow, Table};
 use serde_json::json;
 
 fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
@@ -18,8 +18,12 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
 /// Three tables: points that no model has seen, those that the models were fitted to, and these again
 /// cross-validated. `expected` is the rms of a complete
 /// model under the instrument's noise.
-pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
-    let rows = rows(outcome, store)?;
+pub(super) fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+    let mut rows = rows(outcome, store)?;
+    let withdrawn: Vec<&str> = standing.iter().flat_map(|stands| &stands.withdrawn).map(|gone| gone.step.as_str()).collect();
+    for row in rows.iter_mut().filter(|row| withdrawn.contains(&row.step.as_str())) {
+        row.step.push_str(" (withdrawn)");
+    }
     let mut text = String::new();
     for (held_out, title) in [
         (false, "training points (the models were fitted to these: flattered)"),
@@ -35,32 +39,31 @@ pub(super) fn statistics(outcome: &Outcome, store: &Store) -> Result<String> {
     Ok(text)
 }
 
-/// What the diagnosed model makes of the held-out set with most points, in a line; nothing without a diagnosis.
-pub(super) fn headline(outcome: &Outcome, store: &Store) -> Result<String> {
-    let stages = &outcome.manifest.stages;
-    let writes = |stage: &StageReport, kind: &str| stage.outputs.iter().any(|output| output.kind == kind);
-    let steps = stages.iter().filter(|stage| writes(stage, Prediction::KIND));
-    let steps = steps.map(|stage| (stage.id.as_str(), writes(stage, Parameters::KIND)));
-    let Some(diagnosed) = stages.iter().rfind(|stage| stage.uses == Diagnose::NAME && writes(stage, Parameters::KIND)) else {
-        return Ok(String::new());
-    };
-    for output in diagnosed.outputs.iter().filter(|output| output.kind == Parameters::KIND) {
-        if Parameters::from_frame(&store.load(&output.table)?)?.is_beside() {
-            return Ok(String::new());
-        }
+/// What the model that stands makes of the held-out set with most points, in a line, where it was diagnosed; a line more for every
+/// step that was worse.
+pub(super) fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+    let Some(standing) = standing else { return Ok(String::new()) };
+    let mut text: String = standing.withdrawn.iter().map(|gone| format!("{gone}\n")).collect();
+    if !standing.withdrawn.is_empty() {
+        text.push_str(&format!("`calib compensate` and `calib export` take the step `{}`\n", standing.model));
+    }
+    if !outcome.manifest.stages.iter().any(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty()) {
+        return Ok(text);
     }
     let rows = rows(outcome, store)?;
-    let Some(standing) = standing(steps, &diagnosed.id) else { return Ok(String::new()) };
-    let own = rows.iter().filter(|row| row.held_out && row.step == standing);
-    let Some(after) = own.max_by_key(|row| row.points) else { return Ok(String::new()) };
+    let own = rows.iter().filter(|row| row.held_out && row.step == standing.step);
+    let Some(after) = own.max_by_key(|row| row.points) else { return Ok(text) };
     let earlier = rows.iter().filter(|row| row.held_out && row.set == after.set && row.order < after.order);
     let before = earlier.min_by_key(|row| row.order).map_or_else(String::new, |row| {
         format!("mean {:.4} mm, max {:.4} mm after `{}`, now ", row.mean_mm, row.max_mm, row.step)
     });
-    Ok(format!(
-        "the diagnosed model, {} held-out points of set {}: {before}mean {:.4} mm, max {:.4} mm after `{}`\n",
+    let diagnosed = outcome.manifest.stage(&standing.model).is_some_and(|stage| stage.uses == Diagnose::NAME);
+    let model = if diagnosed { "the diagnosed model" } else { "the model that stands" };
+    text.push_str(&format!(
+        "{model}, {} held-out points of set {}: {before}mean {:.4} mm, max {:.4} mm after `{}`\n",
         after.points, after.set, after.mean_mm, after.max_mm, after.step
-    ))
+    ));
+    Ok(text)
 }
 
 /// Training points under fits without them; nothing where no step made folds.

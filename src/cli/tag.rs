@@ -3,6 +3,7 @@
 use super::emit;
 use super::surroundings::open_store;
 use crate::error::{Error, Result};
+use crate::pipeline::find_run;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,7 +37,7 @@ pub(super) fn main(arguments: &TagArguments) -> Result<()> {
     }
     match (&arguments.run, &arguments.name) {
         (Some(run), Some(name)) => {
-            let run = store.find_run(run)?;
+            let run = find_run(&store, run)?;
             store.tag(name, &run)?;
             emit(&format!("{name} is run {run}\n"))
         }

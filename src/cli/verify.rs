@@ -2,7 +2,7 @@
 
 use super::surroundings::{bucket, default_store, open_store};
 use super::{complain, emit, emit_json};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::store::Verification;
 use clap::Args;
 use std::path::PathBuf;
@@ -49,17 +49,17 @@ fn text(found: &Verification) -> String {
         text.push_str(&format!("and {} more\n", found.faults.len() - SHOWN));
     }
     text.push_str(&format!(
-        "{} tables ({:.1} MB), {} action records, {} runs, {} tags, {} copies for people: ",
-        found.objects,
+        "{} ({:.1} MB), {}, {}, {}, {} for people: ",
+        counted(found.objects, "table"),
         found.bytes as f64 / 1e6,
-        found.actions,
-        found.runs,
-        found.tags,
-        found.copies
+        counted(found.actions, "action record"),
+        counted(found.runs, "run"),
+        counted(found.tags, "tag"),
+        counted(found.copies, "copy")
     ));
     text.push_str(&match found.faults.len() {
         0 => "all as they were written\n".to_string(),
-        faults => format!("{faults} faults\n"),
+        faults => format!("{}\n", counted(faults, "fault")),
     });
     text
 }

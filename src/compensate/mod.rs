@@ -6,6 +6,7 @@
 //! every step gains about three digits. Frames: targets are in the robot's base frame, as identified.
 
 mod arm;
+mod correct;
 mod coverage;
 mod inverse;
 mod rigid;
@@ -13,6 +14,7 @@ mod solve;
 mod uncertainty;
 
 pub use arm::{Arm, Circumstance, Reach};
+pub use correct::{Answer, Corrector, Manner, Tally, Target, turns};
 pub use coverage::Coverage;
 pub(crate) use coverage::beyond_limits;
 pub use inverse::inverse;

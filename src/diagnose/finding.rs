@@ -1,6 +1,7 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::Course;
+use super::group::{groups, ranges};
 use super::judge::Worth;
 use super::pool::Pool;
 use super::rivals::{exact, rivals};
@@ -8,11 +9,10 @@ use super::state::solve;
 use super::statement::sentence;
 use super::verdict::Looked;
 use crate::effect::{
-    AxisWobble, Backlash, Basis, Effect, Form, GearCyclic, JointCompliance, JointHardening, JointLogLag, Number, ParameterSpec,
-    Place, ReductionRatio, Term, Told, Unknown, Variable, cause, people,
+    Basis, Clock, Effect, Form, JointLogLag, Number, ParameterSpec, Place, ReductionRatio, Told, Variable, people,
 };
+use crate::error::counted;
 use crate::estimate::{Fate, Kind, Screening, Suspect, tail};
-use std::collections::BTreeMap;
 
 /// How well a finding stands.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -66,44 +66,24 @@ impl Finding {
     }
 }
 
-/// Chosen causes by the name that they are called and their place: positions among the chosen.
-type Key = (&'static str, Place);
-type Groups = BTreeMap<Key, Vec<usize>>;
-
 /// The chosen causes as findings, strongest first.
 pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
     if let Some(offset) = last.screening.apart {
-        let rows = offset.abs();
+        let rows = counted(offset.unsigned_abs() as usize, "row");
         let how = if offset < 0 { "before" } else { "behind" };
-        let text = format!(
-            "the joints of a point stand {rows} rows {how} it: join the two logs anew, nothing else can be said until then"
-        );
-        return vec![of_the_recording("joint_log_lag", text)];
+        let text =
+            format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
+        return vec![of_the_recording(JointLogLag::NAME, text)];
     }
     let pool = looked.pool;
     // The pool's sets are ascending; the chosen causes stand in their own order.
     let set = &looked.set;
     let mut sorted = set.clone();
     sorted.sort_unstable();
-    let ranges = last.model.stack.effects().count() - last.chosen.len();
-    let ranges: Vec<_> = last.model.stack.effects().skip(ranges).map(|(_, range)| range).collect();
-    let mut groups: Groups = BTreeMap::new();
-    for (i, k) in set.iter().enumerate() {
-        let form = &pool.hypotheses[*k].form;
-        let values = &last.model.x[ranges[i].clone()];
-        groups.entry((form.called(values, looked.survey), form.place())).or_default().push(i);
-    }
-    refine(pool, &mut groups, set);
-    both_angles(pool, &mut groups, set);
-    wobbles(pool, &mut groups, set);
-    // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
-    let hard: Vec<Place> = groups.keys().filter(|key| key.0 == JointHardening::NAME).map(|key| key.1).collect();
-    for place in hard {
-        if let Some(more) = groups.remove(&(JointCompliance::NAME, place)) {
-            groups.entry((JointHardening::NAME, place)).or_default().extend(more);
-        }
-    }
+    let ranges = ranges(last);
+    let groups = groups(last, set, pool, looked.survey);
     let whole = solve(pool, &sorted);
+    let clock = Clock::of(looked.survey.data);
     let bic = pool.bic(&sorted);
     let mut out = Vec::new();
     for ((effect, place), members) in groups {
@@ -158,7 +138,7 @@ pub(crate) fn findings(last: &Course, looked: &Looked) -> Vec<Finding> {
             Place::Joint(joint) => Some((joint, table.unwrap_or(looked.survey.range[joint]))),
             _ => None,
         };
-        let statement = sentence(effect, &Told { place, forms: &forms, numbers: &numbers }, effect_rms);
+        let statement = sentence(effect, &Told { place, forms: &forms, numbers: &numbers, clock }, effect_rms);
         out.push(Finding { effect, place, statement, numbers, evidence: Some(evidence), rivals, valid, forms });
     }
     let data = looked.survey.data;
@@ -183,82 +163,6 @@ fn worth_of(forms: &[Form], place: Place, worths: &[Worth]) -> Option<f64> {
     own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|worth| worth.gain)
 }
 
-/// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
-fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
-    let mut sorted = set.to_vec();
-    sorted.sort_unstable();
-    let whole = solve(pool, &sorted).gain;
-    let finer = |name| cause(name).map_or(&[] as &[&str], |cause| cause.finer());
-    let gain = |members: &[usize]| {
-        let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
-        let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
-        whole - solve(pool, &rest).gain
-    };
-    let gains: BTreeMap<Key, f64> = groups.iter().map(|(key, members)| (*key, gain(members))).collect();
-    for (small, own) in &gains {
-        let main = gains
-            .iter()
-            .filter(|(main, gain)| {
-                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer(main.0).contains(&small.0);
-                // Both go with the side of the last move.
-                joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < TRACE * **gain)
-            })
-            .max_by(|a, b| a.1.total_cmp(b.1));
-        if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
-            let members = groups.remove(small).unwrap_or_default();
-            groups.entry(*main).or_default().extend(members);
-        }
-    }
-}
-
-/// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
-fn both_angles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
-    let form = |i: &usize| &pool.hypotheses[set[*i]].form;
-    let main = groups.iter().find_map(|(key, members)| {
-        let angles = members.iter().find_map(|i| form(i).term()?.two_angles())?;
-        let Place::Joint(joint) = form(&members[0]).place() else { return None };
-        Some((*key, joint, angles))
-    });
-    let Some((main, joint, angles)) = main else { return };
-    let is_part = |i: &usize| match (form(i).place(), form(i).term().map(Term::basis)) {
-        (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
-        (at, Some(Basis::Wave { order, .. })) if form(i).is(&GearCyclic) => {
-            at == Place::Joint(joint) && angles.contains(&joint) && order <= SLOW
-        }
-        _ => false,
-    };
-    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| *key).collect();
-    for part in parts {
-        let members = groups.remove(&part).unwrap_or_default();
-        groups.entry(main).or_default().extend(members);
-    }
-}
-
-/// Orders that a smooth function of an angle may have, too.
-const SLOW: u32 = 2;
-
-/// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
-fn wobbles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
-    // Of a joint that follows a sine of another joint's angle, that other joint.
-    let by = |i: &usize| {
-        let term = pool.hypotheses[set[*i]].form.term()?;
-        match (term.basis(), term.of_one()) {
-            (Basis::Wave { .. }, Some((joint, Variable::Angle { joint: by }))) if by != joint => {
-                Some((AxisWobble::NAME, Place::Joint(by)))
-            }
-            _ => None,
-        }
-    };
-    let unknown: Vec<Key> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
-    for key in unknown {
-        let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
-        if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {
-            let members = groups.remove(&key).unwrap_or_default();
-            groups.entry(wobble).or_default().extend(members);
-        }
-    }
-}
-
 /// Joints that turn the other way than the robot file says.
 fn reversals(last: &Course) -> Vec<Finding> {
     let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.fates);
@@ -278,10 +182,6 @@ fn reversals(last: &Course) -> Vec<Finding> {
 /// A reversed joint's ratio is -1 to this.
 const REVERSED_WITHIN: f64 = 0.1;
 
-/// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
-const REFINEMENT: f64 = 0.1;
-const TRACE: f64 = 0.05;
-
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     // What has no other explanation than that it is far out must be farther than this noise reaches.
@@ -293,21 +193,22 @@ fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     let list = |rows: &[usize]| {
         let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
         let more = rows.len().saturating_sub(20);
-        format!("{}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+        let noun = if rows.len() == 1 { "row" } else { "rows" };
+        format!("{noun} {}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
     };
     let mut out = Vec::new();
     let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
     if !swapped.is_empty() {
-        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: rows {}", list(&swapped))));
+        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped))));
     }
     let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
     if !shifted.is_empty() {
-        let text = format!("joints and points are rows apart in the recording: rows {}", list(&shifted));
+        let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
         out.push(of_the_recording("joint_log_lag", text));
     }
     let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
     if !wrong.is_empty() {
-        out.push(of_the_recording("outlier", format!("single wrong points: rows {}", list(&wrong))));
+        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong))));
     }
     out
 }

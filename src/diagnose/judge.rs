@@ -18,11 +18,13 @@ pub(crate) struct Worth {
 /// A model that is worse on held-out rows by this share, and by so many standard errors, is worse.
 const WORSE: f64 = 0.03;
 const CLEARLY: f64 = 2.0;
+/// Without a share that matters it takes more: every finding is asked.
+const BEYOND_DOUBT: f64 = 3.0;
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
 
 /// Held-out rows that belong.
-struct HeldOut {
+pub(super) struct HeldOut {
     /// Squared errors, m2, by row.
     squares: BTreeMap<usize, f64>,
     /// Whether they lie along a path.
@@ -31,7 +33,7 @@ struct HeldOut {
 
 impl HeldOut {
     /// `None` where no row is held out.
-    fn of(now: &Course, data: &Measurements, question: &Question) -> Option<Self> {
+    pub fn of(now: &Course, data: &Measurements, question: &Question) -> Option<Self> {
         let aside = |row: &usize| now.screening.suspects.iter().any(|s| s.row == *row && !s.used());
         let predicted = now.model.predict(data);
         let rows = question.validate.iter().filter(|row| !aside(row));
@@ -40,7 +42,7 @@ impl HeldOut {
         (!squares.is_empty()).then(|| Self { squares, moving: data.in_motion(question.validate) })
     }
 
-    fn rms(&self) -> f64 {
+    pub fn rms(&self) -> f64 {
         (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
     }
 
@@ -51,6 +53,16 @@ impl HeldOut {
 
     /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
     fn is_better_than(&self, other: &Self) -> bool {
+        self.rms() < other.rms() * (1.0 - WORSE) && self.fall_from(other) > CLEARLY
+    }
+
+    /// Whether this is better than `other`, by however little, beyond what the rows' scatter would have.
+    pub fn is_beyond_doubt_better_than(&self, other: &Self) -> bool {
+        self.fall_from(other) > BEYOND_DOUBT
+    }
+
+    /// By how many standard errors squared errors are smaller than those of `other`.
+    fn fall_from(&self, other: &Self) -> f64 {
         let falls: Vec<f64> = self.squares.iter().filter_map(|(row, own)| Some(other.squares.get(row)? - own)).collect();
         let count = falls.len() as f64;
         let mean = falls.iter().sum::<f64>() / count;
@@ -58,7 +70,8 @@ impl HeldOut {
         // Rows along a path are not as many opinions as there are rows.
         let off: Vec<f64> = falls.iter().map(|fall| fall - mean).collect();
         let count = if self.moving { count / rows_alike(&off, 1) } else { count };
-        self.rms() < other.rms() * (1.0 - WORSE) && mean > CLEARLY * (variance / count).sqrt()
+        let error = (variance / count).sqrt();
+        if error.is_nan() { 0.0 } else { mean / error.max(f64::MIN_POSITIVE) }
     }
 }
 

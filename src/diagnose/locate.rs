@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::state::State;
-use crate::effect::{Basis, Effect, Form, Survey, Variable};
+use crate::effect::{Basis, Clock, Effect, Form, Survey, Variable};
 use std::collections::BTreeMap;
 
 /// The best of all hypotheses at a place, or of a variable.
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 pub struct Share {
     /// `place` or `variable`.
     pub by: &'static str,
-    /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time`.
+    /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
     pub name: String,
     /// Of the squared residual that the base model leaves, in standard deviations.
     pub share: f64,
@@ -46,11 +46,13 @@ pub struct Located {
 pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
     let mut best: BTreeMap<(&'static str, String), Share> = BTreeMap::new();
     let mut spectrum = Vec::new();
+    let clock = Clock::of(survey.data);
     for (fall, h) in state.falls(pool) {
         let form = &pool.hypotheses[*h].form;
         let (gain, numbers) = state.gain(pool, *h);
         let share = gain / state.square.max(f64::MIN_POSITIVE);
-        let names = std::iter::once(("place", form.place().to_string())).chain(variables(form).map(|name| ("variable", name)));
+        let names =
+            std::iter::once(("place", form.place().to_string())).chain(variables(form, clock).map(|name| ("variable", name)));
         for (by, name) in names {
             // Falls come largest first: the first one stands.
             best.entry((by, name.clone())).or_insert(Share {
@@ -72,8 +74,8 @@ pub(crate) fn locate(pool: &Pool, state: &State, survey: &Survey) -> Located {
 }
 
 /// What a form depends on, in words.
-fn variables(form: &Form) -> Option<String> {
-    let names: Vec<String> = form.variables().iter().map(Variable::to_string).collect();
+fn variables(form: &Form, clock: Clock) -> Option<String> {
+    let names: Vec<String> = form.variables().into_iter().map(|variable| clock.named(variable)).collect();
     (!names.is_empty()).then(|| names.join(" and "))
 }
 

@@ -7,6 +7,7 @@
 mod currents;
 mod finding;
 mod gate;
+mod group;
 mod judge;
 mod lens;
 mod locate;
@@ -19,8 +20,10 @@ mod sense;
 mod separate;
 mod state;
 mod statement;
+mod unasked;
 mod unseen;
 mod verdict;
+mod withdraw;
 
 pub use crate::effect::Number;
 pub use finding::{Evidence, Finding, Rival};
@@ -40,6 +43,8 @@ use lens::Lens;
 use nalgebra::Matrix3;
 use pool::Pool;
 use search::{Search, SearchOptions};
+use withdraw::Court;
+use crate::error::counted;
 
 /// Effects that the user's simulation has.
 pub const BASE: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
@@ -97,10 +102,13 @@ struct Chosen {
     known: Vec<Prior>,
 }
 
-/// Diagnoses a recording. `tell` hears what is going on.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` hears what is going on.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     let robot = question.robot;
     let mut data = question.data.clone();
+    if question.fit.len() < unasked::FEWEST {
+        return unasked::not_asked(question);
+    }
     let base = base_model(robot, &data, question.fit);
     let rigid = base.stack.effects().count();
     let mut now = fitted((&base, rigid), None, &[], &data, question);
@@ -112,7 +120,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         now = fitted((&base, rigid), Some(&free), &[], &data, question);
     }
     let before = now.model.predict(&data);
-    tell(format!("{} rows, {} numbers of the base model estimated", now.screening.kept.len(), free.len()));
+    tell(format!("{}, {} of the base model estimated", counted(now.screening.kept.len(), "row"), counted(free.len(), "number")));
     let mut asked_residual = false;
     let mut first = None;
     let mut located = None;
@@ -140,9 +148,9 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let forms: Vec<Form> = found.set.iter().map(|k| search.pool.hypotheses[*k].form.clone()).collect();
         let coefficients: Vec<Vec<f64>> = search.coefficients(&found.set);
         tell(format!(
-            "round {round}: {} hypotheses, {} causes{} (p = {:.3} that the rest is noise)",
+            "round {round}: {} hypotheses, {}{} (p = {:.3} that the rest is noise)",
             search.pool.hypotheses.len(),
-            forms.len(),
+            counted(forms.len(), "cause"),
             forms.iter().map(|form| format!("; {}", form.key())).collect::<String>(),
             found.last
         ));
@@ -170,11 +178,16 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         if (same && kept_same) || last_round {
             let mut set = found.set.clone();
-            let (last, worths) = judge::judge(next, &mut set, search.pool, &free, rigid, &data, question);
+            let (last, mut worths) = judge::judge(next, &mut set, search.pool, &free, rigid, &data, question);
+            let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(&free), chosen, &data, question);
+            let court = Court { pool: search.pool, survey: &survey, data: &data, question, refit: &refit };
+            let (last, withdrawn) = withdraw::withdraw(last, &mut set, &mut worths, &court);
+            withdrawn.iter().for_each(|sentence| tell(format!("taken back: {sentence}")));
             let rest = if set == found.set { found.last } else { search.gate(&set) };
             let first = first.unwrap_or(1.0);
             let located = located.unwrap_or_default();
-            let looked = verdict::Looked { pool: search.pool, set, first, last: rest, survey: &survey, worths, located };
+            let looked =
+                verdict::Looked { pool: search.pool, set, first, last: rest, survey: &survey, worths, withdrawn, located };
             return verdict::conclude(question, &data, &before, &last, repeatability, looked);
         }
         drop(pool);

@@ -1,11 +1,11 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
-use crate::effect::{Survey, Told, cause};
+use crate::effect::{Clock, Survey, Told, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
 pub(crate) fn sentence(effect: &str, told: &Told, rms: f64) -> String {
     let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(told));
-    format!("{text} ({:.0} um rms at the tool).", rms * 1e6)
+    format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
 }
 
 /// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
@@ -31,11 +31,14 @@ pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
             if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
         out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
     }
-    if !survey.robot.has_masses() {
-        out.push("gravity effects: the robot file gives no link masses".into());
+    out.extend(masses(survey));
+    let clock = Clock::of(survey.data);
+    if clock == Clock::Rows {
+        out.push("time: none was recorded; the order of the rows stands for it".into());
     }
     if survey.data.temperature.is_none() {
-        out.push("temperature: none was recorded; growth is told from drift by time alone".into());
+        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
+        out.push(format!("temperature: none was recorded; growth is told from drift by {by} alone"));
     }
     if survey.data.current.is_none() {
         out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
@@ -45,6 +48,24 @@ pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     }
     out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
     out
+}
+
+/// Links whose weight the robot file does not give.
+fn masses(survey: &Survey) -> Option<String> {
+    let all = &survey.robot.description().joints;
+    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
+    match bare.len() {
+        0 => None,
+        none if none == all.len() => Some("gravity effects: the robot file gives no link masses".into()),
+        some => {
+            let (own, all) = (all.len() - some, all.len());
+            let bare = bare.join(", ");
+            Some(format!(
+                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+            ))
+        }
+    }
 }
 
 /// Where nothing else is needed.
@@ -62,7 +83,7 @@ pub(crate) fn next(findings: &[super::Finding]) -> Vec<String> {
     out
 }
 
-/// What is not a pose and may tell two effects apart.
+/// What is not a pose and may separate two effects.
 pub(crate) fn other_means(a: &str, b: &str) -> Option<&'static str> {
     let measures = [a, b].into_iter().filter_map(|name| cause(name)?.measure());
     measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)

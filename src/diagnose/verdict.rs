@@ -19,6 +19,8 @@ pub enum Verdict {
     Explained,
     NothingMissing,
     Unexplained,
+    /// Too few rows were fitted.
+    NotAsked,
 }
 
 impl Verdict {
@@ -27,6 +29,7 @@ impl Verdict {
             Self::Explained => "explained",
             Self::NothingMissing => "nothing_missing",
             Self::Unexplained => "unexplained",
+            Self::NotAsked => "not_asked",
         }
     }
 }
@@ -41,7 +44,7 @@ pub struct Errors {
 
 impl Errors {
     /// Of some rows; `None` of no rows.
-    fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
+    pub(super) fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
         let lengths: Vec<f64> = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect();
         let count = lengths.len() as f64;
         (count > 0.0).then(|| Self {
@@ -64,6 +67,10 @@ pub struct Diagnosis {
     pub held_out: bool,
     /// Strongest first.
     pub findings: Vec<Finding>,
+    /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
+    pub withdrawn: Vec<String>,
+    /// Whether the recording has a clock; else times in the model count rows from 0.
+    pub clock: bool,
     pub screening: Screening,
     /// What these data cannot show, a sentence each.
     pub not_observable: Vec<String>,
@@ -71,11 +78,11 @@ pub struct Diagnosis {
     pub signature: Option<String>,
     /// What to measure next, a sentence each.
     pub next_measurements: Vec<String>,
-    /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise.
+    /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise, where that was asked.
     pub leftover_rms: f64,
     pub chi_square: f64,
-    pub gate_first: f64,
-    pub gate_last: f64,
+    pub gate_first: Option<f64>,
+    pub gate_last: Option<f64>,
     pub repeatability: Repeatability,
     /// Where the residual sits before and after the findings.
     pub located_before: Located,
@@ -96,6 +103,8 @@ pub(crate) struct Looked<'a, 'b> {
     pub first: f64,
     pub last: f64,
     pub worths: Vec<Worth>,
+    /// What was found and taken back, a sentence each.
+    pub withdrawn: Vec<String>,
     /// Where the residual of the base model sits.
     pub located: Located,
     pub survey: &'b Survey<'a>,
@@ -193,14 +202,16 @@ pub(crate) fn conclude(
         after: Errors::of(data, &predicted, rows),
         held_out,
         findings,
+        withdrawn: looked.withdrawn,
+        clock: data.has_clock(),
         screening: last.screening.clone(),
         not_observable,
         signature,
         next_measurements,
         leftover_rms: square(kept, &|row| (data.position[row] - predicted[row]).norm()),
         chi_square,
-        gate_first: looked.first,
-        gate_last: looked.last,
+        gate_first: Some(looked.first),
+        gate_last: Some(looked.last),
         repeatability,
         located_before: looked.located,
         located_after,

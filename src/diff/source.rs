@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
+use crate::raw;
 use crate::store::schema::{self, TableSchema, Version};
 
 /// Rows that are decoded at a time.
@@ -52,14 +53,16 @@ impl Source {
     pub fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let unreadable = |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));
-        let file = File::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+        let file = raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
         // Arrow's own types (dictionaries, views) are left aside, so that every writer's text is plain text.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let metadata = ArrowReaderMetadata::load(&file, options).map_err(unreadable)?;
+        let metadata =
+            raw::decoded(|| ArrowReaderMetadata::load(&file, options)).map_err(|e| unreadable(ParquetError::General(e)))?;
+        let metadata = metadata.map_err(unreadable)?;
         let footer = metadata.metadata().file_metadata();
         let rows = usize::try_from(footer.num_rows()).unwrap_or(0);
         if u32::try_from(rows).is_err() {
-            return Err(Error::spec(place, format!("{rows} rows; a comparison takes up to {}", u32::MAX)));
+            return Err(Error::spec(place, format!("{}; a comparison takes up to {}", counted(rows, "row"), u32::MAX)));
         }
         let said: BTreeMap<String, String> = footer
             .key_value_metadata()
@@ -133,9 +136,10 @@ impl Source {
             .iter()
             .map(|column| (ascending.binary_search(column).unwrap_or_default(), self.columns[*column].kind))
             .collect();
-        Ok(reader.map(move |batch| {
+        let mut reader = reader;
+        Ok(std::iter::from_fn(move || raw::decoded(|| reader.next()).transpose()).map(move |batch| {
             let damaged = |e: &dyn std::fmt::Display| Error::spec(&place, format!("damaged, cannot be read to its end: {e}"));
-            let batch: RecordBatch = batch.map_err(|e| damaged(&e))?;
+            let batch: RecordBatch = batch.map_err(|e| damaged(&e))?.map_err(|e| damaged(&e))?;
             wanted.iter().map(|&(at, kind)| plain(batch.column(at), kind).map_err(|e| damaged(&e))).collect()
         }))
     }

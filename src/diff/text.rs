@@ -1,6 +1,7 @@
 //! A comparison as a short text: counts, columns that differ, the worst rows; never a dump.
 
 use super::{ColumnDiff, TableDiff, WorstCell};
+use crate::error::counted;
 
 /// How much a text shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,9 +15,10 @@ pub enum Detail {
 pub fn text(diff: &TableDiff, detail: Detail) -> String {
     let rows = &diff.rows;
     if let Some(equal) = diff.equal {
-        return format!("same: {} rows, {}\n", rows.same, equal.says());
+        return format!("same: {}, {}\n", counted(rows.same, "row"), equal.says());
     }
-    let mut text = format!("A  {}  {} rows\nB  {}  {} rows\n", diff.a.path, diff.a.rows, diff.b.path, diff.b.rows);
+    let mut text =
+        format!("A  {}  {}\nB  {}  {}\n", diff.a.path, counted(diff.a.rows, "row"), diff.b.path, counted(diff.b.rows, "row"));
     for finding in &diff.findings {
         let column = if finding.column.is_empty() { String::new() } else { format!(" {}", finding.column) };
         text.push_str(&format!("{}{column}: {}\n", finding.what, finding.says));
@@ -31,8 +33,10 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
     text.push_str(&format!(", {} only in A, {} only in B\n", rows.only_a, rows.only_b));
     if diff.duplicates() > 0 {
         text.push_str(&format!(
-            "duplicate keys: {} keys, {} rows of A, {} of B, not compared; --occurrence pairs them in their order\n",
-            rows.duplicate_keys, rows.duplicate_a, rows.duplicate_b
+            "duplicate keys: {}, {} of A, {} of B, not compared; --occurrence pairs them in their order\n",
+            counted(rows.duplicate_keys, "key"),
+            counted(rows.duplicate_a, "row"),
+            rows.duplicate_b
         ));
     }
     text.push_str(&columns(&diff.columns));
@@ -40,12 +44,16 @@ pub fn text(diff: &TableDiff, detail: Detail) -> String {
         return text;
     }
     if !diff.worst.is_empty() {
-        text.push_str(&format!("worst {} of {} changed rows\n", diff.worst.len(), rows.changed));
+        text.push_str(&format!("worst {} of {}\n", diff.worst.len(), counted(rows.changed, "changed row")));
     }
     for row in &diff.worst {
         const SHOWN: usize = 3; // more do not fit on a line
         let cells: Vec<String> = row.cells.iter().take(SHOWN).map(cell).collect();
-        let more = if row.cells.len() > SHOWN { format!("; {} more columns", row.cells.len() - SHOWN) } else { String::new() };
+        let more = if row.cells.len() > SHOWN {
+            format!("; {}", counted(row.cells.len() - SHOWN, "more column"))
+        } else {
+            String::new()
+        };
         text.push_str(&format!("  {}: {}{more}\n", row.key, cells.join("; ")));
     }
     for (keys, what) in
@@ -108,7 +116,7 @@ fn columns(columns: &[ColumnDiff]) -> String {
         ));
     }
     if equal > 0 {
-        text.push_str(&format!("{equal} more columns are equal\n"));
+        text.push_str(&format!("equal: {}\n", counted(equal, "more column")));
     }
     text
 }

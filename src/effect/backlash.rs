@@ -1,7 +1,7 @@
 //! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
 
 use super::basis::around;
-use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable};
+use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -9,6 +9,8 @@ pub struct Backlash;
 
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
+/// Smallest and largest threshold and blur, as shares of the joint's largest load: there the load or the approach decides alone.
+const THRESHOLDS: [f64; 2] = [1e-3, 1.5];
 
 /// The side that the load pushes the joint to, blurred over some torque.
 fn by_load(joint: usize, width: f64) -> Law {
@@ -68,12 +70,13 @@ impl Cause for Backlash {
         vec![("half_gap".into(), Unit::Radian, 0.01)]
     }
 
-    fn near(&self, term: &Term, _survey: &Survey, level: i32) -> Vec<Term> {
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
         let Variable::Push { joint, friction_nm } = term.law().first.of else { return Vec::new() };
         let width = if let Basis::Rise { width, .. } = term.basis() { width } else { 0.0 };
+        let bounds = THRESHOLDS.map(|share| share * survey.load(joint));
         let scaled = |value: f64| {
-            let wide = around(value, 1.6, 0.5, level, [f64::NEG_INFINITY, f64::INFINITY]);
-            wide.chain(around(value, 1.25, 0.5, level, [f64::NEG_INFINITY, f64::INFINITY]))
+            let sizes = [1.6, 1.25].into_iter().flat_map(move |first| around(value.abs(), first, 0.5, level, bounds));
+            sizes.map(move |size| libm::copysign(size, value))
         };
         let wider = scaled(width).filter(|_| width > 0.0).map(|width| mixed(joint, friction_nm, width));
         scaled(friction_nm).map(|friction_nm| mixed(joint, friction_nm, width)).chain(wider).map(|law| term.with(law)).collect()
@@ -84,8 +87,8 @@ impl Cause for Backlash {
         let by = match told.terms(Self::NAME).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {
-                let friction = friction_nm.abs();
-                format!("by the direction from which it came, above about {friction:.0} Nm to the side that the load pushes it")
+                let friction = figure(friction_nm.abs(), 0);
+                format!("by the direction from which it came, above about {friction} Nm to the side that the load pushes it")
             }
             Some(_) => "by the direction from which it came".to_string(),
             None => return format!("{place} has lost motion to the side that its load pushes it"),

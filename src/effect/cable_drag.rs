@@ -27,7 +27,7 @@ impl Cause for CableDrag {
     fn sentence(&self, told: &Told) -> String {
         let place = told.place;
         match told.terms(Unknown::NAME).next() {
-            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law)),
+            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law, told.clock)),
             None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
         }
     }

@@ -4,7 +4,7 @@
 
 use super::{
     About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Survey, Term,
-    Told, Variable,
+    Told, Variable, figure,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -49,7 +49,8 @@ impl Cause for CouplingRatio {
     }
 
     fn sentence(&self, told: &Told) -> String {
-        format!("{}: the second moves with the first by {} of its angle", told.place, told.value())
+        let share = told.numbers.first().map_or_else(String::new, |n| figure(n.value * 100.0, 2));
+        format!("{}: the second moves with the first by {share} % of its angle", told.place)
     }
 }
 

@@ -4,7 +4,7 @@ use super::basis::cosines;
 use super::form::parameters;
 use super::{
     About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told,
-    Variable,
+    Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -40,6 +40,10 @@ pub struct BentWindup {
 
 /// Cosines of a free curve.
 const CURVE: usize = 6;
+/// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
+/// largest a knee is never seen and what saturates there is a straight line.
+const BENDS: [f64; 2] = [0.01, 10.0];
+const LAST_KNEE: f64 = 0.98;
 /// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
 const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
@@ -75,10 +79,10 @@ impl Cause for JointHardening {
 
     fn sentence(&self, told: &Told) -> String {
         let shape = match told.form::<BentWindup>().map(|windup| windup.law) {
-            Some(Law::Saturating { at_nm }) => format!("it stiffens above about {at_nm:.0} Nm"),
-            Some(Law::SoftZone { at_nm }) => format!("it is soft below about {at_nm:.0} Nm"),
-            Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {at_nm:.0} Nm"),
-            Some(Law::Power { exponent, .. }) => format!("it grows by the load to the power of {exponent:.1}"),
+            Some(Law::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
+            Some(Law::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
+            Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
+            Some(Law::Power { exponent, .. }) => format!("it grows by the load to the power of {}", figure(exponent, 1)),
             _ => "its shape is a free curve of the load".to_string(),
         };
         format!("{} winds up under its load, but not in proportion: {shape}", told.place)
@@ -95,7 +99,7 @@ impl Cause for JointHardening {
     /// From a wind-up in proportion.
     fn measure(&self) -> Option<Measure> {
         let advice = "measure with a third payload between none and full, and with joints near their largest load";
-        Some(Measure { rank: 1, advice })
+        Some(Measure { rank: 7, advice })
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
@@ -198,15 +202,18 @@ impl Placed for BentWindup {
         serde_json::json!(self)
     }
 
-    fn near(&self, _survey: &Survey, level: i32) -> Vec<Form> {
+    fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
+        let most = survey.load(self.joint);
+        let within = |at_nm: f64, largest: f64| at_nm.clamp(BENDS[0] * most, largest * most);
         let scaled = |factor: f64| match self.law {
-            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: at_nm * factor }),
-            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: at_nm * factor }),
-            Law::Knee { at_nm } => Some(Law::Knee { at_nm: at_nm * factor }),
+            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
+            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
+            Law::Knee { at_nm } => Some(Law::Knee { at_nm: within(at_nm * factor, LAST_KNEE) }),
             Law::Power { exponent, at_nm } => Some(Law::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm }),
             Law::Curve { .. } => None,
         };
-        [step, 1.0 / step].into_iter().filter_map(scaled).map(|law| Self { joint: self.joint, law }.into()).collect()
+        let laws = [step, 1.0 / step].into_iter().filter_map(scaled).filter(|law| *law != self.law);
+        laws.map(|law| Self { joint: self.joint, law }.into()).collect()
     }
 }

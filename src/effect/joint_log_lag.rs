@@ -2,7 +2,7 @@
 //! joints were logged; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::form::parameters;
-use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
+use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -60,22 +60,23 @@ impl Cause for JointLogLag {
         match told.numbers.first() {
             Some(n) if clocks => {
                 let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
-                let ms = n.value.abs();
+                let ms = figure(n.value.abs(), 2);
                 format!(
-                    "the tracker's clock is {ms:.2} ms {how} against the controller's: points were measured that much {when} the joints \
+                    "the tracker's clock is {ms} ms {how} against the controller's: points were measured that much {when} the joints \
                      beside them"
                 )
             }
             Some(n) if told.numbers.len() == 1 => format!(
-                "joints were logged before the arm had settled: {:.2} % of the last move was still to come",
-                n.value * 100.0
+                "joints were logged before the arm had settled: {} % of the last move was still to come",
+                figure(n.value * 100.0, 2)
             ),
             Some(_) => {
                 let shares = told.numbers.iter().filter(|n| n.name.contains("share"));
                 let most = shares.map(|n| n.value * 100.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
                 format!(
-                    "joints were logged before the arm had settled, each by a share of its own: up to {most:.3} % of the last move was \
-                     still to come"
+                    "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
+                     still to come",
+                    figure(most, 3)
                 )
             }
             None => "joints and points do not belong to the same moment".to_string(),

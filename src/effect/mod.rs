@@ -45,6 +45,7 @@ mod unknown;
 mod variable;
 mod viscous_windup;
 mod warmth;
+mod words;
 mod wrong_point;
 mod zero_shift;
 
@@ -76,6 +77,7 @@ pub use tool_offset::ToolOffset;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
+pub use words::{Clock, figure};
 
 use crate::robot::{Burden, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;

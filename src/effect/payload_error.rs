@@ -3,7 +3,7 @@
 use super::counterbalance::MEASURE;
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable, figure,
 };
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;
@@ -38,7 +38,10 @@ impl Cause for PayloadError {
 
     fn sentence(&self, told: &Told) -> String {
         match told.numbers.first() {
-            Some(n) => format!("the payload is {:+.1} % of what was declared off", n.value * 100.0),
+            Some(n) => {
+                let how = if n.value < 0.0 { "lighter" } else { "heavier" };
+                format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
+            }
             None => "the payload is not what was declared".to_string(),
         }
     }

@@ -1,7 +1,7 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
 use super::link_compliance::{SHORT, extent};
-use super::{About, Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, warmth};
+use super::{About, Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, figure, warmth};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -46,18 +46,19 @@ impl Cause for ThermalGrowth {
         }
     }
 
-    fn near(&self, term: &Term, _survey: &Survey, level: i32) -> Vec<Term> {
-        term.with_bases(warmth::near(term.basis(), level))
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+        term.with_bases(warmth::near(term.basis(), survey, level))
     }
 
     fn sentence(&self, told: &Told) -> String {
         let place = told.place;
         match (told.terms(self.name()).next().map(Term::basis), told.numbers.first()) {
             (Some(Basis::Settling { constant, .. }), Some(n)) => format!(
-                "{place} grows as the robot warms up, {:.0} um/m in the end with a time constant of {constant:.0} s",
-                n.value * 1e6
+                "{place} grows as the robot warms up, {} um/m in the end with a time constant of {}",
+                figure(n.value * 1e6, 0),
+                told.clock.span(constant)
             ),
-            (Some(_), Some(n)) => format!("{place} grows by {:.1} um/m for each kelvin", n.value * 1e6),
+            (Some(_), Some(n)) => format!("{place} grows by {} um/m for each kelvin", figure(n.value * 1e6, 1)),
             _ => format!("{place} grows with warmth"),
         }
     }

@@ -1,6 +1,6 @@
 //! What a cause is given to put its finding into words.
 
-use super::{Form, Place, Term, Variable};
+use super::{Clock, Form, Place, Term, Variable, figure};
 use crate::units::Unit;
 
 /// A coefficient of a finding in the unit in which people read it.
@@ -28,6 +28,8 @@ pub struct Told<'a> {
     pub place: Place,
     pub forms: &'a [Form],
     pub numbers: &'a [Number],
+    /// What counts time in the recording.
+    pub clock: Clock,
 }
 
 impl<'a> Told<'a> {
@@ -48,7 +50,7 @@ impl<'a> Told<'a> {
 
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
-        self.numbers.first().map_or_else(String::new, |n| format!("{:.0} {}", n.value.abs(), n.unit))
+        self.numbers.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit))
     }
 
     /// When the first term of a cause changes, if it does.
@@ -57,14 +59,14 @@ impl<'a> Told<'a> {
             (Variable::Time, super::Basis::After { at }) => Some(at),
             _ => None,
         });
-        change.map_or_else(String::new, |time| format!(" at {time:.0} s"))
+        change.map_or_else(String::new, |time| self.clock.since(time))
     }
 }
 
 /// The amplitude of a sine and a cosine.
 pub(super) fn amplitude(pair: Option<&[Number]>) -> String {
     match pair {
-        Some([a, b]) => format!("{:.0} {}", a.value.hypot(b.value), a.unit),
+        Some([a, b]) => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
         _ => String::new(),
     }
 }

@@ -1,7 +1,7 @@
 //! `tracker_drift`: the tracker's frame moves slowly: steadily, with the warm-up, or as a slow curve in time.
 
 use super::basis::around;
-use super::{About, Axes, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth};
+use super::{About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth};
 use crate::robot::RobotModel;
 
 pub struct TrackerDrift;
@@ -50,13 +50,13 @@ impl Cause for TrackerDrift {
         }
     }
 
-    fn near(&self, term: &Term, _survey: &Survey, level: i32) -> Vec<Term> {
+    fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
         match term.basis() {
             Basis::Power { start, end, exponent } => {
                 let exponents = around(exponent, 1.5, 0.7, level, POWERS);
                 term.with_bases(exponents.map(|exponent| Basis::Power { start, end, exponent }))
             }
-            basis => term.with_bases(warmth::near(basis, level)),
+            basis => term.with_bases(warmth::near(basis, survey, level)),
         }
     }
 
@@ -68,7 +68,8 @@ impl Cause for TrackerDrift {
             Some(Basis::Cosines { .. }) | None => "slowly",
             Some(_) => "with the warm-up",
         };
-        format!("the tracker's frame drifts {how}")
+        let over = if told.clock == Clock::Rows { " over the recording's rows" } else { "" };
+        format!("the tracker's frame drifts {how}{over}")
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
-use super::{About, Axes, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth};
+use super::{About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth};
 use crate::robot::RobotModel;
 
 pub struct Unknown;
@@ -20,6 +20,8 @@ const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 const POWERS: [f64; 2] = [0.3, 3.0];
 /// Periods of a sway as shares of the recording.
 const SWAYS: [f64; 6] = [0.1, 0.14, 0.2, 0.28, 0.4, 0.57];
+/// Shortest and longest period, in the same shares: beyond one period a sway is a drift.
+const PERIODS: [f64; 2] = [0.05, 1.0];
 /// Orders in another joint's angle.
 const ORDERS: u32 = 3;
 /// What depends on another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
@@ -160,14 +162,15 @@ impl Cause for Unknown {
                 term.with_bases(places.map(|from| Basis::Hinge { from, upwards }))
             }
             Basis::Sway { period } => {
-                let periods = around(period, 1.15, 0.7, level, [0.0, f64::INFINITY]);
+                let bounds = PERIODS.map(|share| share * (survey.time[1] - survey.time[0]));
+                let periods = around(period, 1.15, 0.7, level, bounds);
                 term.with_bases(periods.map(|period| Basis::Sway { period }))
             }
             Basis::Creep { start, end, exponent } => {
                 let exponents = around(exponent, 1.5, 0.7, level, POWERS);
                 term.with_bases(exponents.map(|exponent| Basis::Creep { start, end, exponent }))
             }
-            basis => term.with_bases(warmth::near(basis, level)),
+            basis => term.with_bases(warmth::near(basis, survey, level)),
         }
     }
 
@@ -198,7 +201,7 @@ impl Cause for Unknown {
     }
 
     fn sentence(&self, told: &Told) -> String {
-        let law = told.terms(Self::NAME).next().map(described).unwrap_or_default();
+        let law = told.terms(Self::NAME).next().map(|law| described(law, told.clock)).unwrap_or_default();
         format!("{} has an error that no entry of the library explains: {law}", told.place)
     }
 
@@ -242,9 +245,10 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
 }
 
 /// What a law is a function of and how, in words.
-pub(super) fn described(term: &Term) -> String {
-    let variables: Vec<String> = term.law().variables().iter().map(Variable::to_string).collect();
+pub(super) fn described(term: &Term, clock: Clock) -> String {
+    let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
     let of = variables.join(" and ");
+    let over = if clock == Clock::Rows { "over the recording's rows" } else { "with time" };
     match (term.basis(), term.law().first.of) {
         (Basis::Bump { centre, width }, _) => {
             format!("local bump at {:.1} deg, width {:.1} deg", centre.to_degrees(), width.to_degrees())
@@ -260,11 +264,11 @@ pub(super) fn described(term: &Term) -> String {
         (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),
         (Basis::Sway { period }, _) => {
             let turns = term.motion() == Motion::Base { axes: Axes::Rotation };
-            format!("{} with a period of {period:.0} s", if turns { "rocks" } else { "sways" })
+            format!("{} slowly with a period of {}", if turns { "rocks" } else { "sways" }, clock.span(period))
         }
-        (Basis::Creep { exponent, .. }, _) if (exponent - 1.0).abs() < 0.3 => "creeps steadily with time".into(),
+        (Basis::Creep { exponent, .. }, _) if (exponent - 1.0).abs() < 0.3 => format!("creeps steadily {over}"),
         (Basis::Creep { exponent, .. }, _) => {
-            format!("creeps with time, {} and {0}", if exponent > 1.0 { "faster" } else { "slower" })
+            format!("creeps {over}, {} and {0}", if exponent > 1.0 { "faster" } else { "slower" })
         }
         (Basis::Sign, Variable::Gravity { axis }) => {
             let name = ["x", "y", "z"].get(axis.unwrap_or(2)).unwrap_or(&"z");

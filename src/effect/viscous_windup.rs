@@ -2,7 +2,7 @@
 //!
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable};
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -43,7 +43,7 @@ impl Cause for ViscousWindup {
     }
 
     fn sentence(&self, told: &Told) -> String {
-        let trail = told.numbers.first().map_or_else(String::new, |n| format!("{:.2} {}", n.value, n.unit));
+        let trail = told.numbers.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value, 2), n.unit));
         format!("{} trails behind in proportion to its speed, by {trail}", told.place)
     }
 

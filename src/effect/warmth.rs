@@ -6,6 +6,9 @@ use super::{Basis, Law, Survey, Variable};
 /// Time constants as shares of the recording.
 const WARM_UPS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.5];
 
+/// Shortest and longest time constant, in the same shares: the one is a step at the start, the other a straight line.
+const CONSTANTS: [f64; 2] = [0.02, 10.0];
+
 /// What the recording offers, and of how many of its kind each is one: its temperature above the first one (K), and warm-ups of
 /// several time constants, since what was measured need not be the temperature of what grows.
 pub(super) fn all(survey: &Survey) -> Vec<(Law, usize)> {
@@ -20,7 +23,8 @@ pub(super) fn all(survey: &Survey) -> Vec<(Law, usize)> {
 }
 
 /// Other time constants around that of a warm-up by time.
-pub(super) fn near(basis: Basis, level: i32) -> Vec<Basis> {
+pub(super) fn near(basis: Basis, survey: &Survey, level: i32) -> Vec<Basis> {
     let Basis::Settling { start, constant } = basis else { return Vec::new() };
-    around(constant, 1.5, 0.5, level, [0.0, f64::INFINITY]).map(|constant| Basis::Settling { start, constant }).collect()
+    let bounds = CONSTANTS.map(|share| share * (survey.time[1] - survey.time[0]));
+    around(constant, 1.5, 0.5, level, bounds).map(|constant| Basis::Settling { start, constant }).collect()
 }

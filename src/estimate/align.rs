@@ -4,6 +4,7 @@
 
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
+use crate::statistics::nearest;
 use nalgebra::{Matrix3, Vector3};
 
 /// Rows farther off than this many medians take no part in the alignment.
@@ -51,8 +52,7 @@ fn best_start(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     let judges: Vec<usize> = (0..n).step_by(n.div_ceil(JUDGES)).collect();
     let median = |pose: &Pose| {
         let mut errors: Vec<f64> = judges.iter().map(|i| (pose.point(&model[*i]) - measured[*i]).norm()).collect();
-        let middle = errors.len() / 2;
-        *errors.select_nth_unstable_by(middle, f64::total_cmp).1
+        nearest(&mut errors, 0.5).unwrap_or(f64::INFINITY)
     };
     // Spread evenly over the recording by the golden ratio's multiples: no two of a triple are neighbours.
     let at = |share: f64| ((share.fract() * n as f64) as usize).min(n - 1);

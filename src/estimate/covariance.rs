@@ -4,7 +4,7 @@ use super::factor::Factor;
 use super::model::Model;
 use super::triangle::{Triangle, dot};
 use crate::robot::Measurements;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 /// Covariance of the free parameters as `root * root^T`.
@@ -34,6 +34,18 @@ impl Covariance {
 
     fn product(&self, a: usize, b: usize) -> f64 {
         (a.max(b)..self.free.len()).map(|column| self.root.at(a, column) * self.root.at(b, column)).sum()
+    }
+
+    /// The squared distance of `values` of some free parameters from zero, in standard deviations: chi-square of as many degrees of
+    /// freedom where nothing is there. `None` where one of them is not free.
+    pub fn distance(&self, parameters: &[usize], values: &[f64]) -> Option<f64> {
+        let rows: Option<Vec<usize>> =
+            parameters.iter().map(|parameter| self.free.iter().position(|free| free == parameter)).collect();
+        let rows = rows?;
+        let sigma: Vec<f64> = rows.iter().map(|row| self.sigma(*row)).collect();
+        let correlation = DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b]) / (sigma[a] * sigma[b]));
+        let scaled = DVector::from_iterator(rows.len(), values.iter().zip(&sigma).map(|(value, sigma)| value / sigma));
+        Some(scaled.dot(&correlation.cholesky()?.solve(&scaled)))
     }
 
     /// The other free parameter that a parameter of the stack is most correlated with, and the correlation.

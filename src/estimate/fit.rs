@@ -12,6 +12,7 @@ use super::piece::{Rest, Unmodelled, Weight, as_of_three, bound};
 use super::problem::{Evaluation, Problem};
 use super::repeats::{Poses, Repeated};
 use crate::robot::Measurements;
+use crate::statistics::{MEDIAN_CHI2, nearest};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -68,8 +69,6 @@ pub struct Fitted {
     pub indices: Vec<(&'static str, f64, &'static str)>,
 }
 
-/// Median of the squared length of three unit normals.
-const MEDIAN_CHI2_3: f64 = 2.366;
 impl Fitted {
     /// What the rows show beyond their own noise.
     pub(crate) fn beyond(&self) -> Unmodelled {
@@ -303,38 +302,32 @@ fn unmodelled(problem: &Problem, at: &Evaluation, parameters: usize) -> Unmodell
             }
         }
         errors.extend(distances.iter().map(|rest| rest.error(beyond).powi(2) * as_of_three(1)));
-        (median(&mut errors) / freedom, errors.len())
+        (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
     });
     let turn = excess(|extra| {
         let beyond = Unmodelled { point: 0.0, turn: extra };
         errors.clear();
         errors.extend(turns.iter().map(|rest| rest.error(beyond).powi(2)));
-        (median(&mut errors) / freedom, errors.len())
+        (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
     });
     Unmodelled { point, turn }
-}
-
-/// The middle of the values, zero of none.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The extra standard deviation with which the median squared error (of so many) is that of three unit normals.
 fn excess(mut median: impl FnMut(f64) -> (f64, usize)) -> f64 {
     // One sigma of the median's own scatter is no evidence of anything unmodelled.
     let (own, count) = median(0.0);
-    if own <= MEDIAN_CHI2_3 * (1.0 + 1.6 / (count.max(1) as f64).sqrt()) {
+    if own <= MEDIAN_CHI2[3] * (1.0 + 1.6 / (count.max(1) as f64).sqrt()) {
         return 0.0;
     }
     let (mut low, mut high) = (0.0, 1e-6);
-    while median(high).0 > MEDIAN_CHI2_3 && high < 1e3 {
+    while median(high).0 > MEDIAN_CHI2[3] && high < 1e3 {
         low = high;
         high *= 4.0;
     }
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if median(middle).0 > MEDIAN_CHI2_3 { low = middle } else { high = middle }
+        if median(middle).0 > MEDIAN_CHI2[3] { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

@@ -7,8 +7,8 @@
 use super::cluster::pieces;
 use super::factor::Factor;
 use super::fit::{Fate, FitOptions, Fitted, fit};
+use super::miss::miss;
 use super::model::Model;
-use super::piece::miss;
 use super::problem::Problem;
 use super::repeats::Poses;
 use crate::robot::Measurements;

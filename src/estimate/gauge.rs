@@ -3,6 +3,7 @@
 use super::align::align;
 use crate::robot::{Anchor, Gauging, Measurements, RobotModel, Target};
 use crate::spatial::Pose;
+use crate::statistics::nearest;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -62,10 +63,9 @@ fn seen_at(robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose,
         own.map(|row| (*base * robot.last_body(data.q(*row))).inverse_point(&data.position[*row])).collect();
     let median = |axis: usize| {
         let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        nearest(&mut values, 0.5)
     };
-    (!points.is_empty()).then(|| Vector3::from_fn(|axis, _| median(axis)))
+    Some(Vector3::new(median(0)?, median(1)?, median(2)?))
 }
 
 /// Orientation of a target at the zero pose, base frame: the rotation nearest to the sum over its rows (Markley).

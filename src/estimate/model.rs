@@ -1,8 +1,6 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
 use super::known::Known;
-pub use super::piece::Miss;
-use super::piece::miss;
 use crate::effect::{BaseFrame, BasePlacement, EffectStack};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -35,14 +33,6 @@ impl Model {
             .effects()
             .find(|(effect, _)| effect.name() == BaseFrame::NAME)
             .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
-    }
-
-    /// What is left of every row, where some row measured other than a whole point; empty where all measured just that.
-    pub fn misses(&self, data: &Measurements) -> Vec<Miss> {
-        let plain = data.turn.is_none() && data.distance.is_none() && (0..data.rows()).all(|row| data.whole(row));
-        let rows = if plain { 0 } else { data.rows() };
-        let scratch = || self.stack.scratch(&self.robot);
-        (0..rows).into_par_iter().map_init(scratch, |scratch, row| miss(self, data, row, scratch)).collect()
     }
 
     /// Measured points (m, tracker frame) of every row.

@@ -4,13 +4,12 @@ use super::model::Model;
 use crate::effect::Scratch;
 use crate::robot::Measurements;
 use crate::spatial::Pose;
+use crate::statistics::MEDIAN_CHI2;
 use nalgebra::{Matrix3, Vector3};
 
 /// Beyond this whitened error length (99.3 % of good pieces of one, two, three axes are below) a piece pulls with constant force.
 const HUBER_BY_AXES: [f64; 4] = [f64::INFINITY, 2.7, 3.15, HUBER];
 pub(crate) const HUBER: f64 = 3.5;
-/// Median of the squared length of that many unit normals.
-const MEDIAN_CHI2: [f64; 4] = [1.0, 0.454_94, 1.386_29, 2.366];
 
 /// Standard deviations that rows show beyond their own noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -129,26 +128,6 @@ pub(crate) fn distance(
     let joints = data.spread.as_ref().map_or(0.0, |all| along.dot(&(all[row] * along)));
     let residual = Vector3::new(measured.length - reach.norm(), 0.0, 0.0);
     Some((Rest { turn: false, residual, variance: measured.sigma * measured.sigma + joints }, along))
-}
-
-/// How far off a row is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Miss {
-    /// Measured - predicted along the axes that were measured, m.
-    pub point: Vector3<f64>,
-    /// Its length, or that of the distance where no axis was measured, m.
-    pub length: f64,
-    /// Angle between measured and predicted orientation, rad.
-    pub turn: Option<f64>,
-}
-
-/// How far off a row is under a model.
-pub(crate) fn miss(model: &Model, data: &Measurements, row: usize, scratch: &mut Scratch) -> Miss {
-    let at = model.stack.point(&model.robot, data, row, &model.x, scratch);
-    let point = data.residual(row, &at);
-    let distance = (data.axes(row) == 0).then(|| distance(model, data, row, &at, scratch)).flatten();
-    let turn = turn(model, data, row, scratch).map(|rest| rest.residual.norm());
-    Miss { point, length: distance.map_or_else(|| point.norm(), |(rest, _)| rest.residual.norm()), turn }
 }
 
 impl Piece {

@@ -1,6 +1,7 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
 
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -23,7 +24,7 @@ pub struct FleetFile {
     pub name: String,
     /// The pipeline's YAML file, relative to this one.
     pub pipeline: PathBuf,
-    /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.every: 4}`.
+    /// Variables and settings of the pipeline for all robots, as `--set`: `{seed: 7, split.n: 4}`.
     #[serde(default)]
     pub set: BTreeMap<String, Value>,
     /// What is known of all robots.
@@ -55,6 +56,18 @@ pub struct Groups {
     /// Date of the measurement, e.g. 2026-10-01.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub campaign: Option<String>,
+}
+
+impl Groups {
+    /// These, and where they are silent the other's.
+    pub(super) fn or(&self, other: &Self) -> Self {
+        let first = |a: &Option<String>, b: &Option<String>| a.clone().or_else(|| b.clone());
+        Self {
+            model: first(&self.model, &other.model),
+            plant: first(&self.plant, &other.plant),
+            campaign: first(&self.campaign, &other.campaign),
+        }
+    }
 }
 
 /// Robots: exactly one of `folders`, `list` and `recording`.
@@ -148,7 +161,7 @@ impl FleetFile {
     /// Reads the file; fails with every fault at once.
     pub fn load(path: &Path) -> Result<(Self, Node)> {
         let label = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
+        let text = raw::text(path).map_err(|error| Error::spec(&label, unreadable(&error)))?;
         let (tree, mut troubles) = yaml::parse(&text);
         let Some(tree) = tree else { return Err(faulty(&label, troubles)) };
         match typed::<Self>(&tree) {
@@ -204,7 +217,7 @@ impl FleetFile {
 
 /// The text of the pipeline, or the place in FLEET.yaml that names it.
 pub(super) fn pipeline_text(path: &Path, tree: &Node, pipeline: &Path) -> Result<String> {
-    std::fs::read_to_string(pipeline).map_err(|error| {
+    raw::text(pipeline).map_err(|error| {
         let message = format!("`{}`: {} (relative to this file)", pipeline.display(), unreadable(&error));
         let trouble = Trouble::new(message).at(tree.nearest_mark("pipeline")).below("pipeline");
         Error::Spec(vec![trouble.fault(&path.display().to_string())])

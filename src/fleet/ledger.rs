@@ -4,9 +4,10 @@
 //! `runs/<id>.json` is the roster of a run, for the tasks of a cluster and for later campaigns; `cancelled.json` names a run.
 
 use super::file::Groups;
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::Result;
 use crate::store::{Store, TableRef};
+use crate::table::Table;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -184,6 +185,11 @@ impl<'a> Ledger<'a> {
             Some(standing) => Ok(standing),
             None => self.store.put_note(&place, &name, &record).map(|()| record.clone()),
         }
+    }
+
+    /// Reads a table of a record; none where the record has none.
+    pub(super) fn load<T: Table>(&self, table: Option<&TableRef>) -> Result<Option<T>> {
+        table.map(|table| T::from_frame(&self.store.load(table)?)).transpose()
     }
 
     /// Takes a record away, so that the robot is computed again.

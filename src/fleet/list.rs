@@ -1,15 +1,18 @@
 //! Robots from a list: CSV or Parquet, one row a robot.
 
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::Override;
+use crate::raw;
 use arrow::util::display::array_value_to_string;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::fs::File;
 use std::path::Path;
 
 /// Columns that a list may have beside `set.TARGET` and `path.TARGET`.
 const COLUMNS: [&str; 5] = ["robot", "folder", "model", "plant", "campaign"];
+
+/// Rows read at a time.
+const BATCH: usize = 1 << 10;
 
 /// Reads a list; `variable` takes the folder. Fails with every fault of its columns and rows.
 pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<Robot>> {
@@ -65,10 +68,10 @@ pub(super) fn is_parquet(path: &Path) -> bool {
 pub(super) fn csv_reader(path: &Path, setting: &str) -> Result<csv::Reader<File>> {
     let fault = |error: std::io::Error| Error::spec(setting, format!("`{}` cannot be read: {error}", path.display()));
     let mut head = String::new();
-    std::io::BufRead::read_line(&mut std::io::BufReader::new(File::open(path).map_err(fault)?), &mut head).map_err(fault)?;
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(raw::open(path).map_err(fault)?), &mut head).map_err(fault)?;
     let count = |delimiter: u8| head.bytes().filter(|byte| *byte == delimiter).count();
     let delimiter = [b',', b';', b'\t'].into_iter().rev().max_by_key(|delimiter| count(*delimiter)).unwrap_or(b',');
-    Ok(csv::ReaderBuilder::new().delimiter(delimiter).from_reader(File::open(path).map_err(fault)?))
+    Ok(csv::ReaderBuilder::new().delimiter(delimiter).from_reader(raw::open(path).map_err(fault)?))
 }
 
 type Cells = (Vec<String>, Vec<Vec<String>>);
@@ -85,12 +88,11 @@ fn csv(path: &Path) -> Result<Cells> {
 
 fn parquet(path: &Path) -> Result<Cells> {
     let fault = |error: String| Error::spec("list", format!("`{}` cannot be read: {error}", path.display()));
-    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|builder| builder.build());
-    let reader = reader.map_err(|error| fault(error.to_string()))?;
+    let file = raw::open(path).map_err(|error| fault(error.to_string()))?;
+    let reader = raw::parquet(file, BATCH).map_err(fault)?;
     let (mut columns, mut rows) = (Vec::new(), Vec::new());
     for batch in reader {
-        let batch = batch.map_err(|error| fault(error.to_string()))?;
+        let batch = batch.map_err(fault)?;
         columns = batch.schema().fields().iter().map(|field| field.name().clone()).collect();
         for row in 0..batch.num_rows() {
             let cells = batch.columns().iter().map(|column| array_value_to_string(column, row));

@@ -11,14 +11,16 @@ pub mod local;
 mod partition;
 mod pool;
 mod recalibration;
+pub mod robot;
 pub mod roster;
 pub mod slurm;
 pub mod tables;
 mod work;
 
-pub use file::FleetFile;
+pub use file::{FleetFile, Groups};
 pub use ledger::{Ending, Ledger, Record};
-pub use roster::{Groups, Robot, Roster};
+pub use robot::Robot;
+pub use roster::Roster;
 pub use work::{Visit, Watcher, Workshop};
 
 use crate::error::Result;

@@ -1,22 +1,24 @@
 //! One big recording table, parted by robot into files below the store; a table that was parted before is not parted again.
 
 use super::list::{csv_reader, is_parquet};
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::store::{FileHash, Store};
 use arrow::array::{Array, RecordBatch, UInt32Array};
 use arrow::compute::{concat_batches, take_record_batch};
 use arrow::util::display::array_value_to_string;
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
+
+/// Rows read at a time.
+const BATCH: usize = 1 << 10;
 
 /// Parts the table at `path` by its column `by`; `variable` takes the file of a robot.
 pub(super) fn read(path: &Path, by: &str, variable: &str, fleet: &str, store: &Store) -> Result<Vec<Robot>> {
     let fault = |error: String| Error::spec("recording", format!("`{}`: {error}", path.display()));
-    let hash = File::open(path).and_then(FileHash::of_reader).map_err(|error| fault(error.to_string()))?;
+    let hash = raw::open(path).and_then(FileHash::of_reader).map_err(|error| fault(error.to_string()))?;
     let source = blake3::hash(format!("{hash} {by}").as_bytes()).to_hex()[..16].to_string();
     let place = ["fleets", fleet, "parts", &source];
     let names: Vec<String> = match store.note(&place, "names.json")? {
@@ -74,11 +76,10 @@ fn csv(path: &Path, by: &str) -> Result<Parts, String> {
 }
 
 fn parquet(path: &Path, by: &str) -> Result<Parts, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).and_then(|builder| builder.build());
+    let file = raw::open(path).map_err(|error| error.to_string())?;
     let mut parts: BTreeMap<String, Vec<RecordBatch>> = BTreeMap::new();
-    for batch in reader.map_err(|error| error.to_string())? {
-        let batch = batch.map_err(|error| error.to_string())?;
+    for batch in raw::parquet(file, BATCH)? {
+        let batch = batch?;
         let column = batch.column_by_name(by).ok_or_else(|| format!("it has no column `{by}`"))?;
         let mut rows: BTreeMap<String, Vec<u32>> = BTreeMap::new();
         for row in 0..column.len() {

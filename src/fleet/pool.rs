@@ -7,7 +7,6 @@ use super::Fleet;
 use super::file::{Groups, PriorBy, PriorFrom};
 use super::ledger::{Ending, Ledger};
 use super::recalibration::Earlier;
-use super::tables::load;
 use crate::error::Result;
 use crate::pipeline::Override;
 use crate::table::{Parameters, Table};
@@ -68,7 +67,7 @@ impl Known {
         for member in earlier.members() {
             let record = earlier.record(ledger, &member.name)?;
             let table = record.as_ref().and_then(|record| record.of_stage(&wanted.stage, Parameters::KIND));
-            let Some(table) = load::<Parameters>(ledger, table)? else { continue };
+            let Some(table) = ledger.load::<Parameters>(table)? else { continue };
             let estimated = table.0.into_iter().filter(|row| row.status == "free" && wanted.effects.contains(&row.effect));
             let values = estimated.filter_map(|row| Some((row.name, (row.change, row.sigma.filter(|sigma| *sigma > 0.0)?))));
             robots.insert(member.name.clone(), (member.groups.clone(), values.collect()));

@@ -2,8 +2,8 @@
 
 use super::Fleet;
 use super::ledger::{Ledger, Member, Record, RunNote};
-use super::tables::load;
 use crate::error::{Error, Result};
+use crate::statistics::normal_quantile;
 use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
 
 /// How rare a change by chance may be.
@@ -16,7 +16,8 @@ pub(super) struct Limits {
 pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &Limits) -> FleetChanges {
     let tests = robots.iter().map(|(_, changes)| changes.0.len()).sum::<usize>().max(1);
     let each = limits.alpha / tests as f64;
-    let width = normal_limit(each);
+    // A normal variable is farther from its mean, either way, with this chance.
+    let width = normal_quantile(0.5 * each);
     let mut table = FleetChanges::default();
     for (robot, changes) in robots {
         for row in &changes.0 {
@@ -38,16 +39,6 @@ pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &Limits) -> Fleet
     }
     table.0.sort_by(|a, b| (&a.robot, &a.parameter).cmp(&(&b.robot, &b.parameter)));
     table
-}
-
-/// The distance from the mean, in standard deviations, that a normal variable exceeds either way with chance `p`: bisection.
-fn normal_limit(p: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if libm::erfc(middle / std::f64::consts::SQRT_2) > p { low = middle } else { high = middle }
-    }
-    0.5 * (low + high)
 }
 
 /// The latest run of an earlier fleet in the same store.
@@ -92,7 +83,7 @@ impl Earlier {
         let since = member.and_then(|member| member.groups.campaign.as_deref()).unwrap_or(&self.fleet);
         changed.sort_by_key(|row| row.rank);
         let mut flags: Vec<String> = changed.into_iter().map(|row| sentence(row, since)).collect();
-        if let (Some(now), Some(before)) = (findings, load::<Findings>(ledger, record.last(Findings::KIND))?) {
+        if let (Some(now), Some(before)) = (findings, ledger.load::<Findings>(record.last(Findings::KIND))?) {
             flags.extend(diagnosed(&causes(&before), &causes(now), since));
         }
         Ok(flags)
@@ -138,16 +129,4 @@ fn figure(value: f64, sigma: f64) -> String {
         return format!("{value:+.3e} +- {sigma:.1e}");
     }
     format!("{value:+.digits$} +- {sigma:.digits$}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::normal_limit;
-
-    #[test]
-    fn limits_are_those_of_the_normal_distribution() {
-        // Quantiles from tables: 5 % -> 1.959964, 0.27 % -> 3.
-        assert!((normal_limit(0.05) - 1.959_963_985).abs() < 1e-8);
-        assert!((normal_limit(0.002_699_796) - 3.0).abs() < 1e-6);
-    }
 }

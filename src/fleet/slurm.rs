@@ -5,12 +5,12 @@ use super::ledger::{Ledger, RunNote};
 use crate::error::{Error, Result};
 use std::io::Write;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Between two looks at the store.
 const LOOK: Duration = Duration::from_secs(1);
-/// Between two questions to the scheduler, which serves others too.
-const ASK: Duration = Duration::from_secs(10);
+/// Looks from one question to the scheduler to the next: it serves others too.
+const LOOKS: u32 = 10;
 
 /// Submits the arrays of a run and notes their ids. Fails where sbatch does.
 pub fn submit(ledger: &Ledger, note: &mut RunNote, wishes: &Wishes) -> Result<()> {
@@ -39,8 +39,7 @@ pub enum Waited {
 
 /// Waits until `missing` says 0. The scheduler is only asked whether it still has the jobs.
 pub fn wait(jobs: &[String], mut missing: impl FnMut() -> Result<usize>, stop: &dyn Fn() -> bool) -> Result<Waited> {
-    let mut asked = Instant::now();
-    let mut empty = 0;
+    let (mut looks, mut empty) = (0, 0);
     loop {
         if missing()? == 0 {
             return Ok(Waited::Complete);
@@ -49,8 +48,8 @@ pub fn wait(jobs: &[String], mut missing: impl FnMut() -> Result<usize>, stop: &
             return Ok(Waited::Stopped);
         }
         std::thread::sleep(LOOK);
-        if asked.elapsed() >= ASK {
-            asked = Instant::now();
+        looks += 1;
+        if looks % LOOKS == 0 {
             // A job that is long over is unknown to squeue, which then complains.
             let queued = said("squeue", &["--noheader", "--jobs", &jobs.join(",")], None).unwrap_or_default();
             empty = if queued.trim().is_empty() { empty + 1 } else { 0 };

@@ -5,7 +5,7 @@ use super::ledger::{Ending, Ledger, Record};
 use super::recalibration::{self, Limits};
 use crate::error::Result;
 use crate::report::fleet as page;
-use crate::store::{Account, KEY_FORMAT, Product, StageKey, TableRef};
+use crate::store::{Account, KEY_FORMAT, Product, StageKey};
 use crate::table::{
     Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict,
 };
@@ -109,10 +109,10 @@ impl Read {
     fn of(ledger: &Ledger, record: Option<&Record>) -> Result<Self> {
         let Some(record) = record else { return Ok(Self::default()) };
         Ok(Self {
-            statistics: load(ledger, record.last(Statistics::KIND))?,
-            verdict: load(ledger, record.last(Verdict::KIND))?,
-            findings: load(ledger, record.last(Findings::KIND))?,
-            changes: load(ledger, record.last(Changes::KIND))?,
+            statistics: ledger.load(record.last(Statistics::KIND))?,
+            verdict: ledger.load(record.last(Verdict::KIND))?,
+            findings: ledger.load(record.last(Findings::KIND))?,
+            changes: ledger.load(record.last(Changes::KIND))?,
         })
     }
 
@@ -152,10 +152,6 @@ impl Read {
 /// `effect at place`, strongest first.
 fn causes(findings: &Findings) -> String {
     findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect::<Vec<_>>().join("; ")
-}
-
-pub(super) fn load<T: Table>(ledger: &Ledger, table: Option<&TableRef>) -> Result<Option<T>> {
-    table.map(|table| T::from_frame(&ledger.store.load(table)?)).transpose()
 }
 
 /// One row a step, in pipeline order: of held-out points where the last step has some, of the set with most of them.

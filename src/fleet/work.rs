@@ -2,9 +2,9 @@
 
 use super::Fleet;
 use super::ledger::{Ending, LATER, Ledger, Made, Record};
-use super::roster::Robot;
+use super::robot::Robot;
 use crate::error::{Error, Result};
-use crate::pipeline::{Observer, Plan, RunOptions, Selection, StageReport, Surroundings, run};
+use crate::pipeline::{Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run};
 use crate::stage::STAGES;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -111,7 +111,7 @@ impl Workshop<'_> {
         let mut record = Record::blank(robot, key, &format!("{}/{worker}", self.name));
         record.log.clone_from(&self.log);
         let observer = Relay { worker, watcher };
-        let options = RunOptions { selection: Selection::default(), jobs: self.threads };
+        let options = RunOptions { selection: Selection::default(), jobs: self.threads, purpose: Purpose::Fleet };
         let result = plan.and_then(|plan| {
             surroundings.run_id = self.ledger.store.reserve_run(&surroundings.run_id)?;
             record.run = Some(surroundings.run_id.clone());

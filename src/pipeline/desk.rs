@@ -3,11 +3,11 @@
 use super::plan::{Plan, PlannedStage};
 use super::services::label;
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::Arity;
 use crate::store::schema;
 use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 pub(super) struct Desk<'a> {
@@ -76,7 +76,7 @@ impl<'a> Desk<'a> {
         if let Some(hash) = self.hashes.get(path) {
             return Ok(hash.clone());
         }
-        let hash = File::open(path)
+        let hash = raw::open(path)
             .and_then(FileHash::of_reader)
             .map_err(|error| Error::data(path.display().to_string(), format!("cannot be read: {error}")))?;
         self.hashes.insert(path.into(), hash.clone());

@@ -1,6 +1,7 @@
 //! The audit record of one run, written when it starts, between stages where a second of work went into them, and at the end.
 
 use super::overrides::Override;
+use super::run::RunOptions;
 use crate::error::{Error, Result};
 use crate::store::{ActionId, FileHash, Link, StageKey, Store, TableRef};
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,8 @@ pub struct Host {
 pub struct Manifest {
     manifest_format: u32,
     pub run_id: String,
+    #[serde(default)]
+    pub purpose: Purpose,
     /// The run that ended last before this one, with the seal of its manifest.
     pub previous: Option<Link>,
     pub status: RunStatus,
@@ -73,6 +76,22 @@ pub struct Manifest {
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
     pub stages: Vec<StageReport>,
+}
+
+/// What a run was made for. The manifests of older versions do not say; theirs count as runs of their own.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Purpose {
+    /// `calib run`: for the sake of all its tables.
+    #[default]
+    Run,
+    /// For what the verb needs of the pipeline, which may be a part.
+    Compensate,
+    Diagnose,
+    Export,
+    Simulate,
+    /// One robot of a fleet.
+    Fleet,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -163,14 +182,36 @@ impl Manifest {
             .map_err(|e| Error::store(format!("run {run}"), format!("not a manifest that this calib reads: {e}")))
     }
 
+    /// Whether this is a run of `calib run` that has the tables of every stage.
+    pub fn is_complete(&self) -> bool {
+        let has = |stage: &StageReport| matches!(stage.status, StageStatus::Cached | StageStatus::Executed);
+        self.purpose == Purpose::Run && self.status == RunStatus::Done && self.stages.iter().all(has)
+    }
+
+    /// What the run is, in a word; only a `run` can be HEAD.
+    pub fn what(&self) -> &'static str {
+        match (self.purpose, self.status) {
+            (Purpose::Compensate, _) => "compensate",
+            (Purpose::Diagnose, _) => "diagnose",
+            (Purpose::Export, _) => "export",
+            (Purpose::Simulate, _) => "simulate",
+            (Purpose::Fleet, _) => "fleet",
+            (Purpose::Run, RunStatus::Running) => "unfinished",
+            (Purpose::Run, RunStatus::Failed) => "failed",
+            (Purpose::Run, RunStatus::Done) if self.is_complete() => "run",
+            (Purpose::Run, RunStatus::Done) => "partial",
+        }
+    }
+
     pub fn stage(&self, id: &str) -> Option<&StageReport> {
         self.stages.iter().find(|stage| stage.id == id)
     }
 
-    pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, jobs: usize, started: String) -> Self {
+    pub(super) fn new(plan: &super::plan::Plan, surroundings: &Surroundings, options: &RunOptions, started: String) -> Self {
         Self {
             manifest_format: MANIFEST_FORMAT,
             run_id: surroundings.run_id.clone(),
+            purpose: options.purpose,
             previous: None,
             status: RunStatus::Running,
             error: None,
@@ -188,7 +229,7 @@ impl Manifest {
             environment: surroundings.environment.clone(),
             command_line: surroundings.command_line.clone(),
             seed: plan.seed,
-            jobs,
+            jobs: options.jobs,
             started,
             ended: None,
             wall_seconds: None,

@@ -2,8 +2,10 @@
 
 mod desk;
 mod execute;
+mod history;
 mod identity;
 mod lock;
+mod look;
 mod manifest;
 mod overrides;
 pub mod plan;
@@ -18,7 +20,9 @@ mod spec;
 mod tests;
 mod wiring;
 
-pub use manifest::{Host, Manifest, OutputRecord, RunStatus, StageReport, StageStatus, Surroundings, Tool};
+pub use history::find_run;
+pub use look::look;
+pub use manifest::{Host, Manifest, OutputRecord, Purpose, RunStatus, StageReport, StageStatus, Surroundings, Tool};
 pub use overrides::Override;
 pub use plan::Plan;
 pub use preview::{Forecast, Prospect, preview};

@@ -18,7 +18,7 @@ impl Override {
     pub fn parse(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
             Some((target, value)) if !target.is_empty() => Ok(Self { target: target.trim().into(), value: value.into() }),
-            _ => Err(format!("`{text}`: expected TARGET=VALUE, e.g. case=recordings/r7, seed=7 or split.every=4")),
+            _ => Err(format!("`{text}`: expected TARGET=VALUE, e.g. case=recordings/r7, seed=7 or split.n=4")),
         }
     }
 

@@ -6,6 +6,7 @@ pub use super::wiring::{Input, Origin};
 use super::overrides::Override;
 use super::{spec, wiring};
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::stage::{ErasedStage, Port, StageEntry};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +37,7 @@ impl Plan {
     /// Reads a pipeline; fails with every fault at once.
     pub fn load(file: &Path, overrides: &[Override], stages: &'static [StageEntry]) -> Result<Self> {
         let label = file.display().to_string();
-        let text = std::fs::read(file).map_err(|error| {
+        let text = raw::bytes(file).map_err(|error| {
             Error::spec(
                 &label,
                 if error.kind() == std::io::ErrorKind::NotFound { "no such file".into() } else { error.to_string() },
@@ -81,10 +82,15 @@ impl Plan {
     }
 
     /// The plan of a stage and those that it reads from, directly or not.
-    pub fn needed_for(mut self, stage: usize) -> Self {
+    pub fn needed_for(self, stage: usize) -> Self {
+        self.needed_for_all(&[stage])
+    }
+
+    /// The plan of some stages and those that they read from, directly or not.
+    pub fn needed_for_all(mut self, stages: &[usize]) -> Self {
         let mut needed = vec![false; self.stages.len()];
-        needed[stage] = true;
-        for at in (0..=stage).rev().filter(|at| *at < self.stages.len()) {
+        stages.iter().for_each(|stage| needed[*stage] = true);
+        for at in (0..self.stages.len()).rev() {
             if needed[at] {
                 let origins: Vec<usize> = self.stages[at].inputs.iter().flat_map(|input| &input.from).map(|o| o.stage).collect();
                 origins.into_iter().for_each(|origin| needed[origin] = true);

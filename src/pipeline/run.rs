@@ -3,7 +3,7 @@
 use super::desk::{self, Desk, Key};
 use super::execute::{self, Place};
 use super::lock::ActionLock;
-use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
+use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunStatus, StageStatus, Surroundings};
 use super::plan::Plan;
 use super::reason;
 use super::select::{Selected, Selection};
@@ -22,6 +22,7 @@ pub struct RunOptions {
     pub selection: Selection,
     /// Worker threads; no result depends on it.
     pub jobs: usize,
+    pub purpose: Purpose,
 }
 
 /// A run that went through.
@@ -53,7 +54,7 @@ pub fn run(
     let threads =
         rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
     let begun = (surroundings.now)();
-    let mut manifest = Manifest::new(plan, surroundings, options.jobs, rfc3339(begun));
+    let mut manifest = Manifest::new(plan, surroundings, options, rfc3339(begun));
     manifest.previous = store.last_ended()?;
     manifest.run_id = store.reserve_run(&manifest.run_id)?;
     let record = store.begin_run(&manifest.run_id, &manifest)?;

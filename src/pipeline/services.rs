@@ -1,10 +1,10 @@
 //! What the engine does for a running stage: files, sinks, progress and lines that are kept.
 
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::{RawFile, Services, Sink, Source, Streamed};
 use crate::store::frame::Frame;
 use crate::store::{FinishedFile, Store, TableWriter};
-use std::fs::File;
 use std::sync::{Mutex, PoisonError};
 
 /// Whoever watches a run: a terminal, a log, nobody.
@@ -47,14 +47,7 @@ impl<'a> StageServices<'a> {
 
 impl Services for StageServices<'_> {
     fn open(&self, file: &RawFile) -> Result<Source> {
-        if !self.files.iter().any(|known| known.path == file.0) {
-            let message = format!("stage {} opens {} without listing it among its files", self.id, file.0.display());
-            return Err(Error::Bug(message));
-        }
-        let shown = file.0.display().to_string();
-        let opened = File::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
-        let size = opened.metadata().ok().map(|metadata| metadata.len());
-        Ok(Source { label: label(&file.0), reader: Box::new(opened), size })
+        open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
         Ok(Box::new(StoreSink { kind, writer: self.store.writer(kind)? }))
@@ -73,6 +66,18 @@ impl Services for StageServices<'_> {
         self.observer.warn(self.id, &line);
         self.lines.lock().unwrap_or_else(PoisonError::into_inner).warnings.push(line);
     }
+}
+
+/// Opens an input file that the stage listed.
+pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -> Result<Source> {
+    if !files.iter().any(|known| known.path == file.0) {
+        let message = format!("stage {id} opens {} without listing it among its files", file.0.display());
+        return Err(Error::Bug(message));
+    }
+    let shown = file.0.display().to_string();
+    let opened = raw::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
+    let size = opened.metadata().ok().map(|metadata| metadata.len());
+    Ok(Source { label: label(&file.0), reader: Box::new(opened), size })
 }
 
 /// A file as messages and tables name it: its name alone, so that equal content gives equal tables wherever it lies.

@@ -1,5 +1,7 @@
 //! The engine with small stages of its own: caching, reasons, wiring, panics.
 
+#![expect(clippy::disallowed_methods, reason = "a test is its own cli: it hands the clock down")]
+
 use super::*;
 use crate::error::{Error, Fault, Result};
 use crate::stage::{Context, Labelled, RawFile, Stage, StageEntry, reads, writes};
@@ -123,7 +125,7 @@ fn faults(text: &str, sets: &[&str]) -> Vec<String> {
     }
 }
 fn options(force: Option<Vec<String>>) -> RunOptions {
-    RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1 }
+    RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1, purpose: Purpose::Run }
 }
 /// Runs and returns what was said and what came out of `count`.
 fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, Outcome)> {
@@ -190,7 +192,11 @@ fn forcing_runs_what_is_cached() {
 #[test]
 fn a_selected_stage_needs_its_inputs() {
     let folder = tempfile::tempdir().unwrap();
-    let only = |id: &str| RunOptions { selection: Selection { only: Some(id.into()), ..Default::default() }, jobs: 1 };
+    let only = |id: &str| RunOptions {
+        selection: Selection { only: Some(id.into()), ..Default::default() },
+        jobs: 1,
+        purpose: Purpose::Run,
+    };
     let plan = plan(TWO, &[]).unwrap();
     let error = go(folder.path(), &plan, &only("count")).err().unwrap();
     assert!(error.to_string().contains("stage `count` reads from `b`, which is not cached"), "{error}");

@@ -5,14 +5,15 @@ use super::distribution::{self, cumulative, histogram};
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow};
+use crate::table::{Prediction, Statistics, StatisticsRow, Withdrawn};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The steps in pipeline order, each with the colour it has in all pictures.
 pub(super) struct Steps {
     names: BTreeMap<i64, String>,
     standing: Option<i64>,
+    withdrawn: BTreeSet<String>,
 }
 
 impl Steps {
@@ -20,7 +21,15 @@ impl Steps {
     pub fn new(statistics: &Statistics, standing: Option<&str>) -> Self {
         let names: BTreeMap<i64, String> = statistics.0.iter().map(|row| (row.order, row.step.clone())).collect();
         let named = names.iter().rev().find(|(_, name)| Some(name.as_str()) == standing).or(names.last_key_value());
-        Self { standing: named.map(|(order, _)| *order), names }
+        Self { standing: named.map(|(order, _)| *order), names, withdrawn: BTreeSet::new() }
+    }
+    /// The same with steps that do not stand.
+    pub fn without(self, withdrawn: &[Withdrawn]) -> Self {
+        Self { withdrawn: withdrawn.iter().map(|gone| gone.step.clone()).collect(), ..self }
+    }
+    /// How a step is called where its figures stand.
+    fn called(&self, step: &str) -> String {
+        if self.withdrawn.contains(step) { format!("{step} (withdrawn)") } else { step.into() }
     }
     pub fn standing(&self) -> Option<i64> {
         self.standing
@@ -134,13 +143,13 @@ impl Errors {
         let held_out = kept.iter().map(|set| block(set, true, None));
         let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
         Ok(Self {
-            verdict: verdict(rows, &last),
+            verdict: verdict(rows, &last, &tables.withdrawn),
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
-            legend: steps.names.iter().map(|(order, step)| (steps.colour(*order), step.clone())).collect(),
+            legend: steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect(),
         })
     }
 }
@@ -170,7 +179,7 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         row.noise_rms_mm,
     ];
     Row {
-        step: row.step.clone(),
+        step: steps.called(&row.step),
         colour: steps.colour(row.order),
         points: count(row.points),
         last: Some(row.order) == steps.standing(),
@@ -190,7 +199,7 @@ fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Fold> {
         row.block_rms_mm,
     ];
     Some(Fold {
-        step: row.step.clone(),
+        step: steps.called(&row.step),
         colour: steps.colour(row.order),
         set: row.set.clone(),
         values: values.map(|value| value.map_or_else(String::new, mm)),
@@ -221,7 +230,7 @@ fn points(number: i64) -> String {
     if number == 1 { "one point".into() } else { format!("{} points", count(number)) }
 }
 
-fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
+fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> Verdict {
     let Some(after) = last.first() else {
         return Verdict {
             kind: "unknown",
@@ -269,7 +278,7 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow]) -> Verdict {
             ("rms", mm(after.rms_mm)),
             ("rms of measurement noise alone", mm(after.noise_rms_mm)),
         ],
-        others: uneven.into_iter().chain(last.iter().skip(1).map(other)).collect(),
+        others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
     }
 }
 

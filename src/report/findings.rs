@@ -22,6 +22,8 @@ pub(super) struct Section {
     not_observable: Vec<String>,
     next: Vec<String>,
     signature: Option<String>,
+    /// Findings that were taken back.
+    withdrawn: Vec<String>,
     suspects: Vec<[String; 5]>,
 }
 
@@ -53,7 +55,7 @@ impl Section {
                 "explained" | "nothing_missing" => "better",
                 _ => "unknown",
             },
-            sentence: sentence(verdict),
+            sentence: sentence(verdict, tables),
             errors: vec![
                 errors(
                     "before: geometry, zeros and ratios identified",
@@ -63,21 +65,12 @@ impl Section {
                 ),
                 errors("after: with the findings", verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
             ],
-            facts: vec![
-                ("noise of one point, rms", format!("{} mm", mm(verdict.noise_floor_mm))),
-                ("left over at fitted rows, rms", format!("{} mm", mm(verdict.leftover_rms_mm))),
-                ("chance that what is left is noise", significant(verdict.p_after, 2)),
-                ("chance that what the simulation leaves is noise", significant(verdict.p_before, 2)),
-                (
-                    "repeatability of the joints",
-                    format!("{} arcsec", significant(Unit::Arcsecond.from_si(verdict.repeatability_rad), 2)),
-                ),
-                ("rows fitted", count(verdict.points)),
-            ],
+            facts: facts(verdict),
             findings: tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect(),
             not_observable: lines(&verdict.not_observable),
             next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
             signature: verdict.signature.clone(),
+            withdrawn: verdict.withdrawn.as_deref().map(lines).unwrap_or_default(),
             suspects: suspects
                 .map(|row| [row.point_id.clone(), row.set.clone(), row.kind.clone(), mm(row.size_mm), row.remark.clone()])
                 .collect(),
@@ -85,11 +78,29 @@ impl Section {
     }
 }
 
-fn sentence(verdict: &VerdictRow) -> String {
-    match verdict.verdict.as_str() {
-        "explained" => "What was found brings the error of held-out points down to the noise.".into(),
-        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.".into(),
-        _ => "Something is left that the findings do not explain.".into(),
+fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
+    let repeatability = Unit::Arcsecond.from_si(verdict.repeatability_rad);
+    let facts = [
+        ("noise of one point, rms", Some(format!("{} mm", mm(verdict.noise_floor_mm)))),
+        ("left over at fitted rows, rms", Some(format!("{} mm", mm(verdict.leftover_rms_mm)))),
+        ("chance that what is left is noise", verdict.p_after.map(|p| significant(p, 2))),
+        ("chance that what the simulation leaves is noise", verdict.p_before.map(|p| significant(p, 2))),
+        ("repeatability of the joints", verdict.p_after.map(|_| format!("{} arcsec", significant(repeatability, 2)))),
+        ("rows fitted", Some(count(verdict.points))),
+    ];
+    facts.into_iter().filter_map(|(name, figure)| Some((name, figure?))).collect()
+}
+
+fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
+    let said = match verdict.verdict.as_str() {
+        "explained" => "What was found brings the error of held-out points down to the noise.",
+        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.",
+        "not_asked" => "Too few rows were fitted to ask what the simulation lacks.",
+        _ => "Something is left that the findings do not explain.",
+    };
+    match tables.withdrawn.iter().find(|gone| gone.step == verdict.step) {
+        Some(gone) => format!("This model does not stand for the run: {gone}. {said}"),
+        None => said.into(),
     }
 }
 

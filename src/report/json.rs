@@ -34,7 +34,11 @@ pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement:
     });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
         json!({ "step": row.step, "verdict": row.verdict, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
-            "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>() })
+            "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>(),
+            "withdrawn": row.withdrawn.iter().flat_map(|text| text.lines()).collect::<Vec<_>>(), "clock": row.clock })
+    });
+    let withdrawn = tables.withdrawn.iter().map(|gone| {
+        json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
     });
     let limits = judgement.map(|judgement| {
         let lines = judgement.lines.iter().map(|(name, found, limit, kept)| json!({ "figure": name, "found_mm": number(found), "limit_mm": number(limit), "kept": kept }));
@@ -47,6 +51,7 @@ pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement:
         "calib": env!("CARGO_PKG_VERSION"),
         "identity": wishes.identity,
         "standing": tables.standing,
+        "withdrawn": withdrawn.collect::<Vec<_>>(),
         "limits": limits,
         "statistics": statistics.collect::<Vec<_>>(),
         "diagnosis": diagnosis,

@@ -24,7 +24,7 @@ pub use limits::Limits;
 use crate::error::Result;
 use crate::table::{
     Corrections, Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected,
-    Rivals, Robot, Split, Statistics, Suspects, Training, Verdict,
+    Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -51,6 +51,8 @@ pub struct Tables {
     pub curves: Curves,
     /// The step that the report speaks of; without one, the last.
     pub standing: Option<String>,
+    /// Later steps that are worse on the same held-out points.
+    pub withdrawn: Vec<Withdrawn>,
 }
 
 /// What the person who asked for the report chose.
@@ -93,7 +95,7 @@ pub struct Pages {
 
 /// The report; fails where `wishes.set` is no held-out set.
 pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
-    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref());
+    let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref()).without(&tables.withdrawn);
     let robot = data::robot_name(&tables.robot);
     let judgement = limits::Judgement::new(tables, &wishes.limits, wishes.set);
     let title = wishes.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);

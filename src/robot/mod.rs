@@ -1,5 +1,6 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
+mod bound;
 pub mod description;
 mod gauging;
 pub mod import;
@@ -10,6 +11,7 @@ mod posture;
 mod rows;
 mod travel;
 
+pub use bound::Bound;
 pub use gauging::{Anchor, Gauging, Target};
 pub use measured::{Distance, Distances, Named, Turns};
 pub use model::RobotModel;

@@ -1,6 +1,6 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
-use crate::robot::measured::{Distances, Named, Turns};
+use crate::robot::measured::{Distance, Distances, Named, Turns};
 use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
@@ -17,7 +17,7 @@ pub struct Measurements {
     pub payload: Vec<f64>,
     /// A.
     pub current: Option<Vec<f64>>,
-    /// s; without it the number of the row stands for it.
+    /// s; where no row has one, the number of the row stands for it.
     pub time: Option<Vec<f64>>,
     /// Of the arm, C.
     pub temperature: Option<Vec<f64>>,
@@ -64,15 +64,19 @@ impl Measurements {
         }
     }
 
-    /// s from some start; the number of the row where the recording has no clock or the row no time.
+    /// Whether any row has a time: else [`Measurements::time`] counts rows.
+    pub fn has_clock(&self) -> bool {
+        self.time.as_ref().is_some_and(|all| all.iter().any(|time| time.is_finite()))
+    }
+
+    /// s from some start, that of the last row that has one where this row has none; without a clock the number of the row, from 0.
     pub fn time(&self, row: usize) -> f64 {
-        self.time.as_ref().map(|all| all[row]).filter(|time| time.is_finite()).unwrap_or(row as f64)
+        self.time.as_ref().and_then(|all| nearest(all, row)).unwrap_or(row as f64)
     }
 
     /// C; that of the last row that has one where this row has none.
     pub fn temperature(&self, row: usize) -> Option<f64> {
-        let all = self.temperature.as_ref()?;
-        (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
+        nearest(self.temperature.as_ref()?, row)
     }
 
     /// What joint `joint` moved (rad or m) from the row before to this one; 0 in the first row.
@@ -102,11 +106,57 @@ impl Measurements {
         self.velocity.is_some() && 10 * rows.iter().filter(moves).count() > rows.len()
     }
 
+    /// The name of the target that a row measured; empty for the tool point.
+    pub fn target(&self, row: usize) -> &str {
+        self.target.as_ref().map_or("", |target| target.name(row))
+    }
+
+    /// Whether all three axes of a row's point were measured.
+    pub fn whole(&self, row: usize) -> bool {
+        self.sigma[row].iter().all(|sigma| sigma.is_finite())
+    }
+
+    /// How many axes of a row's point were measured.
+    pub fn axes(&self, row: usize) -> usize {
+        self.sigma[row].iter().filter(|sigma| sigma.is_finite()).count()
+    }
+
+    /// Measured - predicted (m); zero along axes that were not measured.
+    pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
+        let residual = self.position[row] - predicted;
+        if self.whole(row) {
+            return residual;
+        }
+        Vector3::from_fn(|axis, _| if self.sigma[row][axis].is_finite() { residual[axis] } else { 0.0 })
+    }
+
+    /// The measured orientation of a row's target and its standard deviation about each axis, rad.
+    pub fn turn(&self, row: usize) -> Option<(&Matrix3<f64>, f64)> {
+        let turn = self.turn.as_ref()?;
+        Some((turn.rotation[row].as_ref()?, turn.sigma[row]))
+    }
+
+    pub fn distance(&self, row: usize) -> Option<Distance<'_>> {
+        let all = self.distance.as_ref()?;
+        let length = all.length[row];
+        length.is_finite().then(|| Distance { anchor: all.anchor.name(row), length, sigma: all.sigma[row] })
+    }
+
+    /// Numbers that a row measured: axes of its point, angles, distance.
+    pub fn values(&self, row: usize) -> usize {
+        self.axes(row) + 3 * usize::from(self.turn(row).is_some()) + usize::from(self.distance(row).is_some())
+    }
+
     /// Whether rows `a` and `b` are the same pose under the same payload.
     pub fn same_pose(&self, a: usize, b: usize) -> bool {
         let near = |(x, y): (&f64, &f64)| (x - y).abs() < SAME_JOINT;
         self.payload[a] == self.payload[b] && self.q(a).iter().zip(self.q(b)).all(near)
     }
+}
+
+/// The value of a row, of the last one that has one, or of the next.
+fn nearest(all: &[f64], row: usize) -> Option<f64> {
+    (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
 }
 
 /// Joint positions (rad or m) closer than this are one command: below any controller's resolution.

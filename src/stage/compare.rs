@@ -126,7 +126,14 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
     let mut source = context.services.open(file)?;
     let mut bytes = Vec::new();
     source.reader.read_to_end(&mut bytes).map_err(|error| crate::error::Error::data(&source.label, error.to_string()))?;
-    from_parquet(&source.label, bytes)
+    let loose = from_parquet(&source.label, bytes)?;
+    if !loose.vouched {
+        let label = &source.label;
+        context
+            .services
+            .warn(format!("{label} carries no content hash: whether it was changed since calib wrote it cannot be told"));
+    }
+    Ok(loose.table)
 }
 
 /// A recording with its fit.

@@ -2,7 +2,8 @@
 //! quantity that reveals it. A joint's effect is shown as an angle about the joint (residual along its motion over its lever), all
 //! others as millimetres along their own displacement.
 
-use crate::error::Result;
+use crate::effect::{Effect, Form, Variable};
+use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::robot::Measurements;
 use crate::table::{CurveRow, Curves, FindingRow, Findings, Parameters, Prediction, Recording};
@@ -36,10 +37,14 @@ pub(super) fn curves(
     let whole = model.predict(data);
     let mut out = Vec::new();
     for finding in &findings.0 {
-        let own: Vec<usize> = (model.stack.effects())
-            .filter(|(effect, _)| effect.name() == finding.effect)
-            .flat_map(|(_, range)| range.filter(|k| specs[*k].place.to_string() == finding.place).collect::<Vec<_>>())
-            .collect();
+        let forms = forms(finding)?;
+        // A finding's forms are its identity: what it is called need not be any of theirs. A cause of the whole arm has none.
+        let is_own = |effect: &dyn Effect, k: usize| match effect.form() {
+            Some(form) => forms.contains(form),
+            None => forms.is_empty() && effect.name() == finding.effect && specs[k].place.to_string() == finding.place,
+        };
+        let own: Vec<usize> =
+            model.stack.effects().flat_map(|(effect, range)| range.filter(move |k| is_own(effect, *k))).collect();
         if own.is_empty() {
             continue;
         }
@@ -73,14 +78,14 @@ pub(super) fn curves(
             let variance: Option<f64> =
                 own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
             let residual = data.position[row] - whole[row];
-            let (over, x_unit, x) = abscissa(finding, joint, data, row, &sight.posture.torque);
+            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &sight.posture.torque);
             let fitted = along(&shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,
                 sequence: recording.sequence[row],
                 over,
-                x_unit: x_unit.symbol().into(),
-                x: x_unit.from_si(x),
+                x_unit: x_unit.map_or(ROW, Unit::symbol).into(),
+                x: x_unit.map_or(x, |unit| unit.from_si(x)),
                 unit: if turn.is_some() { "rad".into() } else { "mm".into() },
                 without: along(&residual) + fitted,
                 with: along(&residual),
@@ -93,29 +98,54 @@ pub(super) fn curves(
     Ok(Curves(out))
 }
 
+/// What counts time where the recording has no clock.
+const ROW: &str = "row";
+
+/// The forms of a finding. Fails where they cannot be read.
+fn forms(finding: &FindingRow) -> Result<Vec<Form>> {
+    serde_json::from_str(&finding.forms)
+        .map_err(|error| Error::data("table findings", format!("`{}` are no forms of effects: {error}", finding.forms)))
+}
+
 /// The joint (from 0) at which a finding sits.
 fn joint_of(finding: &FindingRow) -> Option<usize> {
     let number = finding.place.strip_prefix("joint ")?;
     number.parse::<usize>().ok()?.checked_sub(1)
 }
 
-/// What reveals the effect, its stored unit, and its value in SI.
-fn abscissa(finding: &FindingRow, joint: Option<usize>, data: &Measurements, row: usize, torque: &[f64]) -> (String, Unit, f64) {
-    let time = || ("time".to_string(), Unit::Second, data.time(row));
-    match (finding.effect.as_str(), joint) {
-        ("zero_shift" | "base_shift" | "tool_shift" | "tracker_drift", _) => time(),
-        ("thermal_growth", _) => match data.temperature(row) {
-            Some(now) => ("temperature".into(), Unit::Celsius, now),
+/// What reveals the effect of these forms at this joint, its stored unit (none: a row's number, from 1), and its value in SI.
+fn abscissa(
+    (forms, joint): (&[Form], Option<usize>),
+    data: &Measurements,
+    row: usize,
+    torque: &[f64],
+) -> (String, Option<Unit>, f64) {
+    let with = |over: String, unit, x| (over, Some(unit), x);
+    let time = || match data.has_clock() {
+        true => with("time".into(), Unit::Second, data.time(row)),
+        false => ("place in the recording".to_string(), None, row as f64 + 1.0),
+    };
+    let angle = |joint: usize| with(format!("joint {}", joint + 1), Unit::Radian, data.q(row)[joint]);
+    let load = |joint: usize| with(format!("load torque of joint {}", joint + 1), Unit::NewtonMetre, torque[joint]);
+    let variables: Vec<Variable> = forms.iter().flat_map(|form| form.variables()).collect();
+    let own = joint.map(|joint| Variable::Angle { joint });
+    match own.filter(|own| variables.contains(own)).or(variables.first().copied()).or(own) {
+        Some(Variable::Time) => time(),
+        Some(Variable::Temperature) => match data.temperature(row) {
+            Some(now) => with("temperature".into(), Unit::Celsius, now),
             None => time(),
         },
-        ("joint_compliance" | "joint_hardening" | "counterbalance", Some(joint)) => {
-            (format!("load torque of joint {}", joint + 1), Unit::NewtonMetre, torque[joint])
-        }
-        ("joint_log_lag", Some(joint)) => (format!("last move of joint {}", joint + 1), Unit::Radian, data.last_move(row, joint)),
-        ("payload_error", _) => ("payload".into(), Unit::Kilogram, data.payload[row]),
-        (_, Some(joint)) => (format!("joint {}", joint + 1), Unit::Radian, data.q(row)[joint]),
+        Some(Variable::Payload) => with("payload".into(), Unit::Kilogram, data.payload[row]),
+        Some(Variable::Load { joint }) => load(joint),
+        Some(
+            Variable::Angle { joint }
+            | Variable::Motor { joint }
+            | Variable::Approach { joint }
+            | Variable::Push { joint, .. }
+            | Variable::Velocity { joint },
+        ) => angle(joint),
         // Links and the base bend with the load of the shoulder.
-        _ if torque.len() > 1 => ("load torque of joint 2".into(), Unit::NewtonMetre, torque[1]),
+        _ if torque.len() > 1 => load(1),
         _ => time(),
     }
 }

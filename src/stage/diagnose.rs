@@ -1,6 +1,6 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, beside, diagnose};
+use crate::diagnose::{Question, Verdict as Said, beside, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
@@ -28,8 +28,8 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
-/// Fewest rows to fit: geometry alone takes some thirty numbers from three of each row.
-const FEWEST: usize = 15;
+/// Fewest rows that place a robot before the tracker; what is missing takes more of them.
+const FEWEST: usize = 3;
 
 crate::stage::reads! {
     /// Input ports of [`Diagnose`].
@@ -58,7 +58,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -86,8 +86,7 @@ impl Stage for Diagnose {
         // Causes are told apart by whole points; what else was measured takes no part.
         let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
         if fit.len() < FEWEST {
-            let message =
-                format!("{} rows to fit say nothing beyond the geometry's parameters: at least {FEWEST} are needed", fit.len());
+            let message = format!("{} whole points to fit do not even place the robot: at least {FEWEST} are needed", fit.len());
             return Err(Error::data("table recording", message));
         }
         let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && data.whole(*row)).collect();
@@ -96,6 +95,9 @@ impl Stage for Diagnose {
         let set = screened::numbered(&reads.split);
         let question = Question { robot: &robot, data: &data, fit: &fit, validate: &validate, set: &set, seed: context.seed };
         let diagnosis = diagnose(&question, |line| context.services.note(line));
+        if diagnosis.verdict == Said::NotAsked {
+            context.services.warn(diagnosis.not_observable.join("; "));
+        }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
         fit.iter().for_each(|row| held_out[*row] = false);

@@ -4,7 +4,7 @@ use crate::effect::Load;
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
-use crate::stage::{Context, repeated, screened};
+use crate::stage::{Context, computed, repeated, screened};
 use crate::table::{Beside, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -171,13 +171,17 @@ impl Identified {
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
         };
+        let prediction = Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
+            .with_suspects(aside)
+            .with_folds(errors);
+        let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
+        let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
+        suspicion.into_iter().for_each(|line| context.services.warn(line));
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier).with_advice(&advice),
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, &beside),
-            prediction: Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
-                .with_suspects(aside)
-                .with_folds(errors),
+            prediction,
             suspects: Suspects::of(step, fitting.screening, fitting.recording, fitting.split),
         }
     }

@@ -6,6 +6,7 @@
 mod arm;
 mod bind;
 mod check;
+pub mod encoding;
 mod layout;
 mod lines;
 mod motion;
@@ -26,7 +27,7 @@ pub use layout::{
 pub use motion::Motion;
 pub use orientation::OrientationColumns;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
 use crate::table::{Intake, IntakeRow, Recording, Rejected, Robot};
 use schemars::JsonSchema;
@@ -82,7 +83,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "raw delimited files -> recording, with every rejected row and its reason";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 
@@ -92,10 +93,22 @@ impl Stage for Ingest {
     fn files(&self) -> Vec<(String, RawFile)> {
         self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
     }
+    fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
+        let arm = reads.map(|reads| arm::Arm::of(&reads.robot)).transpose()?;
+        let mut faults = Vec::new();
+        for layout in &self.files {
+            match reading::header(layout, arm.as_ref(), self.limits, context) {
+                Ok(()) => {}
+                Err(Error::Data(more)) => faults.extend(more),
+                Err(other) => return Err(other),
+            }
+        }
+        if faults.is_empty() { Ok(None) } else { Err(Error::Data(faults)) }
+    }
     fn run(&self, reads: IngestReads, context: &Context) -> Result<IngestWrites> {
         let faults = self.check();
         if !faults.is_empty() {
-            return Err(crate::error::Error::Spec(faults));
+            return Err(Error::Spec(faults));
         }
         let arm = arm::Arm::of(&reads.robot)?;
         let scan = |(index, layout)| scan::scan(self, index, layout, &arm, context);

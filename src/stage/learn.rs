@@ -13,6 +13,7 @@ use crate::estimate::network::{Activation, Arm, OUTPUTS, Recipe, Rival, Samples,
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, reads, writes};
+use crate::statistics::nearest;
 use crate::table::{Corrections, Network, Parameters, Prediction, PredictionRow, Recording, Robot, Split, Training};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -342,8 +343,7 @@ impl Learn {
 /// The rows whose residual is not absurdly far off.
 fn within_reach(prediction: &Prediction, rows: &[usize], context: &Context) -> Vec<usize> {
     let mut errors: Vec<f64> = rows.iter().map(|row| prediction.0[*row].error_mm).collect();
-    errors.sort_by(f64::total_cmp);
-    let limit = FAR * errors.get(errors.len() / 2).copied().unwrap_or(f64::INFINITY);
+    let limit = FAR * nearest(&mut errors, 0.5).unwrap_or(f64::INFINITY);
     let near: Vec<usize> =
         rows.iter().copied().filter(|row| prediction.0[*row].error_mm <= limit && !prediction.0[*row].suspect).collect();
     if near.len() < rows.len() {

@@ -2,6 +2,7 @@
 
 mod advice;
 mod compare;
+mod computed;
 mod curves;
 mod diagnose;
 mod identified;
@@ -252,6 +253,11 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     /// The input files among the settings, each with its path below `with`.
     fn files(&self) -> Vec<(String, RawFile)> {
         Vec::new()
+    }
+    /// Looks at the input files without doing the work: at their headers, say. `reads` is there where the stages before could be
+    /// looked at so far that they gave their tables; fails with every fault, gives its own tables where that is all of the work.
+    fn look(&self, _reads: Option<Self::Reads>, _context: &Context) -> Result<Option<Self::Writes>> {
+        Ok(None)
     }
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }

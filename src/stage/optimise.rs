@@ -7,6 +7,7 @@ use crate::error::{Fault, Result};
 use crate::estimate::swarm::{Algorithm, Budget, Landscape, Outcome, Stop};
 use crate::estimate::threads::in_order;
 use crate::stage::{Context, Stage, reads, writes};
+use crate::statistics::quantile;
 use crate::table::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -180,8 +181,10 @@ impl Optimise {
 
     fn row(&self, step: &str, problem: &Problem, method: Algorithm, outcomes: &[Outcome]) -> SearchesRow {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
-        let reached: Vec<f64> = outcomes.iter().filter(|o| o.stop == Stop::Target).map(|o| o.evaluations as f64).collect();
-        let errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
+        let mut reached: Vec<f64> = outcomes.iter().filter(|o| o.stop == Stop::Target).map(|o| o.evaluations as f64).collect();
+        let mut errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
+        reached.sort_by(f64::total_cmp);
+        errors.sort_by(f64::total_cmp);
         let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();
         let beside = |r: &&Reference| (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method);
         let reference = self.reference.iter().find(beside);
@@ -208,13 +211,4 @@ impl Optimise {
 fn stuck(outcome: &Outcome) -> bool {
     let half = outcome.history.get(outcome.history.len() / 2);
     outcome.stop != Stop::Target && half.is_some_and(|half| half.best <= outcome.value)
-}
-
-/// Linear between order statistics; none without values.
-pub fn quantile(values: &[f64], fraction: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let place = fraction * sorted.len().checked_sub(1)? as f64;
-    let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
-    Some(below + (above - below) * place.fract())
 }

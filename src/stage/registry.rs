@@ -12,6 +12,8 @@ pub trait ErasedStage: Send + Sync {
     fn files(&self) -> Vec<(String, RawFile)>;
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
+    /// As [`Stage::look`], with the frames of each input port where all are known.
+    fn look(&self, frames: Option<Vec<Vec<(String, Frame)>>>, context: &Context) -> Result<Option<Vec<Output>>>;
     /// Takes the frames of each input port with the ids of the stages that wrote them.
     fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>>;
 }
@@ -25,6 +27,10 @@ impl<T: Stage> ErasedStage for T {
     }
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("settings are plain data")
+    }
+    fn look(&self, frames: Option<Vec<Vec<(String, Frame)>>>, context: &Context) -> Result<Option<Vec<Output>>> {
+        let reads = frames.map(T::Reads::take).transpose()?;
+        Stage::look(self, reads, context)?.map(Writes::give).transpose()
     }
     fn run(&self, frames: Vec<Vec<(String, Frame)>>, context: &Context) -> Result<Vec<Output>> {
         Stage::run(self, T::Reads::take(frames)?, context)?.give()

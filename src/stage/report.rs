@@ -6,8 +6,8 @@ use crate::report::{Limits, Tables, Wishes, pages};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
-    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Suspects, Table, Training, Verdict, standing,
+    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, HeldOut, Intake, Observability, Parameters,
+    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Step, Suspects, Table, Training, Verdict, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,7 +69,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 6;
+    const IMPLEMENTATION: u32 = 7;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -79,12 +79,19 @@ impl Stage for Report {
         // A diagnosis beside an outside simulation speaks of that, not of this robot's model.
         let diagnosed = reads.findings.last().filter(|_| reads.recording.simulated.is_none()).map(|findings| &findings.stage);
         let model = |stage: &String| reads.models.iter().find(|model| model.stage == *stage).map(|model| model.table.clone());
-        let steps = reads.prediction.iter().map(|step| (step.stage.as_str(), model(&step.stage).is_some()));
-        let standing = diagnosed.and_then(|stage| standing(steps, stage)).map(String::from);
+        let step = |step: &Labelled<Prediction>| Step {
+            id: step.table.0.first().map_or_else(|| step.stage.clone(), |row| row.step.clone()),
+            own: model(&step.stage).is_some(),
+            held_out: HeldOut::of(&step.table),
+        };
+        let steps: Vec<Step> = reads.prediction.iter().map(step).collect();
+        let stands = standing(&steps, diagnosed.map(String::as_str)).filter(|_| reads.recording.simulated.is_none());
+        let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
+        withdrawn.iter().for_each(|gone| context.services.warn(gone.to_string()));
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
-            parameters: diagnosed.and_then(model).unwrap_or(reads.parameters),
+            parameters: stands.as_ref().and_then(|stands| model(&stands.model)).unwrap_or(reads.parameters),
             robot: reads.robot,
             recording: reads.recording,
             split: reads.split,
@@ -100,7 +107,8 @@ impl Stage for Report {
             rivals: unlabelled(reads.rivals),
             suspects: unlabelled(reads.suspects),
             curves,
-            standing,
+            standing: stands.map(|stands| stands.step),
+            withdrawn,
         };
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
         let limits = Limits { mean_mm, p95_mm, max_mm };

@@ -66,6 +66,10 @@ impl Stage for ReadRobot {
         std::iter::once(("file".to_string(), self.file.clone())).chain(urdf).collect()
     }
 
+    fn look(&self, reads: Option<RobotReads>, context: &Context) -> Result<Option<RobotWrites>> {
+        reads.map(|reads| self.run(reads, context)).transpose()
+    }
+
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
         let (label, text) = text(&self.file, context)?;
         let file = Text { label: &label, text: &text };

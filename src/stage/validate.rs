@@ -1,7 +1,8 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
 use crate::error::{Error, Result};
-use crate::stage::{Context, Labelled, Stage, reads, writes};
+use crate::stage::{Context, Labelled, Stage, computed, reads, writes};
+use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -64,6 +65,7 @@ impl Stage for Validate {
             ));
         }
         let mut statistics = Statistics::default();
+        let mut suspicion = None;
         for (order, step) in (0..).zip(&reads.prediction) {
             let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
             let value =
@@ -76,6 +78,9 @@ impl Stage for Validate {
                 (1.0 + free / (values - free - 1.0).max(1.0)).sqrt()
             });
             for ((name, set, held_out), rows) in groups(step)? {
+                let whole = rows.iter().filter(|row| held_out && row.measured.is_none() && !row.suspect);
+                let suspected = computed::suspicion(whole.map(|row| [row.error_mm, row.noise_mm]), 0);
+                suspicion = suspicion.or(suspected.map(|line| format!("{name} on {set}, held out: {line}")));
                 let row = describe(order, name, &set, held_out, &rows);
                 let row = StatisticsRow { expected_rms_mm: expected(held_out, &rows, unmodelled), ..row };
                 statistics.0.push(cross_validated(row, &rows, inflation));
@@ -103,6 +108,7 @@ impl Stage for Validate {
                 row.reference_max_mm = reference.max_mm;
             }
         }
+        suspicion.into_iter().for_each(|line| context.services.warn(line));
         if !statistics.0.iter().any(|row| row.held_out) {
             context.services.warn("no held-out rows: only the training error can be stated, and it flatters".into());
         }
@@ -144,6 +150,7 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
     let mut without: Vec<f64> = rows.iter().filter(|row| !row.suspect).map(|row| row.error_mm).collect();
     without.sort_by(f64::total_cmp);
     let suspects = rows.len() - without.len();
+    let at = |share: f64| quantile(&error, share).unwrap_or(f64::NAN);
     let some = suspects > 0 && !without.is_empty();
     let average = |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
     StatisticsRow {
@@ -155,9 +162,9 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         mean_mm: mean,
         std_mm: if rows.len() > 1 { (spread / (count - 1.0)).sqrt() } else { 0.0 },
         rms_mm: rms(|row| row.error_mm),
-        median_mm: quantile(&error, 0.5),
-        p95_mm: quantile(&error, 0.95),
-        max_mm: quantile(&error, 1.0),
+        median_mm: at(0.5),
+        p95_mm: at(0.95),
+        max_mm: at(1.0),
         rms_x_mm: rms(|row| row.dx_mm),
         rms_y_mm: rms(|row| row.dy_mm),
         rms_z_mm: rms(|row| row.dz_mm),
@@ -219,12 +226,4 @@ fn expected(held_out: bool, rows: &[&PredictionRow], unmodelled: Option<f64>) ->
         sum += noise * if held_out { 1.0 + leverage } else { (1.0 - leverage).max(0.0) };
     }
     Some((sum / rows.len() as f64).sqrt())
-}
-
-/// Linear between order statistics (Hyndman and Fan's type 7, the default of numpy, R and polars' `linear`).
-fn quantile(sorted: &[f64], fraction: f64) -> f64 {
-    let place = fraction * (sorted.len() - 1) as f64;
-    let below = sorted[place.floor() as usize];
-    let above = sorted[place.ceil() as usize];
-    below + (above - below) * place.fract()
 }

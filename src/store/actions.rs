@@ -3,33 +3,21 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::Store;
 use super::content::TableHash;
 use super::disk::{make_read_only, place, refused, write};
 use super::frame::Frame;
-use super::key::{ActionId, FileHash, StageKey};
+use super::key::{ActionId, StageKey};
 use super::reader;
 use super::seal::{seal, unseal};
+use super::table_ref::{TableRef, same_bytes};
 use super::writer::{FinishedFile, TableWriter};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 
 /// Bumped when older records can no longer be understood: all stages run again.
 const RECORD_FORMAT: u32 = 1;
-
-/// A published table.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TableRef {
-    /// `name/version`.
-    pub schema: String,
-    /// Identity of the content.
-    pub table_hash: TableHash,
-    /// Name of the object that holds it.
-    pub file_hash: FileHash,
-    pub rows: u64,
-    pub bytes: u64,
-}
 
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -130,7 +118,7 @@ impl Store {
                 Ok(length) if length == table.bytes && same_bytes(&path, table) => (),
                 _ if self.obtain(table, &path)? => (),
                 Ok(length) if length == table.bytes => return damaged(format!("table {port} is not what was published")),
-                Ok(length) => return damaged(format!("table {port} has {length} bytes instead of {}", table.bytes)),
+                Ok(length) => return damaged(format!("table {port} has {} instead of {}", counted(length, "byte"), table.bytes)),
                 Err(e) => return damaged(format!("table {port}: {e}")),
             }
         }
@@ -179,6 +167,11 @@ impl Store {
         reader::load(&self.object(table)?, table)
     }
 
+    /// Whether the file of a published table is there, byte for byte.
+    pub fn is_whole(&self, table: &TableRef) -> Result<bool> {
+        Ok(same_bytes(&self.object(table)?, table))
+    }
+
     fn write_frame(&self, frame: &Frame) -> Result<FinishedFile> {
         let mut writer = TableWriter::new(frame.schema(), self.workspace()?);
         writer.push(frame)?;
@@ -200,10 +193,6 @@ impl Store {
         }
         Ok(table)
     }
-}
-
-pub(super) fn same_bytes(path: &Path, table: &TableRef) -> bool {
-    fs::File::open(path).and_then(FileHash::of_reader).is_ok_and(|found| found == table.file_hash)
 }
 
 fn conflict(standing: &ActionRecord, fresh: &ActionRecord) -> Option<String> {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::schema::{ColumnType, FieldSchema, TableSchema};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 
 /// Rows ascend by the key; nulls do not occur in it.
 const ASCENDING: SortOptions = SortOptions { descending: false, nulls_first: true };
@@ -147,7 +147,7 @@ fn check_values(schema: &TableSchema, layout: &[(&FieldSchema, Option<usize>)], 
                 .as_deref()
                 .filter(|unit| *unit != "1" && *unit != "row")
                 .map_or(String::new(), |unit| format!(" {unit}"));
-            let more = if bad.len() > 1 { format!(" (and {} more rows)", bad.len() - 1) } else { String::new() };
+            let more = if bad.len() > 1 { format!(" (and {})", counted(bad.len() - 1, "more row")) } else { String::new() };
             faults.push(Fault::new(
                 place(*row),
                 format!("{value}{unit} is out of range; allowed: {}{unit}{more}", span(range.min, range.max)),

@@ -3,13 +3,12 @@
 //! One blake3 stream per column over its cells (a presence byte, then 8 little-endian bytes, 1 byte, or length and text), then
 //! one hash over kind, major version, row count and every column's name, type, unit and stream.
 
-use arrow::array::{Array, ArrayRef, AsArray};
+use arrow::array::{Array, ArrayRef, AsArray, RecordBatch};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
 use super::frame::Frame;
-use super::schema::TableSchema;
 
 /// Hash of a table's logical content, as 64 hex digits.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -31,35 +30,47 @@ impl fmt::Display for TableHash {
 impl Frame {
     /// The identity of this table.
     pub fn table_hash(&self) -> TableHash {
-        let mut hasher = ContentHasher::new(self.schema());
-        hasher.push(self);
+        let mut hasher = ContentHasher::new(self.kind(), self.schema().version.major);
+        hasher.push(self.batch());
         hasher.finish()
     }
 }
 
+/// The identity of columns as a file of this kind and major version has them; none where one is of a type that no table has.
+pub(super) fn hash_of_columns(kind: &str, major: u32, batch: &RecordBatch) -> Option<TableHash> {
+    let known = [DataType::Float64, DataType::Int64, DataType::Boolean, DataType::Utf8];
+    let fields = batch.schema_ref().fields();
+    fields.iter().all(|field| known.contains(field.data_type())).then(|| {
+        let mut hasher = ContentHasher::new(kind, major);
+        hasher.push(batch);
+        hasher.finish()
+    })
+}
+
 /// Hashes a table chunk by chunk; every chunk has the same columns.
 pub(super) struct ContentHasher {
-    schema: &'static TableSchema,
+    kind: String,
+    major: u32,
     rows: u64,
     columns: Vec<(String, blake3::Hasher)>,
 }
 
 impl ContentHasher {
-    pub(super) fn new(schema: &'static TableSchema) -> Self {
-        Self { schema, rows: 0, columns: Vec::new() }
+    pub(super) fn new(kind: &str, major: u32) -> Self {
+        Self { kind: kind.into(), major, rows: 0, columns: Vec::new() }
     }
 
-    pub(super) fn push(&mut self, chunk: &Frame) {
+    pub(super) fn push(&mut self, chunk: &RecordBatch) {
         if self.columns.is_empty() {
             let header = |field: &std::sync::Arc<arrow::datatypes::Field>| {
                 let unit = field.metadata().get("unit").map_or("", String::as_str);
                 format!("{}\0{}\0{unit}", field.name(), field.data_type())
             };
-            self.columns = chunk.arrow_schema().fields().iter().map(|field| (header(field), blake3::Hasher::new())).collect();
+            self.columns = chunk.schema_ref().fields().iter().map(|field| (header(field), blake3::Hasher::new())).collect();
         }
-        assert_eq!(self.columns.len(), chunk.batch().num_columns(), "chunks of one table have the same columns");
-        self.rows += chunk.rows() as u64;
-        for ((_, hasher), array) in self.columns.iter_mut().zip(chunk.batch().columns()) {
+        assert_eq!(self.columns.len(), chunk.num_columns(), "chunks of one table have the same columns");
+        self.rows += chunk.num_rows() as u64;
+        for ((_, hasher), array) in self.columns.iter_mut().zip(chunk.columns()) {
             hash_cells(hasher, array);
         }
     }
@@ -71,8 +82,8 @@ impl ContentHasher {
             whole.update(text.as_bytes());
         };
         text("calib table 1");
-        text(&self.schema.name);
-        text(&self.schema.version.major.to_string());
+        text(&self.kind);
+        text(&self.major.to_string());
         text(&self.rows.to_string());
         for (header, hasher) in self.columns {
             text(&header);

@@ -5,15 +5,15 @@
 //! visible by half, and what a power cut tears is told by its hash.
 
 pub mod actions;
-pub(crate) mod bytes;
+mod bucket;
 mod cell;
 mod check;
 pub mod content;
+mod decode;
 mod disk;
 mod durable;
 pub mod frame;
 pub mod key;
-mod migrate;
 mod notes;
 mod reader;
 mod remote;
@@ -23,19 +23,22 @@ mod s3;
 pub mod schema;
 mod seal;
 mod sweep;
+mod table_ref;
 mod tags;
 mod verify;
 mod view;
 mod workspace;
 pub mod writer;
 
-pub use actions::{Account, ActionRecord, Lookup, Product, Published, TableRef};
+pub use actions::{Account, ActionRecord, Lookup, Product, Published};
+pub use bucket::Bucket;
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
-pub use reader::read_table;
-pub use remote::Bucket;
+pub(crate) use reader::table_of_bytes;
+pub use reader::{Loose, read_table};
 pub use runs::{Link, Run, Sealed};
 pub use sweep::Sweep;
+pub use table_ref::TableRef;
 pub use verify::Verification;
 pub use writer::{FinishedFile, TableWriter};
 

@@ -1,36 +1,50 @@
-//! Parquet files back to frames: the file's hash first, then schema and version, then the columns.
+//! Parquet files back to frames: the file's hash first, then schema and version, then the columns and the hash of what they hold.
 
-use arrow::compute::concat_batches;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::reader::ChunkReader;
 use std::fs::{self, File};
 use std::path::Path;
 
-use super::actions::TableRef;
+use super::decode::Decoded;
 use super::disk::refused;
-use super::frame::{Frame, FrameBuilder};
+use super::frame::Frame;
 use super::key::FileHash;
-use super::migrate::{self, Columns, MIGRATIONS};
 use super::schema::{self, Version};
+use super::table_ref::TableRef;
+use super::writer::{CONTENT_HASH, SCHEMA};
 use crate::error::{Error, Fault, Result};
+use crate::raw;
+
+/// A table from a file outside of a store.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loose<T> {
+    pub table: T,
+    /// Whether the file carries the hash of its content. One that does not was written by another program: nobody can tell whether
+    /// its numbers were changed.
+    pub vouched: bool,
+}
 
 /// Reads a published table; a damaged file is set aside, so that the next run makes it anew.
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
-    let (kind, version) = known_schema(path, &table.schema)?;
-    let file = File::open(path).map_err(|e| refused(path, "read", &e))?;
-    let found = FileHash::of_reader(&file).map_err(|e| refused(path, "read", &e))?;
+    let place = path.display().to_string();
+    let (kind, version) = known_schema(&place, &table.schema)?;
+    let open = || File::open(path).map_err(|e| refused(path, "read", &e));
+    let found = FileHash::of_reader(open()?).map_err(|e| refused(path, "read", &e))?;
     if found != table.file_hash {
         return Err(set_aside(path, "its bytes are not those that were published"));
     }
-    let frame = read(path, kind, version)?;
-    if frame.rows() as u64 != table.rows {
+    let unreadable = |why| Error::store(&place, format!("not a readable Parquet file: {why}"));
+    let decoded = Decoded::of(open()?).map_err(unreadable)?;
+    if decoded.rows() != table.rows {
         return Err(set_aside(path, "it has another number of rows than was published"));
     }
-    Ok(frame)
+    if decoded.table_hash(kind, version).as_ref() != Some(&table.table_hash) {
+        return Err(set_aside(path, "its content is not what was published"));
+    }
+    decoded.frame(kind, version)
 }
 
 /// The kind of a schema id `name/version` that this calib can read.
-fn known_schema<'a>(path: &Path, id: &'a str) -> Result<(&'a str, Version)> {
-    let place = path.display().to_string();
+fn known_schema<'a>(place: &str, id: &'a str) -> Result<(&'a str, Version)> {
     let parts = id.split_once('/').and_then(|(kind, version)| Some((kind, Version::parse(version)?)));
     let Some((kind, version)) = parts else {
         return Err(Error::store(place, format!("schema `{id}` is not of the form name/1.0.0")));
@@ -38,7 +52,6 @@ fn known_schema<'a>(path: &Path, id: &'a str) -> Result<(&'a str, Version)> {
     let known = schema::all().find(|schema| schema.name == kind).map(|schema| schema.version);
     match known {
         Some(known) if known.major == version.major && version.minor <= known.minor => Ok((kind, version)),
-        Some(known) if migrate::reaches(MIGRATIONS, kind, version.major, known.major) => Ok((kind, version)),
         Some(known) => Err(Error::store(
             place,
             format!("the table is {id}, this calib reads {kind}/{known}: use the calib that wrote it, or a newer one"),
@@ -49,65 +62,53 @@ fn known_schema<'a>(path: &Path, id: &'a str) -> Result<(&'a str, Version)> {
     }
 }
 
-fn read(path: &Path, kind: &str, version: Version) -> Result<Frame> {
-    let unreadable =
-        |e: &dyn std::fmt::Display| Error::store(path.display().to_string(), format!("not a readable Parquet file: {e}"));
-    let file = File::open(path).map_err(|e| refused(path, "read", &e))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
-    let arrow_schema = builder.schema().clone();
-    let reader = builder.with_batch_size(1 << 16).build().map_err(|e| unreadable(&e))?;
-    let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|e| unreadable(&e))?;
-    let batch = concat_batches(&arrow_schema, &batches).map_err(|e| unreadable(&e))?;
-    let names = arrow_schema.fields().iter().map(|field| field.name().clone());
-    let columns: Columns = names.zip(batch.columns().iter().cloned()).collect();
-    let known = schema::of(kind)?.version;
-    let (columns, version) = if version.major < known.major {
-        let columns = migrate::climb(MIGRATIONS, kind, version.major, known.major, columns);
-        (columns.map_err(|why| Error::store(path.display().to_string(), why))?, Version { minor: 0, patch: 0, ..known })
-    } else {
-        (columns, version)
-    };
-    let mut frame = FrameBuilder::new(kind);
-    let added = added_since(kind, version, &columns, batch.num_rows())?;
-    for (name, column) in columns.into_iter().chain(added) {
-        frame.push(name, column);
-    }
-    frame.finish()
+/// Reads a table that is not in a store, of the kind that it names or of the one that is given. Where the file carries the hash of its
+/// content, that must be the hash of what was read.
+pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Loose<Frame>> {
+    let place = path.display().to_string();
+    let file = raw::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
+    loose(&place, file, kind)
 }
 
-/// Reads a table that is not in a store, of the kind that it names or of the one that is given.
-pub fn read_table(path: &Path, kind: Option<&str>) -> Result<Frame> {
-    let place = path.display().to_string();
-    let unreadable = |e: &dyn std::fmt::Display| Error::data(&place, format!("not a readable Parquet file: {e}"));
-    let file = File::open(path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
-    let said = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
-    let id = said.filter(|pair| pair.key == "calib.schema").find_map(|pair| pair.value.clone());
+/// The same from the bytes of the file, which `label` names in errors.
+pub(crate) fn table_of_bytes(label: &str, bytes: Vec<u8>, kind: &str) -> Result<Loose<Frame>> {
+    loose(label, bytes::Bytes::from(bytes), Some(kind))
+}
+
+fn loose<R: ChunkReader + 'static>(place: &str, source: R, kind: Option<&str>) -> Result<Loose<Frame>> {
+    let decoded = Decoded::of(source).map_err(|why| Error::data(place, format!("not a readable Parquet file: {why}")))?;
+    let id = decoded.said(SCHEMA).map(String::from);
     let (kind, version) = match (kind, &id) {
-        (None, Some(id)) => known_schema(path, id)?,
-        (Some(kind), _) => (kind, schema::of(kind)?.version),
+        (Some(kind), Some(id)) if id.split_once('/').is_none_or(|(named, _)| named != kind) => {
+            return Err(Error::data(place, format!("says that it is a table `{id}`; expected a table `{kind}` of calib")));
+        }
+        (_, Some(id)) => known_schema(place, id).map_err(|error| of_the_data(place, error))?,
+        (Some(kind), None) => (kind, schema::of(kind)?.version),
         (None, None) => return Err(Error::spec(place, "does not say which table it is; say so with --as KIND")),
     };
-    read(path, kind, version).map_err(|error| match error {
-        Error::Bug(message) => Error::data(&place, message),
+    let carried = decoded.said(CONTENT_HASH);
+    if carried.is_some_and(|carried| decoded.table_hash(kind, version).is_none_or(|found| found.as_str() != carried)) {
+        let message = format!(
+            "its content is not what calib wrote: the hash that it carries (`{CONTENT_HASH}`) is of other numbers. Take the file again \
+             from the store that it comes from, where `calib run` writes it anew"
+        );
+        return Err(Error::data(place, message));
+    }
+    let vouched = carried.is_some();
+    let table = decoded.frame(kind, version).map_err(|error| of_the_data(place, error))?;
+    Ok(Loose { table, vouched })
+}
+
+/// What is wrong with a file that a person named is wrong with the data, wherever it showed.
+fn of_the_data(place: &str, error: Error) -> Error {
+    match error {
+        Error::Bug(message) => Error::data(place, message),
+        Error::Store(fault) => Error::Data(vec![fault]),
         Error::Data(faults) => {
             Error::Data(faults.into_iter().map(|fault| Fault::new(format!("{place}: {}", fault.place), fault.message)).collect())
         }
         other => other,
-    })
-}
-
-/// Nullable columns that a later minor version has, as nulls.
-fn added_since(kind: &str, version: Version, columns: &Columns, rows: usize) -> Result<Columns> {
-    let schema = schema::of(kind)?;
-    if version.minor == schema.version.minor {
-        return Ok(Columns::new());
     }
-    let added = schema
-        .fields
-        .iter()
-        .filter(|field| field.nullable && !field.optional && !field.per_joint && !columns.contains_key(&field.name));
-    Ok(added.map(|field| (field.name.clone(), arrow::array::new_null_array(&field.column_type.arrow(), rows))).collect())
 }
 
 /// Takes a damaged object out of the way.

@@ -6,7 +6,6 @@
 //! What is for people (`tables/`, `documents/`) lies in the folder alone, where every run puts it.
 
 use std::collections::BTreeSet;
-use std::fmt::Debug;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,9 +14,10 @@ use std::thread;
 use std::time::Duration;
 
 use super::Store;
-use super::actions::{TableRef, same_bytes};
+use super::bucket::Bucket;
 use super::disk::{component, make_dir, make_read_only, place, put_if_absent, refused, write};
 use super::durable::together;
+use super::table_ref::{TableRef, same_bytes};
 use crate::error::{Error, Result};
 
 /// How often and at which distance a record is asked for that was there and is not: another machine's is being decided just now.
@@ -25,22 +25,6 @@ const TRIES: u32 = 5;
 const PAUSE: Duration = Duration::from_millis(200);
 /// More than any store has.
 const ALL: usize = usize::MAX;
-
-/// Whole files under keys with slashes, as S3 has them; what is written is seen by all at once.
-pub trait Bucket: Debug + Send + Sync {
-    /// As a person writes it: `s3://bucket/prefix`.
-    fn name(&self) -> &str;
-    /// Fetches into a new file; false where there is nothing.
-    fn fetch(&self, key: &str, to: &Path) -> Result<bool>;
-    /// Writes a file over what may be there.
-    fn send(&self, from: &Path, key: &str) -> Result<()>;
-    /// Writes a small file where nothing is, decided once for all who try; false where something is.
-    fn create(&self, from: &Path, key: &str) -> Result<bool>;
-    /// Takes away; nothing where there is nothing.
-    fn remove(&self, key: &str) -> Result<()>;
-    /// Keys below a folder (all where it is empty) with their bytes, in order, `most` at most.
-    fn list(&self, folder: &str, most: usize) -> Result<Vec<(String, u64)>>;
-}
 
 #[derive(Debug)]
 pub(super) struct Remote {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use super::Store;
 use super::disk::{component, make_dir, place, refused, replace, write, write_synced};
 use super::seal::{seal, unseal};
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result};
 
 /// A run in flight.
 #[derive(Debug)]
@@ -194,6 +194,11 @@ impl Store {
         Ok(None)
     }
 
+    /// Whether anything of a run's manifest was written: a power cut may leave a run without, which then never ended.
+    pub fn has_manifest(&self, id: &str) -> bool {
+        self.run_dir(id).is_ok_and(|dir| fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0))
+    }
+
     /// The manifest of a run, as far as it was written.
     pub fn manifest(&self, id: &str) -> Result<Value> {
         self.sealed_manifest(id).map(|found| found.manifest)
@@ -207,39 +212,5 @@ impl Store {
         let sealed = unseal(&bytes).map_err(|why| damaged(why.into()))?;
         let manifest = serde_json::from_slice(&bytes).map_err(|e| damaged(e.to_string()))?;
         Ok(Sealed { manifest, sealed })
-    }
-
-    /// The run that a person means: an id, the beginning or end of one, a tag, `HEAD` for the last, `HEAD~2` for two before it.
-    pub fn find_run(&self, text: &str) -> Result<String> {
-        let runs = self.runs()?;
-        let nothing = |message: String| Err(Error::spec(format!("run {text}"), message));
-        if runs.is_empty() {
-            return nothing(format!("the store {} has no runs", self.name()));
-        }
-        if let Some(back) = text.strip_prefix("HEAD") {
-            let back = match back.strip_prefix('~') {
-                Some("") => Some(1),
-                Some(count) => count.parse::<usize>().ok(),
-                None => back.is_empty().then_some(0),
-            };
-            return match back.and_then(|back| runs.len().checked_sub(back + 1)) {
-                Some(at) => Ok(runs[at].clone()),
-                None => nothing(format!("expected HEAD or HEAD~N; the store has {} runs", runs.len())),
-            };
-        }
-        if let Some(run) = self.tags()?.remove(text) {
-            return Ok(run);
-        }
-        let wanted = text.to_uppercase();
-        let found: Vec<&String> = runs.iter().filter(|id| id.starts_with(&wanted) || id.ends_with(&wanted)).collect();
-        match found.as_slice() {
-            [run] if !text.is_empty() => Ok((*run).clone()),
-            [] => {
-                let tags = self.tags()?;
-                let hint = nearest(text, tags.keys().map(String::as_str)).map(|near| format!("; did you mean the tag `{near}`?"));
-                nothing(format!("no such run or tag{} `calib log` lists them", hint.unwrap_or_else(|| ";".into())))
-            }
-            several => nothing(format!("{} runs begin or end so; give more of the id", several.len())),
-        }
     }
 }

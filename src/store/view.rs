@@ -4,9 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Store;
-use super::actions::TableRef;
 use super::disk::{component, make_dir, place, refused, write};
 use super::seal::seal;
+use super::table_ref::TableRef;
 use crate::error::Result;
 
 impl Store {

@@ -1,13 +1,14 @@
 //! The folder of one process below `tmp/`, locked while the process lives, swept by others when it is dead.
 
 use std::fs::{self, File, TryLockError};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::disk::{make_dir, refused};
 use crate::error::Result;
 
-/// `tmp/<ulid>/` with its lock `tmp/<ulid>.lock`; the kernel frees the lock when the process dies. No name is ever used
+/// `tmp/<name>/` with its lock `tmp/<name>.lock`; the kernel frees the lock when the process dies. No name is ever used
 /// twice: a sweeper that still holds a dead folder's lock would otherwise remove the living folder of the same name.
 #[derive(Debug)]
 pub(super) struct Workspace {
@@ -23,7 +24,7 @@ impl Workspace {
         make_dir(tmp)?;
         sweep(tmp);
         loop {
-            let dir = tmp.join(ulid::Ulid::generate().to_string());
+            let dir = tmp.join(fresh_name());
             let lock_path = dir.with_extension("lock");
             let lock = File::create_new(&lock_path).map_err(|e| refused(&lock_path, "write", &e))?;
             // A sweeper may have come between creating and locking; then the name is gone or held: take another.
@@ -39,6 +40,12 @@ impl Workspace {
     pub(super) fn fresh(&self) -> PathBuf {
         self.dir.join(self.next.fetch_add(1, Ordering::Relaxed).to_string())
     }
+}
+
+/// A name that nobody else has: 128 random bits, by the kernel's randomness in the keys of std's hasher. No result depends on it.
+fn fresh_name() -> String {
+    let draw = || RandomState::new().build_hasher().finish();
+    format!("{:016x}{:016x}", draw(), draw())
 }
 
 impl Drop for Workspace {

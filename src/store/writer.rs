@@ -14,15 +14,20 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::actions::TableRef;
 use super::check;
 use super::content::ContentHasher;
 use super::disk::refused;
 use super::frame::Frame;
 use super::key::FileHash;
 use super::schema::TableSchema;
+use super::table_ref::TableRef;
 use super::workspace::Workspace;
 use crate::error::{Error, Result};
+
+/// Keys of a file's metadata: the table's `name/version`, the units of its columns as JSON, and the hash of its content.
+pub(super) const SCHEMA: &str = "calib.schema";
+pub(super) const UNITS: &str = "calib.units";
+pub(super) const CONTENT_HASH: &str = "calib.table_hash";
 
 /// Rows of a row group: a few MB of a recording, so that readers can skip and writers stay small.
 const GROUP_ROWS: usize = 1 << 16;
@@ -108,7 +113,7 @@ impl Drop for FinishedFile {
 impl Open {
     fn new(schema: &'static TableSchema, chunk: &Frame, path: &Path) -> Result<Self> {
         let file = File::create_new(path).map_err(|e| refused(path, "write", &e))?;
-        let (arrow_schema, content) = (chunk.arrow_schema(), ContentHasher::new(schema));
+        let (arrow_schema, content) = (chunk.arrow_schema(), ContentHasher::new(&schema.name, schema.version.major));
         Ok(Self { file: Some(file), writer: None, arrow_schema, content, waiting: Vec::new(), last: None, rows: 0 })
     }
 
@@ -127,8 +132,8 @@ impl Open {
         if chunk.arrow_schema() != self.arrow_schema {
             return Err(Error::Bug(format!("table {}: chunks with different columns", schema.name)));
         }
-        self.content.push(chunk);
         let batch = chunk.batch();
+        self.content.push(batch);
         if batch.num_rows() == 0 {
             return Ok(());
         }
@@ -169,7 +174,7 @@ impl Open {
         self.writer(schema, path)?;
         let Some(mut writer) = self.writer else { return Err(Error::Bug(format!("table {}: no writer", schema.name))) };
         let table_hash = self.content.finish();
-        writer.append_key_value_metadata(KeyValue::new("calib.table_hash".into(), table_hash.to_string()));
+        writer.append_key_value_metadata(KeyValue::new(CONTENT_HASH.into(), table_hash.to_string()));
         // Not `into_inner`, which hides what the disk said of the last bytes.
         writer.finish().map_err(|e| parquet_refused(path, e))?;
         let (file, file_hash, bytes) = writer.inner_mut().close().map_err(|e| refused(path, "write", &e))?;
@@ -189,10 +194,10 @@ fn properties(schema: &TableSchema, arrow_schema: &SchemaRef, rows: u64) -> Resu
     };
     let units: serde_json::Map<String, serde_json::Value> = arrow_schema.fields().iter().filter_map(unit).collect();
     let key_values = [
-        ("calib.schema", schema.id()),
+        (SCHEMA, schema.id()),
         ("calib.description", schema.description.clone()),
         ("calib.primary_key", schema.primary_key.join(",")),
-        ("calib.units", super::key::canonical(&units.into())),
+        (UNITS, super::key::canonical(&units.into())),
     ];
     let level = ZstdLevel::try_new(3).map_err(|e| Error::Bug(e.to_string()))?;
     let compression = if rows < SMALL_ROWS { Compression::SNAPPY } else { Compression::ZSTD(level) };

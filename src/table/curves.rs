@@ -7,9 +7,9 @@ crate::table::rows! { "curves",
         rank: i64,
         /// Row of the recording.
         sequence: i64,
-        /// What is on the abscissa, e.g. `joint 3`, `torque of joint 2`, `time`.
+        /// What is on the abscissa, e.g. `joint 3`, `torque of joint 2`, `time`, `place in the recording`.
         over: String,
-        /// Unit of `x`.
+        /// Unit of `x`; `row` (from 1) where the recording has no clock.
         x_unit: String,
         x: f64,
         /// Unit of the figures below: `rad` about the joint, or `mm` along the effect's own displacement.

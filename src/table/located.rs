@@ -9,7 +9,7 @@ crate::table::rows! { "shares",
         moment: String,
         /// `place` or `variable`.
         by: String,
-        /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time`.
+        /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
         name: String,
         /// Of the squared residual, in standard deviations.
         share: f64,

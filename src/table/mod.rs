@@ -4,7 +4,9 @@
 //! is written by hand.
 
 use crate::error::Result;
+pub use crate::store::Loose;
 pub use crate::store::frame::Frame;
+use std::path::Path;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {
@@ -13,9 +15,18 @@ pub trait Table: Sized + Send + Sync + 'static {
     fn from_frame(frame: &Frame) -> Result<Self>;
 }
 
-/// A table from the bytes of its Parquet file; `label` names the file in errors.
-pub fn from_parquet<T: Table>(label: &str, bytes: Vec<u8>) -> Result<T> {
-    T::from_frame(&crate::store::bytes::frame(T::KIND, label, bytes)?)
+/// A table from a Parquet file outside of a store. Fails where its content is not what the hash in the file says.
+pub fn from_file<T: Table>(path: &Path) -> Result<Loose<T>> {
+    typed(crate::store::read_table(path, Some(T::KIND))?)
+}
+
+/// The same from the bytes of the file; `label` names it in errors.
+pub fn from_parquet<T: Table>(label: &str, bytes: Vec<u8>) -> Result<Loose<T>> {
+    typed(crate::store::table_of_bytes(label, bytes, T::KIND)?)
+}
+
+fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
+    Ok(Loose { table: T::from_frame(&loose.table)?, vouched: loose.vouched })
 }
 
 /// Declares a table as a list of rows: `rows! { "kind", /// doc pub struct Name of Row { column: type, ... } }`.
@@ -66,6 +77,7 @@ mod robot;
 mod scoreboard;
 mod searches;
 mod split;
+mod standing;
 mod statistics;
 mod suspects;
 mod training;
@@ -91,7 +103,8 @@ pub use robot::{Robot, RobotRow};
 pub use scoreboard::{Scoreboard, ScoreboardRow};
 pub use searches::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 pub use split::{Split, SplitRow};
-pub use statistics::{Statistics, StatisticsRow, standing};
+pub use standing::{HeldOut, Standing, Step, Withdrawn, standing};
+pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
 pub use training::{Training, TrainingRow};

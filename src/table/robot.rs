@@ -1,6 +1,7 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
 
 use crate::error::{Error, Result};
+use crate::robot::Bound;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::Unit;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -137,6 +138,9 @@ fn joint(row: &RobotRow) -> Result<JointDescription> {
         other => return Err(fault(row, &format!("kind is `{other}`; expected revolute or prismatic"))),
     };
     let centre = [row.centre_x_mm, row.centre_y_mm, row.centre_z_mm];
+    let factors: Vec<f64> = [row.reduction_ratio, row.motor_constant_nm_a].into_iter().flatten().collect();
+    sized(Bound::Factor, &factors, row, "reduction_ratio, motor_constant_nm_a")?;
+    sized(Bound::Mass, row.mass_kg.as_slice(), row, "mass_kg")?;
     Ok(JointDescription {
         name: row.name.clone(),
         kind,
@@ -200,13 +204,23 @@ fn millimetres(point: Option<[f64; 3]>) -> [Option<f64>; 3] {
 }
 
 fn metres(point: [Option<f64>; 3], row: &RobotRow, what: &str) -> Result<[f64; 3]> {
-    Ok(all(point, row, what)?.map(|x| Unit::Millimetre.to_si(x)))
+    let point = all(point, row, what)?.map(|x| Unit::Millimetre.to_si(x));
+    sized(Bound::Length, &point, row, what)?;
+    Ok(point)
 }
 
 fn all(vector: [Option<f64>; 3], row: &RobotRow, what: &str) -> Result<[f64; 3]> {
     match vector {
         [Some(x), Some(y), Some(z)] => Ok([x, y, z]),
         _ => Err(fault(row, &format!("has no {what}"))),
+    }
+}
+
+/// Whether numbers (SI) are such as a robot can have.
+fn sized(bound: Bound, values: &[f64], row: &RobotRow, what: &str) -> Result<()> {
+    match values.iter().find_map(|value| bound.fault(*value)) {
+        Some(message) => Err(fault(row, &format!("{what}: {message}"))),
+        None => Ok(()),
     }
 }
 

@@ -55,32 +55,3 @@ crate::table::rows! { "statistics",
         reference_max_mm: Option<f64>,
     }
 }
-
-/// The step that stands for a run with a diagnosis: the diagnosed model with what was learned on it. `steps` are those that predict, in
-/// their order, each with whether it has a model of its own.
-pub fn standing<'a>(steps: impl IntoIterator<Item = (&'a str, bool)>, diagnosed: &str) -> Option<&'a str> {
-    let mut found = None;
-    for (step, own) in steps {
-        match found {
-            Some(_) if own => break,
-            None if step != diagnosed => (),
-            _ => found = Some(step),
-        }
-    }
-    found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::standing;
-
-    #[test]
-    fn a_diagnosis_stands_with_what_was_learned_on_it_and_not_with_another_model() {
-        let steps =
-            [("nominal", true), ("network", false), ("diagnose", true), ("on_top", false), ("joint", true), ("more", false)];
-        assert_eq!(standing(steps, "diagnose"), Some("on_top"));
-        assert_eq!(standing(steps, "joint"), Some("more"));
-        assert_eq!(standing(steps, "nominal"), Some("network"));
-        assert_eq!(standing(steps, "other"), None);
-    }
-}

@@ -4,7 +4,7 @@ crate::table::rows! { "verdict",
     /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects apart.
     pub struct Verdict of VerdictRow {
         step: String,
-        /// `explained`, `nothing_missing` or `unexplained`.
+        /// `explained`, `nothing_missing`, `unexplained`, or `not_asked` of too few rows.
         verdict: String,
         /// Rms length of the noise of these rows: instrument and joint repeatability.
         noise_floor_mm: f64,
@@ -20,9 +20,9 @@ crate::table::rows! { "verdict",
         leftover_rms_mm: f64,
         /// Squared whitened residual per degree of freedom.
         chi_square: f64,
-        /// Probability that what the base model leaves, and what is left in the end, is noise.
-        p_before: f64,
-        p_after: f64,
+        /// Probability that what the base model leaves, and what is left in the end, is noise; null where it was not asked.
+        p_before: Option<f64>,
+        p_after: Option<f64>,
         /// Standard deviation of every joint from move to move.
         repeatability_rad: f64,
         /// Immediate repeats of a pose that it rests on.
@@ -35,6 +35,10 @@ crate::table::rows! { "verdict",
         signature: Option<String>,
         /// What to measure next, one sentence a line.
         next_measurements: Option<String>,
+        /// Findings that the fit of the whole model left without size or made worse, one sentence a line.
+        withdrawn: Option<String>,
+        /// What counts time in statements and in the forms of findings: `s`, or `row` of the recording where it has no clock.
+        clock: Option<String>,
     }
 }
 
@@ -65,6 +69,8 @@ impl Verdict {
             not_observable: diagnosis.not_observable.join("\n"),
             signature: diagnosis.signature.clone(),
             next_measurements: (!diagnosis.next_measurements.is_empty()).then(|| diagnosis.next_measurements.join("\n")),
+            withdrawn: (!diagnosis.withdrawn.is_empty()).then(|| diagnosis.withdrawn.join("\n")),
+            clock: Some(if diagnosis.clock { "s" } else { "row" }.into()),
         }])
     }
 }

@@ -3,8 +3,8 @@
 //! Frame j sits on body j with its origin on the axis of joint j; at the zero pose of the nominal arm it is parallel to the base.
 //! `T_j = T_(j-1) * (span and elastic motion of link j-1) * (motion of joint j)`.
 
-use super::effect::Motion;
 use super::matrix::{self, Matrix, Vector};
+use super::motion::Motion;
 use super::truth::TrueRobot;
 use crate::robot::description::{JointKind, RobotDescription};
 

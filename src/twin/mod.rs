@@ -7,13 +7,16 @@
 pub mod arm;
 pub mod conceal;
 pub mod effect;
+pub mod equilibrium;
 pub mod folder;
 pub mod matrix;
+pub mod motion;
 pub mod noise;
 pub mod plan;
 pub mod recorder;
 pub mod reveal;
 pub mod statics;
 pub mod tracker;
+pub mod true_value;
 pub mod truth;
 pub mod way;

@@ -4,8 +4,8 @@
 //! (Mitchell's best candidate), so that points spread over the workspace instead of crowding where many postures reach.
 
 use super::arm::Arm;
-use super::effect::Motion;
 use super::matrix::{self, Vector};
+use super::motion::Motion;
 use super::noise::{Noise, Purpose};
 use crate::robot::description::RobotDescription;
 use schemars::JsonSchema;

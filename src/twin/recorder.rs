@@ -2,11 +2,13 @@
 //! the moving arm, on which statics hold all the same: it is slow against its own vibrations.
 
 use super::arm::Arm;
-use super::effect::{JointCompliance, Motion, Physical};
+use super::effect::{JointCompliance, Physical};
+use super::equilibrium::settle;
 use super::matrix::{self, Vector};
+use super::motion::Motion;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
-use super::statics::{Row, settle};
+use super::statics::Row;
 use super::tracker::Tracker;
 use super::truth::{ARCSEC, TrueRobot};
 use super::way::{Path, Way};

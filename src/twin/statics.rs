@@ -1,7 +1,6 @@
-//! Statics: forces summed over bodies, and the posture in which the deflected arm carries them.
+//! Statics: forces and moments summed over bodies.
 
 use super::arm::{Arm, Posture};
-use super::effect::{Motion, Physical, State};
 use super::matrix::{self, Vector};
 
 /// Bodies with weight, in the base frame: the link that carries it (the payload: one past the last), mass in kg, centre.
@@ -61,47 +60,4 @@ pub struct Row {
     pub payload_kg: f64,
     /// Of each joint, rad/s or m/s; empty where the arm stands.
     pub velocity: Vec<f64>,
-}
-
-/// The arm at rest under its loads.
-#[derive(Debug, Clone)]
-pub struct Equilibrium {
-    pub posture: Posture,
-    pub motion: Motion,
-    /// Torque of gravity and of other loads on each joint in the deflected posture, Nm.
-    pub torque: Vec<f64>,
-}
-
-/// A change of less than this (rad, m or Nm) is rest; a picometre at 3 m.
-const REST: f64 = 1e-13;
-/// Every round shrinks the change by the wind-up itself, about 1e-3: six are usual, more than this many mean a collapsing arm.
-const ROUNDS: usize = 60;
-
-/// Lets the arm sag until loads and deflections agree.
-pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
-    let mut motion = Motion::none(arm.links.len());
-    for _ in 0..ROUNDS {
-        let held = hold(arm, row, motion);
-        let mut next = Motion::none(arm.links.len());
-        let state = State { arm, row, posture: &held.0, loads: &held.1, torque: &held.2 };
-        for effect in effects {
-            effect.act(&state, &mut next);
-        }
-        let change = next.distance(&held.3);
-        motion = next;
-        if change < REST {
-            break;
-        }
-    }
-    let (posture, _, torque, motion) = hold(arm, row, motion);
-    Equilibrium { posture, motion, torque }
-}
-
-fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Motion) {
-    let angle: Vec<f64> = row.drive.iter().zip(&motion.joint).map(|(drive, extra)| drive + extra).collect();
-    let posture = arm.posture(&angle, &motion);
-    let loads = Loads::new(arm, &posture, row.payload_kg);
-    let gravity = loads.torques(arm, &posture);
-    let torque = gravity.iter().zip(&motion.load).map(|(gravity, load)| gravity + load).collect();
-    (posture, loads, torque, motion)
 }

@@ -1,8 +1,8 @@
 //! The laser tracker: a pose in the room and a noise that grows with range.
 
-use super::effect::{TrueValue, true_value};
 use super::matrix::{self, Matrix, Vector};
 use super::noise::Noise;
+use super::true_value::{TrueValue, true_value};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

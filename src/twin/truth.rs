@@ -3,8 +3,8 @@
 //! Joint i stands at `offset_i + k_i (q_i - sum c_ij q_j) + sum k_j (c_ij + e_ij) q_j`, where c_ij is the nominal coupling (the
 //! motion of joint i caused by joint j, which the controller takes out) and e_ij its error.
 
-use super::effect::{TrueValue, true_value};
 use super::matrix::Vector;
+use super::true_value::{TrueValue, true_value};
 use crate::robot::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -3,12 +3,13 @@
 //! The only file that knows the YAML crate. Booleans are `true` and `false` alone; a key given twice is a fault.
 
 mod node;
+mod path;
 mod trouble;
 mod typed;
 
 pub use node::{Mark, Node, Value};
+pub(crate) use path::join;
 pub use trouble::Trouble;
-pub(crate) use trouble::join;
 pub use typed::typed;
 
 use serde::de::{self, Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -40,8 +41,18 @@ fn read(text: &str, duplicate_keys: DuplicateKeyPolicy) -> Result<Node, Trouble>
     };
     serde_saphyr::from_str_with_options::<Spanned<Tree>>(text, options).map(Tree::node).map_err(|error| {
         let formatted = error.render_with_formatter(&serde_saphyr::UserMessageFormatter);
-        Trouble::new(in_words(&formatted)).at(error.location().map_or(Mark::Unknown, mark))
+        let line = error.location().and_then(|location| text.lines().nth(location.line().saturating_sub(1) as usize));
+        let message = line.and_then(bare_variable).unwrap_or_else(|| in_words(&formatted));
+        Trouble::new(message).at(error.location().map_or(Mark::Unknown, mark))
     })
+}
+
+/// What to write where a variable without quotes breaks the syntax of its line.
+fn bare_variable(line: &str) -> Option<String> {
+    let quotes = |before: &str| before.matches(['"', '\'']).count();
+    let (at, _) = line.match_indices("${").find(|(at, _)| quotes(&line[..*at]) % 2 == 0)?;
+    let (variable, _) = line[at..].split_once('}')?;
+    Some(format!("inside {{}} and [] a variable stands in quotes: \"{variable}}}\""))
 }
 
 /// One line, in our words where it matters; the place is printed once, in front of it.
@@ -208,6 +219,14 @@ mod tests {
         let (node, _) = parse("every: 4\nlabel: 007\n");
         assert_eq!(typed::<Sample>(&node.unwrap()).unwrap().label, "007");
         assert_eq!(faults("every: 010"), ["f.yaml:1:8: every: expected a positive whole number, e.g. 4; found 10.0"]);
+    }
+
+    #[test]
+    fn a_variable_without_quotes_inside_braces_says_what_to_write() {
+        let told = "f.yaml:2:9: inside {} and [] a variable stands in quotes: \"${u}\"";
+        assert_eq!(faults("every: 4\nlist: [${u}]\n").last().map(String::as_str), Some(told));
+        let told = faults("every: 4\nlist: {a: \"${u}\", b: ${name}}\n");
+        assert!(told[0].ends_with("stands in quotes: \"${name}\""), "{told:?}");
     }
 
     #[test]

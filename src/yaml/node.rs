@@ -1,5 +1,7 @@
 //! A YAML value with its place in the file.
 
+use super::path::{join, rest_after, split_index, split_key};
+
 /// Where a value was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
@@ -153,7 +155,10 @@ impl Node {
             Value::List(items) => {
                 let (index, rest) = split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
                 if index > items.len() {
-                    return Err(format!("the list has {} entries; index {index} is too large", items.len()));
+                    return Err(format!(
+                        "the list has {}; index {index} is too large",
+                        crate::error::counted(items.len(), "entry")
+                    ));
                 }
                 if index == items.len() {
                     items.push(Node::new(Value::Null, node.mark));
@@ -195,7 +200,7 @@ impl Node {
             }
             Value::Map(entries) => {
                 for (key, _, value) in entries {
-                    value.walk(&super::trouble::join(path, key), visit);
+                    value.walk(&join(path, key), visit);
                 }
             }
             _ => {}
@@ -211,30 +216,10 @@ impl Node {
             }
             Value::Map(entries) => {
                 for (key, _, value) in entries {
-                    value.walk_mut(&super::trouble::join(path, key), visit);
+                    value.walk_mut(&join(path, key), visit);
                 }
             }
             _ => {}
         }
     }
-}
-
-/// What follows a key at the head of a path.
-fn rest_after<'p>(path: &'p str, key: &str) -> Option<&'p str> {
-    let rest = path.strip_prefix(key)?;
-    if rest.is_empty() || rest.starts_with('[') { Some(rest) } else { rest.strip_prefix('.') }
-}
-fn split_key(path: &str) -> (&str, &str) {
-    match path.find(['.', '[']) {
-        Some(end) if path[end..].starts_with('.') => (&path[..end], &path[end + 1..]),
-        Some(end) => (&path[..end], &path[end..]),
-        None => (path, ""),
-    }
-}
-fn split_index(path: &str) -> Option<(usize, &str)> {
-    let (digits, rest) = match path.strip_prefix('[') {
-        Some(inner) => inner.split_once(']')?,
-        None => path.split_at(path.find(['.', '[']).unwrap_or(path.len())),
-    };
-    Some((digits.parse().ok()?, rest.strip_prefix('.').unwrap_or(rest)))
 }

@@ -1,7 +1,8 @@
 //! One fault of a YAML value: path, place and message; built from the inside out while serde unwinds.
 
 use super::Mark;
-use crate::error::{Fault, nearest};
+use super::path::join;
+use crate::error::{Fault, counted, nearest};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;
 
@@ -57,15 +58,6 @@ impl Trouble {
             Some(Mark::Unknown) | None => file.into(),
         };
         Fault::new(if self.path.is_empty() { place } else { format!("{place}: {}", self.path) }, self.message)
-    }
-}
-
-/// `stages[2]` + `with.every` -> `stages[2].with.every`.
-pub(crate) fn join(path: &str, rest: &str) -> String {
-    match (path.is_empty(), rest.is_empty() || rest.starts_with('[')) {
-        (true, _) => rest.into(),
-        (false, true) => format!("{path}{rest}"),
-        (false, false) => format!("{path}.{rest}"),
     }
 }
 
@@ -126,7 +118,7 @@ fn wanted(expected: &str) -> String {
         other if other.starts_with("a nonzero ") => "a whole number other than 0".into(),
         other if other.starts_with("struct ") => "a block of keys".into(),
         other => match other.strip_prefix("an array of length ") {
-            Some(length) => format!("a list of {length} values"),
+            Some(length) => format!("a list of {}", counted(length, "value")),
             None => other.into(),
         },
     }

@@ -22,7 +22,7 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
             Err(trouble) => {
                 let trouble = locate::<T>(trouble, &rest);
                 if let Some(field) = trouble.missing {
-                    let path = super::trouble::join(&trouble.path, field);
+                    let path = super::path::join(&trouble.path, field);
                     if !removed.iter().any(|gone: &String| gone.starts_with(&path)) {
                         troubles.push(trouble);
                     }
@@ -49,7 +49,7 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
         Clue::Word(word) if matches!(&node.value, Value::Text(text) if text == word) => candidates.push((path.into(), node.mark)),
         Clue::Key(key) => {
             let entry = node.entries().iter().find(|(name, _, _)| name == key);
-            candidates.extend(entry.map(|(name, mark, _)| (super::trouble::join(path, name), *mark)));
+            candidates.extend(entry.map(|(name, mark, _)| (super::path::join(path, name), *mark)));
         }
         Clue::Word(_) => {}
     });

@@ -6,6 +6,8 @@
 //! - `cargo bench -- train FILE` trains the network on rows that `tests/reference/training_speed.py` wrote and prints times as JSON;
 //! - `cargo bench -- swarm` prints how often and how fast each swarm optimiser finds a known minimum.
 
+#![expect(clippy::disallowed_methods, clippy::print_stdout, reason = "benches read the clock and print figures")]
+
 use std::hint::black_box;
 
 #[path = "../it/fixture.rs"]

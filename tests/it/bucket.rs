@@ -143,7 +143,10 @@ fn what_one_machine_made_another_takes() {
     let Lookup::Done(record) = second.action(&key("split", 1)).unwrap() else { panic!("not done") };
     assert_eq!(second.load(&record.tables["out"]).unwrap(), split(0..100));
     assert_eq!(second.records().unwrap().len(), 1);
-    assert_eq!((second.runs().unwrap(), second.find_run("as delivered").unwrap()), (vec![FIRST.into()], FIRST.into()));
+    assert_eq!(
+        (second.runs().unwrap(), calib::pipeline::find_run(&second, "as delivered").unwrap()),
+        (vec![FIRST.into()], FIRST.into())
+    );
     assert_eq!(second.manifest(FIRST).unwrap()["status"], "done");
     run(&second, SECOND).unwrap();
     second.untag("as delivered").unwrap();

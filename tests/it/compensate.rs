@@ -1,5 +1,6 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
+mod standing;
 mod true_error;
 
 use calib::compensate::{Chain, Nominal, SETTLED, Wanted, inverse, least_change};
@@ -192,4 +193,101 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     let (code, said, _) = run("foo,bar\n1,2\n");
     assert_eq!(code, Some(2));
     assert!(said.contains("no targets found"), "{said}");
+}
+
+#[test]
+fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
+    let input = "id,x_mm,y_mm,z_mm\nnear,800,40,900\nfar,7800,40,900\nnear,810,40,900\n";
+    for more in [&[][..], &["--one-step"]] {
+        let output = calib(cell(), &[&["compensate", "latest", "--quiet"], more].concat(), input);
+        assert_eq!(output.status.code(), Some(10));
+        let (said, told) = (text(&output.stdout), text(&output.stderr));
+        let rows: Vec<Vec<&str>> = said.lines().map(|line| line.split(',').collect()).collect();
+        assert_eq!((rows.len(), rows[0][4], rows[0][9]), (4, "q1_deg", "q6_deg"));
+        for row in [&rows[1], &rows[3]] {
+            assert!(row[4..10].iter().all(|cell| cell.parse::<f64>().is_ok_and(f64::is_finite)), "{said}");
+        }
+        assert_eq!(rows[2][4..10], [""; 6]);
+        // The arm reaches 1.4 m from its second axis, which stands 0.4 m above the base.
+        let off: f64 = rows[2][11].parse().expect("a residual");
+        assert!((6000.0..7000.0).contains(&off), "{said}");
+        assert!(said.lines().nth(2).is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")), "{said}");
+        assert!(told.contains("stdin:3: not reached, 6") && told.contains(" mm off: no joints are written"), "{told}");
+        assert!(told.contains("warning: 1 of them could not be reached and have no joints (column `remark`)"), "{told}");
+    }
+    let plain = calib(cell(), &["compensate", "latest", "--quiet", "--plain"], input);
+    assert_eq!(plain.status.code(), Some(10));
+    assert_eq!(text(&plain.stdout).lines().nth(2), Some("far,7800,40,900,,,,,,"));
+}
+
+#[test]
+fn a_pose_that_only_another_orientation_reaches_gets_no_joints() {
+    // The wrist's limits do not bind the search: what is out of reach is the point 1.4 m away, with the tool turned back.
+    let input = "x_mm,y_mm,z_mm,qw,qx,qy,qz\n1230,0,900,1,0,0,0\n1230,0,900,0,0,0,1\n";
+    let output = calib(cell(), &["compensate", "latest", "--quiet"], input);
+    let (said, told) = (text(&output.stdout), text(&output.stderr));
+    assert_eq!(output.status.code(), Some(10), "{said}{told}");
+    assert!(said.lines().nth(2).is_some_and(|row| row.contains(",,,,,,") && row.contains("not reached")), "{said}");
+}
+
+#[test]
+fn a_target_that_is_not_reached_is_null_in_parquet() {
+    use arrow::array::{Array, AsArray, Float64Array, RecordBatch};
+    use arrow::datatypes::Float64Type;
+    let column = |values: [f64; 2]| -> arrow::array::ArrayRef { std::sync::Arc::new(Float64Array::from(values.to_vec())) };
+    let axes = [("x_mm", column([800.0, 7800.0])), ("y_mm", column([40.0; 2])), ("z_mm", column([900.0; 2]))];
+    let batch = RecordBatch::try_from_iter(axes).expect("a batch");
+    let file = std::fs::File::create(cell().join("points.parquet")).expect("a file");
+    let mut writer = parquet::arrow::ArrowWriter::try_new(file, batch.schema(), None).expect("a writer");
+    writer.write(&batch).and_then(|()| writer.close().map(|_| ())).expect("written");
+    let output = calib(cell(), &["compensate", "latest", "points.parquet", "--out", "points_c.parquet", "--quiet"], "");
+    assert_eq!(output.status.code(), Some(10));
+    assert!(text(&output.stderr).contains("points.parquet: row 2: not reached, 6"), "{}", text(&output.stderr));
+    let file = std::fs::File::open(cell().join("points_c.parquet")).expect("written though a row is not reached");
+    let builder = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).expect("Parquet");
+    let batch = builder.build().expect("a reader").next().expect("a batch").expect("rows");
+    for joint in 1..=6 {
+        let q = batch.column_by_name(&format!("q{joint}_rad")).expect("a joint").as_primitive::<Float64Type>();
+        assert!(q.is_valid(0) && q.value(0).is_finite() && q.is_null(1));
+    }
+    let remark = batch.column_by_name("remark").expect("remarks").as_string::<i32>();
+    assert!(remark.value(0).is_empty() && remark.value(1).starts_with("not reached, 6"));
+}
+
+#[test]
+fn quiet_keeps_warnings_and_takes_the_summary() {
+    let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
+    let told = |more: &[&str]| text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr);
+    let (loud, quiet) = (told(&[]), told(&["-q"]));
+    assert!(loud.contains("model: ") && loud.contains("1 targets; "), "{loud}");
+    let warnings: String = loud.lines().filter(|line| line.starts_with("warning: ")).map(|line| format!("{line}\n")).collect();
+    assert!(warnings.contains("1 of them leave the joint limits"), "{loud}");
+    assert_eq!(quiet, warnings);
+}
+
+#[test]
+fn partial_targets_of_a_program_stay_where_that_is_wished_and_nothing_is_written_otherwise() {
+    let program = "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n";
+    std::fs::write(cell().join("partial.src"), program).expect("a file");
+    let run = |more: &[&str]| {
+        let output =
+            calib(cell(), &[&["compensate", "latest", "partial.src", "--out", "partial_c.src", "-q"], more].concat(), "");
+        (output.status.code(), text(&output.stderr))
+    };
+    let whole = "a target is corrected whole or not at all";
+    let (code, told) = run(&[]);
+    assert_eq!(code, Some(10));
+    assert!(told.contains(&format!("partial.src:2:5: the target has no Z, A, B, C; {whole}")), "{told}");
+    assert!(told.contains(&format!("partial.src:3:5: the target has no A2, A3, A4, A5, A6; {whole}")), "{told}");
+    assert!(told.contains("partial.src: partial targets stay as they are with --leave-partial"), "{told}");
+    assert!(!cell().join("partial_c.src").exists());
+    let (code, told) = run(&["--leave-partial"]);
+    assert_eq!(code, Some(0), "{told}");
+    assert!(
+        told.contains(&format!("warning: partial.src:3:5: left as it is: the target has no A2, A3, A4, A5, A6; {whole}")),
+        "{told}"
+    );
+    let written = std::fs::read_to_string(cell().join("partial_c.src")).expect("written");
+    assert!(written.starts_with("PTP {A1 10.") || written.starts_with("PTP {A1 9."), "{written}");
+    assert!(written.ends_with("\r\nLIN {X 10,Y 20}\r\nPTP {A1 20}\r\n"), "{written}");
 }

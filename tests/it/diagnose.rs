@@ -1,5 +1,7 @@
 //! Diagnosis of recordings with concealed effects: what was hidden is named and placed, and nothing else.
 
+mod said;
+
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Effect, Form, Load};
@@ -228,43 +230,50 @@ fn case_with(folder: &Path, changes: &[(&str, &str)]) {
 
 const CASE: [&str; 2] = ["--set", "case=sealed/recordings/c0001"];
 
+/// The last run of a folder's store, whatever it was for.
+fn newest(folder: &Path) -> String {
+    let runs = std::fs::read_dir(folder.join(".calib/runs")).expect("runs");
+    runs.map(|run| run.expect("a run").file_name().into_string().expect("UTF-8")).max().expect("a run")
+}
+
 #[test]
 fn a_diagnosis_is_shown_again_from_its_run_as_it_was_printed() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
     let twice = ("  - uses: validate\n", "  - {id: again, uses: diagnose}\n\n  - uses: validate\n");
     case_with(here, &[]);
-    let made =
-        [calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here), calib(&["diagnose", "HEAD", "--json"], here)];
+    let told = calib(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    let made = [told, calib(&["diagnose", &newest(here), "--json"], here)];
     let runs = std::fs::read_dir(here.join(".calib/runs")).expect("runs").count();
-    assert_eq!(calib(&["diagnose", "HEAD"], here), made[0]);
+    assert_eq!(calib(&["diagnose", &newest(here)], here), made[0]);
     // Nothing was run, and nothing was computed anew.
     assert_eq!(std::fs::read_dir(here.join(".calib/runs")).expect("runs").count(), runs);
     assert_eq!(calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here), made[1]);
-    calib(&["tag", "HEAD", "found"], here);
+    calib(&["tag", &newest(here), "found"], here);
     calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry", "--set", "seed=9"], &CASE[..]].concat(), here);
-    let (code, said) = refused(&["diagnose", "HEAD"], here);
+    let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("never came to its stage `diagnose`"), "{said}");
     assert!(said.contains("calib diagnose p.yaml --set seed=9 --set case=sealed/recordings/c0001"), "{said}");
     assert_eq!(calib(&["diagnose", "found", "--json"], here), made[1]);
     case_with(here, &[("  - uses: diagnose\n", "")]);
     calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
-    let (code, said) = refused(&["diagnose", "HEAD"], here);
+    let (code, said) = refused(&["diagnose", &newest(here)], here);
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("has no stage `diagnose`: put `- uses: diagnose` after the split of p.yaml"), "{said}");
     case_with(here, &[twice]);
     calib(&[&["run", "p.yaml", "--quiet", "--until", "again"], &CASE[..]].concat(), here);
-    for place in [&["HEAD"][..], &[&["p.yaml"], &CASE[..]].concat()] {
+    let run = newest(here);
+    for place in [&[run.as_str()][..], &[&["p.yaml"], &CASE[..]].concat()] {
         let (code, said) = refused(&[&["diagnose"], place].concat(), here);
         assert_eq!(code, Some(2), "{said}");
         assert!(said.contains("has several diagnoses; say which with --step: diagnose, again"), "{said}");
     }
     assert_eq!(
-        calib(&["diagnose", "HEAD/again", "--json"], here),
-        calib(&["diagnose", "HEAD", "--step", "again", "--json"], here)
+        calib(&["diagnose", &format!("{run}/again"), "--json"], here),
+        calib(&["diagnose", &run, "--step", "again", "--json"], here)
     );
-    let (code, said) = refused(&["diagnose", "HEAD", "--set", "seed=2"], here);
+    let (code, said) = refused(&["diagnose", &run, "--set", "seed=2"], here);
     assert_eq!((code, said.contains("nothing of a run can be set again")), (Some(2), true), "{said}");
 }
 
@@ -292,9 +301,10 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
     std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
     let table = ".calib/tables/case/diagnose.parameters.parquet";
     let robot = "sealed/recordings/c0001/robot.json";
+    let run = newest(here);
     for verb in [
-        &["compensate", "HEAD", "t.csv"][..],
-        &["export", "latest", "--format", "json"],
+        &["compensate", &run, "t.csv"][..],
+        &["export", &run, "--format", "json"],
         &["export", table, "--robot", robot, "--format", "json"],
     ] {
         let (code, said) = refused(verb, here);
@@ -302,13 +312,13 @@ fn parameters_that_correct_an_outside_simulation_are_not_taken_for_the_robots_ow
         assert!(said.contains("correct the simulation of sim_x, sim_y, sim_z") && said.contains("--step"), "{said}");
     }
     calib(&[&["run", "p.yaml", "--quiet", "--until", "geometry"], &CASE[..]].concat(), here);
-    calib(&["export", "HEAD", "--step", "geometry", "--format", "json", "--quiet"], here);
+    calib(&["export", &newest(here), "--step", "geometry", "--format", "json", "--quiet"], here);
 }
 
 /// A table that a run of the pipeline of cases wrote.
 fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
     let path = folder.join(".calib/tables/case").join(name);
-    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table")
+    calib::table::from_parquet(name, std::fs::read(path).expect("a table")).expect("a sound table").table
 }
 
 /// What is left, squared and over the noise, of points that `truth` makes where `other` is fitted to them in all that is `free`.
@@ -424,7 +434,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     };
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
     assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "counterbalance");
-    let said = calib(&["poses", "--run", "HEAD", "--separate", "gear_cyclic", "counterbalance@j4"], here);
+    let said = calib(&["poses", "--run", &newest(here), "--separate", "gear_cyclic", "counterbalance@j4"], here);
     assert!(said.contains("no pose tells gear_cyclic at joint 4 from counterbalance at joint 4"), "{said}");
     assert!(said.contains("instead: log motor currents at rest"), "{said}");
     let folder = concealed("zero_shift", "9", "60");
@@ -432,7 +442,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     case_with(here, &[]);
     // A step of the first joint is one turn of the base.
     assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "base_shift");
-    let said = calib(&["poses", "--run", "HEAD", "--separate"], here);
+    let said = calib(&["poses", "--run", &newest(here), "--separate"], here);
     assert!(said.contains("whatever zero_shift at joint 1 does, base_shift at base can do too"), "{said}");
     assert!(said.contains("instead: return to a few anchor poses"), "{said}");
     for (names, wanted) in [
@@ -442,7 +452,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         (&["1", "gear_cyclic@joint 9"], "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2"),
         (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),
     ] {
-        let (code, said) = refused(&[&["poses", "--run", "HEAD", "--separate"], names].concat(), here);
+        let (code, said) = refused(&[&["poses", "--run", &newest(here), "--separate"], names].concat(), here);
         assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
     }
 }

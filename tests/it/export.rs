@@ -96,6 +96,6 @@ fn malformed_programs_are_refused_with_line_and_column() {
     refused(
         "bad.mod",
         rapid,
-        &["bad.mod:1:22: expected a target", "bad.mod:2:26: `x` is no number", "bad.mod:3:21: `[` without `]`"],
+        &["bad.mod:1:23: 3 numbers, expected 6", "bad.mod:2:26: `x` is no number", "bad.mod:3:21: `[` without `]`"],
     );
 }

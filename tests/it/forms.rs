@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people, whole,
+    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people, whole,
 };
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -197,7 +197,7 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
             .iter()
             .map(|spec| Number { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
             .collect();
-        let told = Told { place: form.place(), forms: std::slice::from_ref(form), numbers: &numbers };
+        let told = Told { place: form.place(), forms: std::slice::from_ref(form), numbers: &numbers, clock: Clock::Seconds };
         let coefficients = vec![0.0; specs.len()];
         for name in [form.name(), form.called(&coefficients, survey)] {
             let cause = cause(name).unwrap_or_else(|| panic!("{name} has no cause"));

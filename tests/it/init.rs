@@ -1,5 +1,7 @@
 //! `init` writes what `check` accepts and `run` runs, and overwrites nothing; completions and manual pages are made.
 
+mod layouts;
+
 use crate::compensate::calib;
 use std::fmt::Write;
 

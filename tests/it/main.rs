@@ -1,10 +1,23 @@
 //! Integration tests, one module a capability.
 
+#![allow(
+    clippy::disallowed_methods,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "tests read the environment and the clock, and say what they skipped"
+)]
+
+#[cfg(target_os = "linux")]
+mod alone;
 mod arms;
 mod bucket;
+mod check;
+mod circles;
 mod cmd;
 mod compensate;
+mod computed;
 mod conceal;
+mod curves;
 mod desk;
 mod diagnose;
 mod diff;
@@ -16,6 +29,9 @@ mod fleet;
 mod folds;
 mod forms;
 mod gauges;
+mod heads;
+mod helps;
+mod held;
 mod identify;
 mod ingest;
 mod init;
@@ -26,7 +42,9 @@ mod network;
 mod parameter_sets;
 mod pipelines;
 mod poses;
+mod program;
 mod query;
+mod raw;
 mod readme;
 mod remedies;
 mod repeats;
@@ -36,6 +54,8 @@ mod robot;
 mod robot_faults;
 mod schema;
 mod screen;
+mod shapes;
+mod source;
 mod split;
 mod sr210d;
 mod store;
@@ -45,3 +65,4 @@ mod tables;
 mod trail;
 mod transfer;
 mod twin;
+mod vouched;

@@ -1,7 +1,7 @@
 //! `calib query`: SQL over the tables of a run gives what the tables hold.
 
 use calib::audit::{self, QueryTables};
-use calib::pipeline::Manifest;
+use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Prediction, PredictionRow, Recording, Table};
 use serde_json::Value;
@@ -43,7 +43,7 @@ fn rows(sql: &str) -> Vec<Value> {
 }
 fn table<T: Table>(name: &str) -> T {
     let store = Store::open(STORE.path()).unwrap();
-    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
     T::from_frame(&store.load(&tables.find(name).unwrap().table).unwrap()).unwrap()
 }
 fn objects(store: &Path) -> Vec<PathBuf> {
@@ -205,6 +205,30 @@ fn what_is_not_there_is_named_with_what_is() {
 }
 
 #[test]
+fn a_product_of_tables_that_no_memory_holds_is_refused_before_it_is_made() {
+    for sql in [
+        "SELECT count(*) FROM recording a CROSS JOIN recording b CROSS JOIN recording c CROSS JOIN recording d CROSS JOIN recording e",
+        "WITH p AS (SELECT a.sequence FROM recording a CROSS JOIN recording b) SELECT * FROM p x CROSS JOIN p y CROSS JOIN p z",
+        "SELECT a.sequence FROM recording a, recording b, (SELECT x.sequence FROM recording x, recording y) c, recording d",
+    ] {
+        let told = refused(sql);
+        assert!(
+            told.contains("every row of one table with every row of the other gives") && told.contains("USING"),
+            "{sql}: {told}"
+        );
+    }
+    // 80 rows twice are no harm.
+    assert_eq!(rows("SELECT a.sequence FROM recording a CROSS JOIN recording b").len(), 6400);
+}
+
+#[test]
+fn a_text_that_a_spreadsheet_would_run_is_only_a_text_in_csv() {
+    let sql = "SELECT '=1+1' AS a, '@x' AS b, '-2.5' AS c, '+x' AS d, sequence AS \"=e\" FROM recording LIMIT 1";
+    assert_eq!(ask(&[sql, "--csv"]), "a,b,c,d,'=e\n'=1+1,'@x,-2.5,'+x,0\n");
+    assert_eq!(rows(sql)[0]["a"], "=1+1");
+}
+
+#[test]
 fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
     let before = objects(STORE.path());
     for sql in [
@@ -227,7 +251,7 @@ fn nothing_but_the_tables_of_the_run_is_read_and_nothing_changed() {
 fn of_a_store_in_a_bucket_the_tables_that_are_asked_are_fetched() {
     let folder = tempfile::tempdir().unwrap();
     let store = bucket_of(STORE.path(), &folder.path().join("cache"));
-    let tables = QueryTables::of(&Manifest::of(&store, &store.find_run("HEAD").unwrap()).unwrap());
+    let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap());
     let answer = audit::query(&store, &tables, "SELECT r.sequence FROM recording r JOIN split USING (sequence)").unwrap();
     assert_eq!((answer.rows(), objects(store.root()).len()), (80, 2));
 }

@@ -1,11 +1,13 @@
 //! A run that is killed goes on where it stood, and ends with the tables of an undisturbed one.
 
+use crate::held;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::sync::LazyLock;
+use std::time::Duration;
 
 fn pipeline() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/resume/pipeline.yaml")
@@ -45,49 +47,61 @@ fn executed(result: &Value) -> usize {
     result["stages"].as_array().unwrap().iter().filter(|stage| stage["status"] == "executed").count()
 }
 
+/// An undisturbed run, on two threads.
+struct Undisturbed {
+    stages: usize,
+    hashes: BTreeMap<String, String>,
+    /// In the order of the stages.
+    actions: Vec<String>,
+}
+
+static UNDISTURBED: LazyLock<Undisturbed> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let result = run(calib(folder.path()).args(["--jobs", "2"]));
+    let actions = held::actions_of(folder.path(), result["run_id"].as_str().unwrap());
+    Undisturbed { stages: executed(&result), hashes: hashes(&result), actions }
+});
+
 #[test]
 fn a_killed_run_resumes_and_ends_as_an_undisturbed_one() {
     let folder = tempfile::tempdir().unwrap();
-    let begun = Instant::now();
-    let undisturbed = run(&mut calib(&folder.path().join("undisturbed")));
-    let whole = begun.elapsed();
     let mut random = ChaCha8Rng::seed_from_u64(20);
-    let mut midway = 0;
     for round in 0..20 {
         let store = folder.path().join(format!("killed-{round}"));
+        // No run comes past this stage while it is held, so that it is killed before its end on any machine.
+        let barrier = random.random_range(1..UNDISTURBED.stages);
+        let held = held::action(&store, &UNDISTURBED.actions[barrier]);
+        let mut seen = 0;
         // Twice in a row: what a killed run left, and what a killed resumption left.
         for _ in 0..2 {
             let mut child = calib(&store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-            // After some stage's record and a moment more: a clock alone would miss the stages on a busy machine.
-            let enough = random.random_range(0..executed(&undisturbed));
-            while actions(&store).len() < enough && child.try_wait().unwrap().is_none() {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            std::thread::sleep(whole.mul_f64(random.random_range(0.0..0.2)));
+            let enough = random.random_range(1..=barrier);
+            held::until(&mut child, || actions(&store).len() >= enough);
+            // Somewhere in the next stage, or at the barrier.
+            std::thread::sleep(Duration::from_millis(random.random_range(0..60)));
             child.kill().unwrap();
             child.wait().unwrap();
+            seen = enough.max(seen);
         }
+        drop(held);
         let finished = actions(&store);
+        assert!((seen..=barrier).contains(&finished.len()), "round {round}: {} of {barrier}", finished.len());
         let modified: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
         let resumed = run(&mut calib(&store));
-        let stages = resumed["stages"].as_array().unwrap().len();
-        midway += usize::from(!finished.is_empty() && finished.len() < stages);
-        assert_eq!(executed(&resumed), stages - finished.len(), "round {round}: finished stages are not redone");
+        assert_eq!(executed(&resumed), UNDISTURBED.stages - finished.len(), "round {round}: finished stages are not redone");
         let after: Vec<_> = finished.iter().map(|path| path.metadata().unwrap().modified().unwrap()).collect();
         assert_eq!(modified, after, "round {round}: records stand");
-        assert_eq!(hashes(&resumed), hashes(&undisturbed), "round {round}");
+        assert_eq!(hashes(&resumed), UNDISTURBED.hashes, "round {round}");
         assert_eq!(executed(&run(&mut calib(&store))), 0);
         let left: Vec<_> = std::fs::read_dir(store.join("tmp")).unwrap().flatten().collect();
         assert!(left.is_empty(), "round {round}: {left:?}");
     }
-    assert!(midway >= 3, "only {midway} of 20 runs were killed between their first and their last stage");
 }
 
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let with = |jobs: &str| hashes(&run(calib(&folder.path().join(jobs)).args(["--jobs", jobs])));
-    assert_eq!(with("1"), with("2"));
+    assert_eq!(hashes(&run(calib(folder.path()).args(["--jobs", "1"]))), UNDISTURBED.hashes);
 }
 
 #[test]
@@ -107,20 +121,17 @@ fn two_runs_at_once_share_their_work() {
 #[test]
 fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
     let folder = tempfile::tempdir().unwrap();
+    // Nobody comes past the first stage.
+    let _held = held::action(folder.path(), &UNDISTURBED.actions[0]);
     let mut child = calib(folder.path()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let runs = folder.path().join("runs");
-    let begun = Instant::now();
-    let manifest = loop {
-        let found = std::fs::read_dir(&runs).into_iter().flatten().flatten().map(|entry| entry.path().join("manifest.json"));
-        if let Some(path) = found.into_iter().find(|path| path.is_file()) {
-            break path;
-        }
-        assert!(begun.elapsed() < Duration::from_secs(20), "no manifest");
-        std::thread::sleep(Duration::from_millis(1));
+    let manifest = || {
+        let runs = std::fs::read_dir(folder.path().join("runs")).into_iter().flatten().flatten();
+        runs.map(|entry| entry.path().join("manifest.json")).find(|path| path.is_file())
     };
+    held::until(&mut child, || manifest().is_some());
     child.kill().unwrap();
     child.wait().unwrap();
-    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&std::fs::read(manifest().unwrap()).unwrap()).unwrap();
     assert_eq!(manifest["status"], "running");
     assert_eq!(manifest["seed"], 11);
 }

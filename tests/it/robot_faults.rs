@@ -119,7 +119,7 @@ fn units_are_stated_and_known() {
     assert_eq!(
         calib(&format!("{}joints: [{{limits: [-185, 185]}}, ]\n", GOOD.replace("deg", "rad"))),
         "robot.yaml:8:9: joints: 1 entries for 2 joints; expected one per joint\n\
-         robot.yaml:8:19: joints[0].limits: [-185, 185] rad is more than ten turns; is it in another unit?"
+         robot.yaml:8:19: joints[0].limits: -185 rad is more than 63 rad, ten turns; is it in another unit?"
     );
 }
 
@@ -217,6 +217,21 @@ fn a_urdf_fault_names_its_line() {
 }
 
 #[test]
+fn a_name_stands_for_one_joint() {
+    assert_eq!(
+        added("joints: [{name: A1}, {name: A1}]"),
+        "robot.yaml:8:29: joints[1].name: joint 1 is called `A1` too; expected a name of its own"
+    );
+    // The first joint's name is the one that the second has for want of another.
+    assert_eq!(
+        added("joints: [{name: J2}, null]"),
+        "robot.yaml:8:17: joints[0].name: joint 2 is called `J2` too; expected a name of its own"
+    );
+    let two = ARM.replace("\"j2\" type=\"fixed\"", "\"j1\" type=\"revolute\"");
+    assert_eq!(urdf(&two, "base_link", "tool0"), "arm.urdf:4: joint `j1` is there twice");
+}
+
+#[test]
 fn a_practice_robot_is_checked_too() {
     let case = |text: &str| read_case(Text { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
     assert_eq!(
@@ -238,4 +253,73 @@ fn a_practice_robot_is_checked_too() {
     for text in ["[]", ""] {
         assert!(case(text).starts_with("robot.json:1:1: expected a map with the keys name, axes"), "{}", case(text));
     }
+}
+
+#[test]
+fn a_number_that_no_robot_has_is_refused_at_its_place() {
+    assert_eq!(
+        changed("point: [300, 0, 0]", "point: [300, 1e308, 0]"),
+        "robot.yaml:6:38: kinematics.screws[1].point[1]: 1e305 m is more than 1000 m; is it in another unit?"
+    );
+    assert_eq!(
+        changed("tool: {point: [900, 0, 0]", "tool: {point: [900, 0, -2000001], orientation: {rpy: [0, 0, 9e307]}"),
+        "robot.yaml:7:24: tool.point[2]: -2000.001 m is more than 1000 m; is it in another unit?\n\
+         robot.yaml:7:61: tool.orientation.rpy[2]: 1.5707963267948965e306 rad is more than 63 rad, ten turns; is it in another unit?"
+    );
+    assert_eq!(
+        added("joints:\n  - {name: A, reduction_ratio: 1e308}\n  - {name: B, motor_constant: -1e7}"),
+        "robot.yaml:9:32: joints[0].reduction_ratio: 1e308 is more than 1e6\nrobot.yaml:10:31: joints[1].motor_constant: -1e7 is more than 1e6"
+    );
+    assert_eq!(
+        added("payload: {mass: 1e300, offset: [0, 0, 1e300]}"),
+        "robot.yaml:8:39: payload.offset[2]: 1e297 m is more than 1000 m; is it in another unit?\n\
+         robot.yaml:8:17: payload.mass: 1e300 kg is more than 1e6 kg; is it in another unit?"
+    );
+    let table =
+        "calib_robot: 1\nunits: {length: m, angle: rad}\nkinematics:\n  dh:\n    - {theta: 1e3, d: 1e308, a: 0, alpha: 0}\n";
+    assert_eq!(
+        calib(table),
+        "robot.yaml:5:15: kinematics.dh[0].theta: 1000 rad is more than 63 rad, ten turns; is it in another unit?\n\
+         robot.yaml:5:23: kinematics.dh[0].d: 1e308 m is more than 1000 m; is it in another unit?"
+    );
+    let case = r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
+    let told = read_case(Text { label: "robot.json", text: case }).unwrap_err().to_string();
+    assert_eq!(
+        told.lines().collect::<Vec<_>>(),
+        [
+            "robot.json:1:41: points[0][2]: 1e305 m is more than 1000 m; is it in another unit?",
+            "robot.json:1:79: mass[0]: 1e9 kg is more than 1e6 kg; is it in another unit?"
+        ]
+    );
+}
+
+#[test]
+fn a_direction_may_have_any_length() {
+    for axis in ["[0, 0, 1e308]", "[1e308, 0, 1e308]", "[0, 3e-5, 0]"] {
+        assert_eq!(changed("axis: [0, 0, 1]", &format!("axis: {axis}")), "no fault");
+    }
+    assert_eq!(
+        changed("{axis: [0, 1, 0], point: [300, 0, 0]}", "{twist: [1e6, 0, 0, 0, 1e-3, 0]}"),
+        "robot.yaml:6:15: kinematics.screws[1].twist: its axis is away from the base: -1e6 m is more than 1000 m; is it in another unit?"
+    );
+}
+
+#[test]
+fn a_urdf_with_numbers_that_no_robot_has_names_the_lines() {
+    let arm = |origin: &str, axis: &str, limit: &str| {
+        format!(
+            "<robot name=\"r\">\n<link name=\"a\"/><link name=\"b\"><inertial>\n<mass value=\"1\"/></inertial></link>\n\
+             <joint name=\"j\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/>\n<origin xyz=\"{origin}\"/>\n\
+             <axis xyz=\"{axis}\"/>\n<limit {limit}/></joint></robot>"
+        )
+    };
+    assert_eq!(urdf(&arm("0 0 1", "1e308 0 1e308", "lower=\"-3\" upper=\"3\""), "a", "b"), "no fault");
+    assert_eq!(
+        urdf(&arm("1e308 0 1e308", "0 0 1", "lower=\"-180\" upper=\"180\""), "a", "b"),
+        "arm.urdf:5: <origin xyz>: 1e308 m is more than 1000 m; is it in another unit?"
+    );
+    assert_eq!(
+        urdf(&arm("0 0 1", "0 0 1", "lower=\"-180\" upper=\"3\""), "a", "b"),
+        "arm.urdf:7: <limit lower>: -180 rad is more than 63 rad, ten turns; is it in another unit?"
+    );
 }

@@ -15,6 +15,7 @@ use calib::stage::{
 use calib::store::frame::Frame;
 use calib::table::{Parameters, Prediction, Recording, Robot, Split};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -134,8 +135,10 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         assert!(std::env::var_os("CI").is_none(), "nothing may be skipped in CI");
         return println!("skipped: {} is not here", data.display());
     }
-    let a = series("Series_A/measurements_grid.csv", 16).unwrap();
-    let c = series("Series_C/measurements_random_poses.csv", 3).unwrap();
+    let (a, c) = rayon::join(
+        || series("Series_A/measurements_grid.csv", 16).unwrap(),
+        || series("Series_C/measurements_random_poses.csv", 3).unwrap(),
+    );
     for (name, series) in [("A", &a), ("C", &c)] {
         let [before, after] = series.own;
         println!(
@@ -149,9 +152,12 @@ fn between_two_series_of_a_real_robot_a_correction_is_never_worse_than_none() {
         assert!(after[0] <= 1.001 * before[0], "{name}: {before:?} -> {after:?}");
     }
     // Named causes carry over between random poses and the grid: there is more in them than the points they were found in.
-    for (name, from, to) in [("A to C", &a, &c), ("C to A", &c, &a)] {
-        let before = transferred(&from.geometry, to).unwrap();
-        let after = transferred(&diagnosed(from).unwrap(), to).unwrap();
+    let ways = [("A to C", &a, &c), ("C to A", &c, &a)];
+    let errors = |(_, from, to): &(_, &Series, &Series)| {
+        (transferred(&from.geometry, to).unwrap(), transferred(&diagnosed(from).unwrap(), to).unwrap())
+    };
+    let found: Vec<([f64; 2], [f64; 2])> = ways.par_iter().map(errors).collect();
+    for ((name, ..), (before, after)) in ways.into_iter().zip(found) {
         println!("{name}, diagnosed: {before:.3?} -> {after:.3?} mm");
         assert!(after[0] < before[0] && after[1] < before[1], "{name}: {before:?} -> {after:?}");
     }

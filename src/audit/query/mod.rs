@@ -6,6 +6,7 @@
 mod answer;
 mod fault;
 mod order;
+mod size;
 mod statement;
 mod tables;
 

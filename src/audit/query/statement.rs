@@ -26,6 +26,7 @@ impl<'t> Statement<'t> {
         let (Some(sqlparser::ast::Statement::Query(mut query)), None) = (statements.pop(), statements.pop()) else {
             return Err(faulty("expected one SELECT: the tables of a run are read, never changed".into()));
         };
+        super::size::check(&query, tables)?;
         let mut names = Names { tables, local: BTreeSet::new(), used: BTreeMap::new() };
         match query.visit(&mut names) {
             ControlFlow::Break(error) => Err(error),

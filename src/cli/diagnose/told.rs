@@ -114,8 +114,10 @@ impl Told {
             "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
             "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
             "held_out": v.held_out,
+            "clock": v.clock,
             "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
             "findings": findings.collect::<Vec<_>>(),
+            "withdrawn": v.withdrawn.as_deref().map(lines).unwrap_or_default(),
             "not_observable": lines(&v.not_observable),
             "leftover": {
                 "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
@@ -161,6 +163,9 @@ impl Told {
             if !rivals.is_empty() {
                 text.push_str(&format!("   these data cannot tell it from: {}\n", rivals.join(", ")));
             }
+        }
+        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+            text.push_str(&format!("taken back: {line}\n"));
         }
         for line in v.not_observable.lines() {
             text.push_str(&format!("not observable: {line}\n"));

@@ -1,6 +1,6 @@
 //! Robots on a cluster: what is asked of it, and the wait for their records.
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::fleet::cluster::Wishes;
 use crate::fleet::ledger::RunNote;
 use crate::fleet::slurm::{self, Waited};
@@ -93,7 +93,12 @@ pub(super) fn on_slurm(
         note.tasks = arguments.tasks(&left);
         note.jobs.clear();
         slurm::submit(&workshop.ledger, note, &wishes)?;
-        progress.say(&format!("{} robots in {} tasks: jobs {}", left.len(), note.tasks.len(), note.jobs.join(", ")));
+        progress.say(&format!(
+            "{} in {}: jobs {}",
+            counted(left.len(), "robot"),
+            counted(note.tasks.len(), "task"),
+            note.jobs.join(", ")
+        ));
         if arguments.detach {
             return Ok(None);
         }
@@ -111,15 +116,19 @@ pub(super) fn on_slurm(
                 break;
             }
             Waited::Gone if round >= arguments.resubmit => {
-                let message =
-                    format!("{} robots have no record after {} rounds; see {}", left.len(), round + 1, log_folder(&wishes, note));
+                let message = format!(
+                    "without a record after {}: {}; see {}",
+                    counted(round + 1, "round"),
+                    counted(left.len(), "robot"),
+                    log_folder(&wishes, note)
+                );
                 return Err(Error::Store(Fault::new("slurm", message)));
             }
             Waited::Gone => {
                 round += 1;
                 // Tasks of a new array need numbers of their own.
                 note.run = (workshop.surroundings)().run_id;
-                progress.say(&format!("{} robots have no record and no task: they are submitted again", left.len()));
+                progress.say(&format!("submitted again, having no record and no task: {}", counted(left.len(), "robot")));
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::super::emit;
 use super::super::surroundings::surroundings;
 use super::{run, workshop};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::fleet::{Fleet, local};
 use crate::progress::{FleetProgress, Verbosity};
 use clap::Args;
@@ -29,7 +29,8 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     let note = ledger.run(Some(&arguments.run))?;
     let note = note.ok_or_else(|| Error::store(&arguments.run, "no such run in the store, or not yet visible here"))?;
     let tasks = note.tasks.len();
-    let robots = note.tasks.get(arguments.task).ok_or_else(|| Error::spec("--task", format!("the run has {tasks} tasks")))?;
+    let robots =
+        note.tasks.get(arguments.task).ok_or_else(|| Error::spec("--task", format!("the run has {}", counted(tasks, "task"))))?;
     let fleet = Fleet::load(&note.file, &store)?;
     // By name: the roster may have grown since.
     let names = robots.iter().filter_map(|index| note.robots.get(*index)).map(|member| member.name.as_str());
@@ -44,7 +45,7 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     let stop = || workshop.ledger.cancelled(&note.run);
     let worked = local::work(&workshop, &chosen, &local::Options { workers: 1, fail_fast: false, stop: &stop }, &progress)?;
     let recorded = worked.records.iter().flatten().count();
-    emit(&format!("{recorded} of {} robots recorded, {} computed here\n", robots.len(), worked.computed))?;
+    emit(&format!("{recorded} of {} recorded, {} computed here\n", counted(robots.len(), "robot"), worked.computed))?;
     if recorded < robots.len() {
         return Err(Error::store(&arguments.run, "not all robots of this task are recorded"));
     }

@@ -7,7 +7,7 @@ mod run;
 mod status;
 
 use super::surroundings::{bucket, default_store};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop};
 use crate::pipeline::Surroundings;
 use crate::progress::shown;
@@ -104,7 +104,7 @@ fn verdict(fleet: &Fleet, records: &[Option<Record>]) -> Result<()> {
     }
     let missing = records.iter().filter(|record| record.is_none()).count();
     if missing > 0 {
-        faults.push(Fault::new("", format!("{missing} of {} robots are not computed yet: run again", records.len())));
+        faults.push(Fault::new("", format!("not computed yet: {missing} of {}; run again", counted(records.len(), "robot"))));
     }
     if missing > 0 || bad(Ending::Failed).next().is_some() {
         return Err(Error::store(fleet.name(), list(&faults)));

@@ -4,7 +4,7 @@ use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
 use super::cluster::{ClusterArguments, on_slurm};
 use super::{Place, records, verdict, workshop};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::fleet::ledger::{Member, RunNote};
 use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop, local, tables};
 use crate::progress::{FleetProgress, Verbosity, shown};
@@ -203,9 +203,9 @@ fn text(records: &[Option<Record>], computed: usize, seconds: f64, told: &tables
     text.push_str(&format!("page: {}\n", told.page.display()));
     let rate = if computed > 0 { format!(", {:.0} a minute", computed as f64 / seconds * 60.0) } else { String::new() };
     text + &format!(
-        "{} of {} robots done, {} rejected, {} failed; {computed} computed now ({seconds:.1} s{rate})\n",
+        "{} of {} done, {} rejected, {} failed; {computed} computed now ({seconds:.1} s{rate})\n",
         count(records, Ending::Done),
-        records.len(),
+        counted(records.len(), "robot"),
         count(records, Ending::Rejected),
         count(records, Ending::Failed)
     )

@@ -4,7 +4,7 @@ use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
 use super::run::{count, ledger};
 use super::{Place, records, workshop};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::fleet::{Ending, Fleet, FleetFile, Record, slurm};
 use crate::progress::shown;
 use clap::Args;
@@ -68,9 +68,9 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
         text.push_str(&format!("{}: {}: {}\n", shown(&record.robot), record.ending.name(), first_line(record)));
     }
     text.push_str(&format!(
-        "fleet {}: {done} of {} robots done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
+        "fleet {}: {done} of {} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
         fleet.name(),
-        records.len()
+        counted(records.len(), "robot")
     ));
     emit(&text)
 }
@@ -98,10 +98,10 @@ fn detail(record: &Record, store: &crate::store::Store, fleet: &str) -> String {
     }
     for made in &record.tables {
         text.push_str(&format!(
-            "  {}.{}: {} rows, {}\n",
+            "  {}.{}: {}, {}\n",
             made.stage,
             made.port,
-            made.table.rows,
+            counted(made.table.rows, "row"),
             store.object_path(&made.table).display()
         ));
     }

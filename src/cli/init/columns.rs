@@ -1,236 +1,341 @@
-//! What a recording's columns seem to hold, by their names and first values: a proposal that a person checks.
+//! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
-use super::names::{Name, joints, point};
+use super::names::{LENGTHS, Name, joints};
+use super::points::{Way, points};
 use super::quoted;
-use crate::error::{Error, Result};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use super::sheet::Sheet;
+use super::words;
+use crate::error::Result;
 use std::path::Path;
 
-/// Bytes and lines that are looked at.
-const LOOKED: u64 = 1 << 20;
-const LINES: usize = 400;
+/// No angle in rad is beyond this.
+const MOST_RADIANS: f64 = 6.5;
+/// Beyond this coordinates are millimetres, by the size of robots.
+const MOST_METRES: f64 = 50.0;
 
-/// What columns of points' names are called.
-const IDS: [&str; 13] =
-    ["point", "point_id", "id", "name", "pose", "nr", "no", "punkt", "messpunkt", "index", "label", "target", "measurement"];
+/// What may stand for one quantity, best first.
+pub(super) struct Mapping {
+    pub quantity: &'static str,
+    pub choices: Vec<Choice>,
+    /// What to look at.
+    pub check: Option<String>,
+    /// For the terminal.
+    pub account: String,
+}
 
-/// A delimited text, as far as it was understood.
+/// Lines below `columns`, and the columns that they take.
+pub(super) struct Choice {
+    pub lines: Vec<String>,
+    pub columns: Vec<usize>,
+}
+
+/// A file, as far as it was understood.
 pub(super) struct Found {
-    delimiter: char,
-    comma: bool,
-    /// Lines above the header.
-    skip: usize,
-    pub joints: Vec<String>,
-    /// Whether the joints' values go beyond what radians can be.
-    degrees: bool,
-    /// Whether the name says the unit.
-    joint_unit: Option<&'static str>,
-    pub id: Option<String>,
-    /// A column that says what a row is for, e.g. fit or validate.
-    pub usage: Option<String>,
-    /// Quantities of each joint, by pattern: motor currents, directions of approach, velocities.
-    patterns: Vec<(&'static str, &'static str, Option<&'static str>)>,
-    /// x, y, z.
-    pub point: Vec<String>,
-    point_unit: Option<&'static str>,
-    /// Quantity, column, unit, whether the unit was in the name.
-    others: Vec<(&'static str, String, &'static str, bool)>,
-    unused: Vec<String>,
-    /// Largest coordinate found.
-    farthest: f64,
+    /// As messages name it.
+    pub name: String,
+    pub sheet: Sheet,
+    pub said: Vec<Name>,
+    pub mappings: Vec<Mapping>,
+    /// Seconds in the unit of a time column.
+    pub second: f64,
+    /// Lines of comment.
+    pub remarks: Vec<String>,
 }
 
 impl Found {
     pub fn read(path: &Path) -> Result<Self> {
-        let place = path.display().to_string();
-        let file = File::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
-        let mut lines = Vec::new();
-        for line in BufReader::new(file.take(LOOKED)).split(b'\n').take(LINES) {
-            let line = line.map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
-            lines.push(String::from_utf8_lossy(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+        let sheet = Sheet::read(path)?;
+        let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
+        let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
+        for (name, unit) in said.iter_mut().zip(&sheet.units) {
+            name.unit = name.unit.or(*unit);
         }
-        let delimiter =
-            [';', '\t', ',', ' '].into_iter().max_by_key(|c| lines.iter().filter(|line| line.matches(*c).count() >= 3).count());
-        let delimiter = delimiter.unwrap_or(',');
-        let cells = |line: &String| -> Vec<String> {
-            line.split(delimiter)
-                .map(|cell| cell.trim().trim_matches('"').to_string())
-                .filter(|cell| delimiter != ' ' || !cell.is_empty())
-                .collect()
-        };
-        let number = |text: &String| {
-            text.parse::<f64>().ok().or_else(|| (delimiter != ',').then(|| text.replacen(',', ".", 1).parse().ok())?)
-        };
-        let numeric = |line: &Vec<String>| line.iter().filter(|cell| number(cell).is_some()).count();
-        let rows: Vec<Vec<String>> = lines.iter().map(cells).collect();
-        // The header is the line of names above the first line of numbers as wide as itself.
-        let header = (0..rows.len().saturating_sub(1)).find(|k| {
-            let (here, next) = (&rows[*k], &rows[*k + 1]);
-            here.len() >= 3 && here.len() == next.len() && numeric(here) == 0 && 2 * numeric(next) >= next.len()
-        });
-        let Some(skip) = header else {
-            return Err(Error::data(
-                place,
-                "no header found: expected a line of column names above the numbers; put one there, or describe the columns by number in the pipeline",
-            ));
-        };
-        let names = rows[skip].clone();
-        let body: Vec<&Vec<String>> = rows[skip + 1..].iter().filter(|row| row.len() == names.len()).collect();
-        let values = |column: usize| body.iter().filter_map(move |row| number(&row[column]));
-        let largest = |column: usize| values(column).map(f64::abs).fold(0.0, f64::max);
-        let comma =
-            delimiter != ',' && body.iter().flat_map(|row| row.iter()).any(|cell| cell.contains(',') && number(cell).is_some());
-        let mut found = Self {
-            delimiter,
-            comma,
-            skip,
-            joints: Vec::new(),
-            degrees: false,
-            joint_unit: None,
-            id: None,
-            usage: None,
-            patterns: Vec::new(),
-            point: Vec::new(),
-            point_unit: None,
-            others: Vec::new(),
-            unused: Vec::new(),
-            farthest: 0.0,
-        };
-        let said: Vec<Name> = names.iter().map(|name| Name::of(name)).collect();
-        let mut taken = vec![false; names.len()];
-        let filled = |column: usize| !body.is_empty() && values(column).count() == body.len();
-        let angle = |column: usize| {
-            filled(column) && largest(column) <= 360.0 && said[column].unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
-        };
-        for column in joints(&said, angle) {
-            taken[column] = true;
-            found.degrees |= largest(column) > 6.5;
-            found.joint_unit = said[column].unit_of(&["deg", "rad"]);
-            found.joints.push(names[column].clone());
-        }
-        for column in point(&said).into_iter().flatten() {
-            taken[column] = true;
-            found.farthest = found.farthest.max(largest(column));
-            found.point_unit = said[column].unit_of(&["mm", "m", "um", "in"]);
-            found.point.push(names[column].clone());
-        }
-        for (quantity, pattern, unit) in
-            [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None), ("velocity", "dq{j}_deg_s", Some("deg/s"))]
-        {
-            let column = |n: usize| names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
-            let columns: Vec<usize> = (1..).map_while(column).collect();
-            if !columns.is_empty() && columns.len() == found.joints.len() {
-                columns.iter().for_each(|column| taken[*column] = true);
-                found.patterns.push((quantity, pattern, unit));
-            }
-        }
-        for (column, name) in names.iter().enumerate().filter(|(column, _)| !taken[*column]) {
-            let (lower, unit) = (said[column].stem(), said[column].unit);
-            let is = |words: &[&str]| words.iter().any(|word| lower == *word || lower.starts_with(&format!("{word}_")));
-            if found.id.is_none() && is(&IDS) {
-                found.id = Some(name.clone());
-            } else if found.usage.is_none() && is(&["use", "usage", "set"]) {
-                found.usage = Some(name.clone());
-            } else if is(&["payload", "load", "mass", "last", "traglast"]) && filled(column) {
-                found.others.push(("payload", name.clone(), "kg", unit == Some("kg")));
-            } else if is(&["temp", "temperature", "temperatur"]) && filled(column) {
-                found.others.push(("temperature", name.clone(), "C", unit == Some("C")));
-            } else if is(&["time", "t", "timestamp", "zeit"]) && filled(column) {
-                found.others.push(("time", name.clone(), "s", unit == Some("s")));
-            } else {
-                found.unused.push(name.clone());
-            }
+        let mut found = Self { name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
+        if found.sheet.header && found.sheet.trouble.is_none() {
+            found.joints();
+            found.point();
+            found.per_joint();
+            found.scalars();
+            found.time();
+            found.texts();
         }
         Ok(found)
     }
 
+    pub fn get(&self, quantity: &str) -> Option<&Mapping> {
+        self.mappings.iter().find(|mapping| mapping.quantity == quantity)
+    }
+
+    /// Takes a quantity out and leaves it as a remark.
+    pub fn drop(&mut self, quantity: &str, why: &str) {
+        if let Some(at) = self.mappings.iter().position(|mapping| mapping.quantity == quantity) {
+            let dropped = self.mappings.remove(at);
+            let lines = dropped.choices.first().map(|choice| choice.lines.clone()).unwrap_or_default();
+            self.remarks.extend(
+                lines
+                    .into_iter()
+                    .zip([why].into_iter().chain(std::iter::repeat("")))
+                    .map(|(line, why)| if why.is_empty() { line } else { format!("{line}   # CHECK: {why}") }),
+            );
+        }
+    }
+
     /// What was found, for the terminal.
     pub fn account(&self) -> String {
-        let mut parts = Vec::new();
-        if !self.joints.is_empty() {
-            parts.push(format!("{} joints ({} to {})", self.joints.len(), self.joints[0], self.joints[self.joints.len() - 1]));
-        }
-        if self.point.len() == 3 {
-            parts.push(format!("the point ({})", self.point.join(", ")));
-        }
-        parts.extend(self.id.iter().map(|id| format!("names ({id})")));
-        parts.extend(self.usage.iter().map(|usage| format!("usage ({usage})")));
-        parts.extend(self.patterns.iter().map(|(quantity, pattern, _)| format!("{quantity} ({pattern})")));
-        parts.extend(self.others.iter().map(|(quantity, column, ..)| format!("{quantity} ({column})")));
-        if !self.unused.is_empty() {
-            parts.push(format!("not used: {}", self.unused.join(", ")));
+        let mut parts: Vec<String> = self.sheet.trouble.iter().cloned().collect();
+        parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
+        let unused = (0..self.said.len()).filter(|column| !self.is_taken(*column)).collect::<Vec<usize>>();
+        if !unused.is_empty() {
+            parts.push(format!("not used: {}", self.shown(&unused)));
         }
         parts.join("; ")
     }
 
-    /// The settings of this file under `files`, with lines to replace where no file has the joints, or the point.
-    pub fn yaml(&self, missing: [bool; 2]) -> String {
-        let mut out = String::new();
-        if self.delimiter != ',' {
-            out.push_str(&format!("          delimiter: {}\n", quoted(&self.delimiter.to_string())));
+    pub fn is_taken(&self, column: usize) -> bool {
+        self.mappings.iter().any(|mapping| mapping.choices.first().is_some_and(|choice| choice.columns.contains(&column)))
+    }
+
+    /// A column as the pipeline names it: by its number where the name is not its alone.
+    pub fn reference(&self, column: usize) -> String {
+        let name = self.sheet.names.get(column).map_or("", String::as_str);
+        let alone = self.sheet.names.iter().filter(|other| *other == name).count() == 1;
+        if name.is_empty() || !alone || name.contains("${") || !self.sheet.header {
+            (column + 1).to_string()
+        } else {
+            quoted(name)
         }
-        if self.comma {
-            out.push_str("          decimal: comma\n");
-        }
-        if self.skip > 0 {
-            out.push_str(&format!("          skip: {}                 # lines above the header\n", self.skip));
-        }
-        out.push_str("          columns:\n");
-        let mut put = |quantity: &str, column: &str, unit: Option<&str>, check: &str| {
-            let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
-            let check = if check.is_empty() { String::new() } else { format!("   # CHECK: {check}") };
-            out.push_str(&format!("            {quantity}: {{column: {}{unit}}}{check}\n", quoted(column)));
+    }
+
+    fn shown(&self, columns: &[usize]) -> String {
+        columns.iter().map(|column| self.sheet.names[*column].as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    pub fn line(&self, quantity: &str, column: usize, unit: Option<&str>) -> String {
+        let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
+        format!("{quantity}: {{column: {}{unit}}}", self.reference(column))
+    }
+
+    /// Maps a quantity to single columns, best first.
+    pub fn map(&mut self, quantity: &'static str, columns: &[usize], unit: Option<&'static str>, check: Option<String>) {
+        let choice = |column: &usize| Choice { lines: vec![self.line(quantity, *column, unit)], columns: vec![*column] };
+        let Some(first) = columns.first() else { return };
+        let word = if quantity == "point_id" { "names" } else { quantity };
+        let account = format!("{word} ({})", self.sheet.names[*first]);
+        let check = check.or_else(|| (columns.len() > 1).then(|| "several columns fit".to_string()));
+        self.mappings.push(Mapping { quantity, choices: columns.iter().map(choice).collect(), check, account });
+    }
+
+    fn joints(&mut self) {
+        let angle = |column: usize| {
+            self.sheet.is_numeric(column)
+                && self.sheet.largest(column) <= 400.0
+                && self.said[column].unit.is_none_or(|unit| ["deg", "rad"].contains(&unit))
         };
-        if let Some(id) = &self.id {
-            put("point_id", id, None, "");
-        }
-        if let Some(first) = self.joints.first() {
-            let pattern = pattern(first, self.joints.get(1));
-            let (unit, why) = match self.joint_unit {
-                Some(unit) => (unit, String::new()),
-                None if self.degrees => ("deg", "values beyond 6.5 cannot be radians".to_string()),
-                None => ("rad", "no value is beyond 6.5; are these degrees?".to_string()),
-            };
-            put("q", &pattern, Some(unit), &why);
-        }
-        if let Some(usage) = &self.usage {
-            put("usage", usage, None, "");
-        }
-        for (quantity, pattern, unit) in &self.patterns {
-            put(quantity, pattern, *unit, "");
-        }
-        for (axis, column) in ["x", "y", "z"].iter().zip(&self.point) {
-            let (unit, why) = match self.point_unit {
-                Some(unit) => (unit, ""),
-                None if self.farthest > 50.0 => ("mm", "by the size of the numbers"),
-                None => ("m", "by the size of the numbers"),
-            };
-            put(axis, column, Some(unit), why);
-        }
-        for (quantity, column, unit, named) in &self.others {
-            put(quantity, column, Some(unit), if *named { "" } else { "the unit" });
-        }
-        if self.joints.is_empty() && missing[0] {
-            out.push_str("            q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number\n");
-        }
-        if self.point.len() < 3 && missing[1] {
-            for axis in ["x", "y", "z"] {
-                out.push_str(&format!(
-                    "            {axis}: {{column: {axis}, unit: mm}}   # REPLACE: the measured point was not recognised\n"
-                ));
+        let mut rows = joints(&self.said, angle);
+        rows.retain(|columns| columns.iter().all(|column| self.sheet.is_numeric(*column)));
+        let Some(best) = rows.first() else { return };
+        let degrees = best.iter().any(|column| self.sheet.largest(*column) > MOST_RADIANS);
+        let named = self.said[best[0]].unit_of(&["deg", "rad"]);
+        let (unit, why) = match named {
+            Some(unit) => (unit, None),
+            None if degrees => ("deg", Some("values beyond 6.5 cannot be radians".to_string())),
+            None => ("rad", Some("no value is beyond 6.5; are these degrees?".to_string())),
+        };
+        let several = (rows.len() > 1).then(|| "several columns of joints fit".to_string());
+        let check: Vec<String> = several.into_iter().chain(why).collect();
+        let account =
+            format!("{} joints ({} to {})", best.len(), self.sheet.names[best[0]], self.sheet.names[best[best.len() - 1]]);
+        let choice =
+            |columns: &Vec<usize>| Choice { lines: vec![self.joints_line("q", columns, Some(unit))], columns: columns.clone() };
+        let mapping = Mapping {
+            quantity: "q",
+            choices: rows.iter().map(choice).collect(),
+            check: (!check.is_empty()).then(|| check.join("; ")),
+            account,
+        };
+        self.mappings.push(mapping);
+    }
+
+    /// A pattern where the names follow one, else a list.
+    fn joints_line(&self, quantity: &str, columns: &[usize], unit: Option<&str>) -> String {
+        let unit = unit.map(|unit| format!(", unit: {unit}")).unwrap_or_default();
+        let names: Vec<&str> = columns.iter().map(|column| self.sheet.names[*column].as_str()).collect();
+        let alone = columns.iter().all(|column| self.reference(*column).starts_with('"'));
+        match pattern(&names).filter(|_| alone) {
+            Some(pattern) => format!("{quantity}: {{column: {}{unit}}}", quoted(&pattern)),
+            None => {
+                let list: Vec<String> = columns.iter().map(|column| self.reference(*column)).collect();
+                format!("{quantity}: {{columns: [{}]{unit}}}", list.join(", "))
             }
         }
-        for column in &self.unused {
-            out.push_str(&format!("            # not used: {}\n", quoted(column)));
+    }
+
+    fn point(&mut self) {
+        let found = points(&self.said);
+        let numeric = |way: &Way| {
+            let more = way.difference.iter().flat_map(|(columns, _)| columns);
+            way.columns.iter().chain(more).all(|column| self.sheet.is_numeric(*column))
+        };
+        let ways: Vec<&Way> = found.ways.iter().filter(|way| numeric(way)).collect();
+        if let Some(sigma) = found.sigma {
+            let unit = self.length_unit(&sigma).0;
+            let lines =
+                ["sigma_x", "sigma_y", "sigma_z"].iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
+            let lines: Vec<String> = lines.collect();
+            self.remarks.push(format!("{}   # CHECK: one standard deviation, if rows are to be weighted by it", lines[0]));
+            self.remarks.extend(lines.into_iter().skip(1));
         }
-        out
+        let Some(best) = ways.first() else {
+            if let Some(wanted) = found.wanted {
+                self.remarks.push(format!("only the wanted point is there: {}", quoted(&self.shown(&wanted))));
+            }
+            return;
+        };
+        let by_size = self.length_unit(&best.columns).1.then(|| "the unit, by the size of the numbers".to_string());
+        let check: Vec<String> = found.question.into_iter().chain(by_size).collect();
+        let said = if found.said { "the measured point" } else { "the point" };
+        let mapping = Mapping {
+            quantity: "x",
+            choices: ways.iter().map(|way| self.way(way)).collect(),
+            check: (!check.is_empty()).then(|| check.join("; ")),
+            account: format!("{said} ({})", self.shown(&best.columns)),
+        };
+        self.mappings.push(mapping);
+    }
+
+    fn way(&self, way: &Way) -> Choice {
+        let unit = self.length_unit(&way.columns).0;
+        let mut columns = way.columns.to_vec();
+        let lines = ["x", "y", "z"].iter().enumerate().map(|(axis, name)| match &way.difference {
+            None => self.line(name, way.columns[axis], Some(unit)),
+            Some((difference, minus)) => {
+                let (key, column) = (if *minus { "minus" } else { "plus" }, difference[axis]);
+                let other = self.said[column].unit_of(&LENGTHS).filter(|other| *other != unit);
+                let other = other.map(|other| format!(", difference_unit: {other}")).unwrap_or_default();
+                let (target, column) = (self.reference(way.columns[axis]), self.reference(column));
+                format!("{name}: {{column: {target}, {key}: {column}, unit: {unit}{other}}}")
+            }
+        });
+        let lines = lines.collect();
+        columns.extend(way.difference.iter().flat_map(|(columns, _)| columns));
+        Choice { lines, columns }
+    }
+
+    /// The unit of coordinates, and whether their size alone says so.
+    fn length_unit(&self, columns: &[usize; 3]) -> (&'static str, bool) {
+        if let Some(unit) = columns.iter().find_map(|column| self.said[*column].unit_of(&LENGTHS)) {
+            return (unit, false);
+        }
+        let farthest = columns.iter().map(|column| self.sheet.largest(*column)).fold(0.0, f64::max);
+        (if farthest > MOST_METRES { "mm" } else { "m" }, true)
+    }
+
+    /// Motor currents, directions of approach and velocities under calib's own names.
+    fn per_joint(&mut self) {
+        let Some(count) = self.get("q").map(|joints| joints.choices[0].columns.len()) else { return };
+        for (quantity, pattern, unit) in
+            [("current", "i{j}_a", Some("A")), ("direction", "dir{j}", None), ("velocity", "dq{j}_deg_s", Some("deg/s"))]
+        {
+            let column = |n: usize| self.sheet.names.iter().position(|name| *name == pattern.replace("{j}", &n.to_string()));
+            let columns: Vec<usize> = (1..).map_while(column).collect();
+            if columns.len() == count {
+                let lines = vec![self.joints_line(quantity, &columns, unit)];
+                let account = format!("{quantity} ({pattern})");
+                self.mappings.push(Mapping { quantity, choices: vec![Choice { lines, columns }], check: None, account });
+            }
+        }
+    }
+
+    fn scalars(&mut self) {
+        for (quantity, listed, unit, most) in
+            [("payload", &words::PAYLOADS[..], "kg", 1e4), ("temperature", &words::TEMPERATURES[..], "C", 200.0)]
+        {
+            let fits = |column: &usize| {
+                let name = &self.said[*column];
+                let named = if quantity == "payload" { listed.contains(&name.stem().as_str()) } else { name.is(listed) };
+                let plausible = self.sheet.is_numeric(*column) && self.sheet.largest(*column) <= most;
+                named && plausible && !self.is_taken(*column) && name.unit.is_none_or(|other| other == unit)
+            };
+            let columns: Vec<usize> = (0..self.said.len()).filter(fits).collect();
+            let Some(first) = columns.first() else { continue };
+            let check = (self.said[*first].unit.is_none()).then(|| "the unit".to_string());
+            self.map(quantity, &columns, Some(unit), check);
+        }
+    }
+
+    fn time(&mut self) {
+        let named = |column: &usize| self.said[*column].is(&words::TIMES) && !self.is_taken(*column);
+        let unit = |column: usize| match self.said[column].unit {
+            None => Some((if self.sheet.largest(column) > 1e11 { "ms" } else { "s" }, false)),
+            Some(unit) => Some((unit, true)).filter(|(unit, _)| ["s", "ms"].contains(unit)),
+        };
+        let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
+        let running: Vec<usize> =
+            columns.iter().copied().filter(|column| unit(*column).is_some() && self.runs(*column)).collect();
+        for column in columns.iter().filter(|column| !running.contains(column)) {
+            let name = quoted(&self.sheet.names[*column]);
+            self.remarks.push(format!("{name} is no time that can be read: s or ms as numbers that do not fall"));
+        }
+        let Some((unit, said)) = running.first().and_then(|column| unit(*column)) else { return };
+        self.second = if unit == "ms" { 1e-3 } else { 1.0 };
+        self.map("time", &running, Some(unit), (!said).then(|| "the unit".to_string()));
+    }
+
+    /// Whether numbers do not fall, do not stand still, and are no dates in digits (20201103154500).
+    fn runs(&self, column: usize) -> bool {
+        let times: Vec<f64> = self.sheet.numbers(column).collect();
+        let falls = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        let dates = times.iter().all(|time| (1.9e13..2.2e13).contains(time));
+        let moves = times.first().zip(times.last()).is_some_and(|(first, last)| last > first);
+        self.sheet.is_numeric(column) && moves && !dates && 20 * falls <= times.len()
+    }
+
+    /// What rows are for, which reflector they measured, and what points are called in a file that stands alone.
+    fn texts(&mut self) {
+        let columns = 0..self.said.len();
+        let few = |column: usize| {
+            let distinct = self.distinct(column);
+            (2..=10).contains(&distinct) && 3 * distinct <= self.sheet.rows.len() && !self.sheet.is_numeric(column)
+        };
+        let listed = |listed: &[&str], column: usize| listed.contains(&self.said[column].stem().as_str());
+        let usages: Vec<usize> = columns.clone().filter(|column| listed(&words::USAGES, *column) && few(*column)).collect();
+        let reflectors: Vec<usize> = columns.filter(|column| listed(&words::REFLECTORS, *column) && few(*column)).collect();
+        self.map("usage", &usages, None, None);
+        self.map(
+            "target",
+            &reflectors,
+            None,
+            Some("which of several reflectors was measured?".into()).filter(|_| !reflectors.is_empty()),
+        );
+    }
+
+    pub fn distinct(&self, column: usize) -> usize {
+        self.sheet.texts(column).collect::<std::collections::BTreeSet<_>>().len()
+    }
+
+    /// Columns that may name points by their header, whole, best first: texts before numbers, each of different cells.
+    pub fn ids(&self) -> Vec<usize> {
+        let rows = self.sheet.rows.len();
+        let named = |column: &usize| {
+            let stem = self.said[*column].stem();
+            let name = self.sheet.names[*column].trim();
+            let ends = stem.ends_with("_id") || stem.ends_with("_name") || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
+            let whole = self.sheet.texts(*column).count() == rows;
+            (words::IDS.contains(&stem.as_str()) || ends) && whole && !self.is_taken(*column)
+        };
+        let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
+        let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));
+        columns.sort_by_key(|column| rank(*column));
+        let best = columns.first().map(|column| rank(*column));
+        columns.retain(|column| Some(rank(*column)) == best);
+        columns
     }
 }
 
-/// The names of all joints in one: the 1 that becomes a 2 in the next name is the joint's number.
-fn pattern(first: &str, second: Option<&String>) -> String {
+/// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
+fn pattern(names: &[&str]) -> Option<String> {
+    let first = names.first()?;
     let ones = first.match_indices('1').map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
-    let fits = |pattern: &String| second.is_none_or(|second| pattern.replace("{j}", "2") == *second);
-    ones.into_iter().find(fits).unwrap_or_else(|| first.replacen('1', "{j}", 1))
+    let fits = |pattern: &String| names.iter().enumerate().all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name);
+    ones.into_iter().find(fits)
 }

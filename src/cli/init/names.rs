@@ -1,38 +1,6 @@
-//! What the name of a column says: words, a unit, the number of a joint, an axis of the point.
+//! What the name of a column says: words, a unit, the number of a joint, an axis of a point.
 
-/// Units by how people write them in a header.
-const UNITS: [(&str, &str); 22] = [
-    ("mm", "mm"),
-    ("m", "m"),
-    ("um", "um"),
-    ("\u{b5}m", "um"),
-    ("\u{3bc}m", "um"),
-    ("in", "in"),
-    ("inch", "in"),
-    ("deg", "deg"),
-    ("degree", "deg"),
-    ("degrees", "deg"),
-    ("grad", "deg"),
-    ("\u{b0}", "deg"),
-    ("rad", "rad"),
-    ("kg", "kg"),
-    ("c", "C"),
-    ("\u{b0}c", "C"),
-    ("degc", "C"),
-    ("s", "s"),
-    ("sec", "s"),
-    ("ms", "ms"),
-    ("a", "A"),
-    ("nm", "Nm"),
-];
-
-/// What the joints' columns are usually called; the number of the joint follows.
-const JOINTS: [&str; 13] =
-    ["q", "a", "j", "joint", "axis", "theta", "achse", "gelenk", "axe", "asse", "eje", "jnt", "joint_angle"];
-
-/// What stands beside an axis' name where there are commanded and measured points.
-const MEASURED: [&str; 9] = ["ist", "actual", "act", "meas", "measured", "mess", "gemessen", "real", "tracker"];
-const WANTED: [&str; 9] = ["soll", "nom", "nominal", "cmd", "command", "target", "wanted", "ref", "programmed"];
+use super::words;
 
 /// A column's name taken apart.
 #[derive(Debug, Clone)]
@@ -41,14 +9,16 @@ pub(super) struct Name {
     pub words: Vec<String>,
     /// Symbol of the unit that the name ends in.
     pub unit: Option<&'static str>,
+    /// The unit as it stands there, where no bracket says that it is one: the `a` of `x_a`.
+    ending: Option<String>,
 }
 
 impl Name {
     pub fn of(text: &str) -> Self {
         let lower = text.trim().to_lowercase();
-        let (stem, unit) = without_unit(&lower);
+        let (stem, unit, ending) = without_unit(&lower);
         let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_string).collect();
-        Self { words, unit }
+        Self { words, unit, ending }
     }
 
     pub fn stem(&self) -> String {
@@ -60,77 +30,144 @@ impl Name {
         self.unit.filter(|unit| allowed.contains(unit))
     }
 
-    /// What the joints are called here, and which one this is (from 1): `q1`, `A1_deg`, `joint_3`, `Achse 4 [deg]`.
-    pub fn joint(&self) -> Option<(String, usize)> {
-        let stem = self.stem();
-        let name = stem.trim_end_matches(|c: char| c.is_ascii_digit());
-        let number = stem[name.len()..].parse().ok()?;
-        Some((name.trim_end_matches('_').to_string(), number))
+    /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
+    pub fn is(&self, listed: &[&str]) -> bool {
+        let listed = |text: &str| listed.contains(&text);
+        // A letter alone says little beside other words: `x_t` is no time.
+        let mut ends = [self.words.first(), self.words.last()].into_iter().flatten().filter(|word| word.len() > 1);
+        listed(&self.stem()) || ends.any(|word| listed(word))
     }
 
-    /// The axis (0 to 2) that this is the coordinate of, and what else the name says.
+    /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
+    pub fn joint(&self) -> Option<(String, usize)> {
+        let at = self.words.iter().rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
+        let stem = self.words[at].trim_end_matches(|c: char| c.is_ascii_digit());
+        let number = self.words[at][stem.len()..].parse().ok()?;
+        let before = self.words[..at].iter().map(String::as_str);
+        let after = self.words[at + 1..].iter().map(String::as_str);
+        let place = format!("{stem}#");
+        Some((before.chain([place.as_str()]).chain(after).collect::<Vec<_>>().join("_").replace("_#", "#"), number))
+    }
+
+    /// The axis (0 to 2) that this is the coordinate of, and what else the name says: `x_ist`, `Goal X`, `dx`, `Xsoll`.
     pub fn axis(&self) -> Option<(usize, Vec<String>)> {
-        let at = self.words.iter().position(|word| ["x", "y", "z"].contains(&word.as_str()))?;
-        let axis = ["x", "y", "z"].iter().position(|axis| self.words[at] == *axis)?;
-        let rest = self.words.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, word)| word.clone()).collect();
-        Some((axis, rest))
+        let (at, (axis, more)) = self.words.iter().enumerate().find_map(|(at, word)| Some((at, axis(word)?)))?;
+        let rest = self.words.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, word)| word.clone());
+        let lengthless = self.unit.is_some() && self.unit_of(&LENGTHS).is_none();
+        // No length, so that a single letter behind the name is a word: the point A of `x_a`.
+        let ending = self.ending.clone().filter(|ending| lengthless && ending.len() == 1);
+        if lengthless && ending.is_none() {
+            return None;
+        }
+        Some((axis, rest.chain((!more.is_empty()).then(|| more.to_string())).chain(ending).collect()))
     }
 }
 
-fn without_unit(lower: &str) -> (&str, Option<&'static str>) {
-    let symbol = |text: &str| UNITS.iter().find(|(written, _)| *written == text.trim()).map(|(_, unit)| *unit);
+/// Units of a coordinate.
+pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
+
+/// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
+fn axis(word: &str) -> Option<(usize, &str)> {
+    let known = |more: &str| {
+        let listed =
+            [&words::MEASURED[..], &words::WANTED, &words::DIFFERENCE, &words::SIGMA, &["pos", "p", "coord", "tcp", "t"]];
+        more.is_empty() || more.bytes().all(|byte| byte.is_ascii_digit()) || listed.iter().any(|list| list.contains(&more))
+    };
+    let named = ["x", "y", "z"].iter().enumerate().find_map(|(axis, letter)| {
+        let more = [word.strip_prefix(letter), word.strip_suffix(letter)].into_iter().flatten().find(|more| known(more))?;
+        Some((axis, more))
+    });
+    named.filter(|(_, more)| more.len() < word.len())
+}
+
+type Stem<'a> = (&'a str, Option<&'static str>, Option<String>);
+
+fn without_unit(lower: &str) -> Stem<'_> {
     for (open, close) in [('[', ']'), ('(', ')')] {
         if let Some((stem, inside)) = lower.strip_suffix(close).and_then(|text| text.rsplit_once(open))
             && !stem.trim().is_empty()
-            && let Some(unit) = symbol(inside)
+            && let Some(unit) = words::unit(inside)
         {
-            return (stem.trim(), Some(unit));
+            return (stem.trim(), Some(unit), None);
         }
     }
     for separator in ["_", " ", "/", "."] {
         if let Some((stem, ending)) = lower.rsplit_once(separator)
             && !stem.trim().is_empty()
-            && let Some(unit) = symbol(ending)
+            && let Some(unit) = words::unit(ending)
         {
-            return (stem.trim().trim_end_matches(" in"), Some(unit));
+            return (stem.trim().trim_end_matches(" in"), Some(unit), Some(ending.trim().to_string()));
         }
     }
-    (lower, None)
+    (lower, None, None)
 }
 
-/// Columns of joints 1, 2, ... under one name: a usual one first, else the longest row of four or more that `angle` takes for angles.
-pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<usize> {
+/// Rows of columns that may be the joints, best first: those of usual names, else the longest of four or more that `angle` takes for angles.
+pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+    let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS.iter().filter_map(|listed| named(names, listed)).collect();
+    // Nine letters of a Yaskawa with seven axes hold those of one with six.
+    found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
+    found.truncate(1);
     let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
-    let run = |prefix: &str| -> Vec<usize> {
-        let column = |n: usize| parts.iter().position(|part| part.as_ref().is_some_and(|(name, k)| name == prefix && *k == n));
-        (1..).map_while(column).collect()
+    let mut keys: Vec<&String> = parts.iter().flatten().map(|(key, _)| key).collect();
+    keys.sort();
+    keys.dedup();
+    let run = |key: &str| -> Vec<usize> {
+        let column = |n: usize| parts.iter().position(|part| part.as_ref().is_some_and(|(name, k)| name == key && *k == n));
+        let first = usize::from(column(0).is_none());
+        (first..).map_while(column).collect()
     };
-    let usual = JOINTS.iter().map(|prefix| run(prefix)).find(|columns| columns.len() > 1);
-    usual.unwrap_or_else(|| {
-        let runs = parts.iter().flatten().map(|(prefix, _)| run(prefix));
-        let likely = runs.filter(|columns| columns.len() >= 4 && columns.iter().all(|column| angle(*column)));
-        likely.fold(Vec::new(), |best, columns| if columns.len() > best.len() { columns } else { best })
-    })
-}
-
-/// Columns of x, y, z under one name; the measured ones where there are several.
-pub(super) fn point(names: &[Name]) -> Option<[usize; 3]> {
-    let parts: Vec<Option<(usize, Vec<String>)>> = names.iter().map(Name::axis).collect();
-    let score = |rest: &[String]| {
-        let has = |words: &[&str]| rest.iter().any(|word| words.contains(&word.as_str()));
-        i32::from(has(&MEASURED)) - 2 * i32::from(has(&WANTED))
-    };
-    let mut best: Option<(i32, [usize; 3])> = None;
-    for (_, rest) in parts.iter().flatten() {
-        let column =
-            |axis: usize| parts.iter().position(|part| part.as_ref().is_some_and(|(a, other)| *a == axis && other == rest));
-        if let (Some(x), Some(y), Some(z)) = (column(0), column(1), column(2))
-            && best.is_none_or(|(least, _)| score(rest) > least)
-        {
-            best = Some((score(rest), [x, y, z]));
+    let runs: Vec<(&str, Vec<usize>)> = keys.iter().map(|key| (key.as_str(), run(key))).collect();
+    let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
+    for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
+        if let Some(rank) = usual_name(key) {
+            usual.push((rank, columns[0], columns.clone()));
         }
     }
-    best.map(|(_, columns)| columns)
+    // The longest first; of equal ones those with the plainest name.
+    usual.sort_by_key(|(rank, first, columns)| (std::cmp::Reverse(columns.len()), *rank, *first));
+    found.extend(usual.into_iter().map(|(_, _, columns)| columns));
+    if found.is_empty() {
+        let foreign = runs.into_iter().filter(|(key, columns)| {
+            let other = key.split(['_', '#']).any(|word| words::NO_JOINTS.contains(&word));
+            columns.len() >= 4 && !other && columns.iter().all(|column| angle(*column))
+        });
+        found.extend(foreign.map(|(_, columns)| columns));
+        found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
+    }
+    let longest = found.first().map_or(0, Vec::len);
+    found.retain(|columns| columns.len() == longest);
+    found
+}
+
+/// Columns of joints that have names instead of numbers, in the order of the arm.
+fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
+    let letters = listed.iter().all(|name| name.len() == 1);
+    let column = |wanted: &&str| {
+        names.iter().position(|name| {
+            let stem = name.stem();
+            if letters { stem == *wanted } else { stem.contains(wanted) }
+        })
+    };
+    listed.iter().map(column).collect()
+}
+
+/// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
+fn usual_name(key: &str) -> Option<usize> {
+    const SAID: [&str; 8] = ["pos", "position", "angle", "ang", "winkel", "value", "deg", "rad"];
+    let mut pieces: Vec<&str> = key.split(['_', '#']).filter(|word| !word.is_empty() && !SAID.contains(word)).collect();
+    let before = pieces.len();
+    pieces.retain(|word| !words::MEASURED.contains(word));
+    let measured = pieces.len() < before;
+    let before = pieces.len();
+    pieces.retain(|word| !words::WANTED.contains(word));
+    let wanted = pieces.len() < before;
+    let joined = pieces.join("_");
+    (words::JOINTS.contains(&joined.as_str()) && key.contains('#')).then_some(match (measured, wanted) {
+        (_, true) => 2,
+        (true, false) => 1,
+        _ => 0,
+    })
 }
 
 #[cfg(test)]
@@ -151,6 +188,7 @@ mod tests {
             ("load kg", "load", Some("kg")),
             ("X/mm", "x", Some("mm")),
             ("X in mm", "x", Some("mm")),
+            ("Y [\u{b5}m]", "y", Some("um")),
             ("m", "m", None),
             ("remark", "remark", None),
         ] {
@@ -160,13 +198,36 @@ mod tests {
     }
 
     #[test]
-    fn joints_and_the_measured_point_are_found_under_names_that_nobody_foresaw() {
-        let all =
-            names(&["Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist", "Y_ist", "Z_ist"]);
-        assert_eq!(joints(&all, |_| true), [2, 3, 4, 5, 6]);
-        assert_eq!(joints(&all, |column| column != 4), Vec::<usize>::new());
-        assert_eq!(point(&all), Some([10, 11, 12]));
-        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), |_| false), [2, 3]);
-        assert_eq!(point(&names(&["x", "y"])), None);
+    fn joints_are_found_under_names_that_nobody_foresaw() {
+        let all = names(&["Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist"]);
+        assert_eq!(joints(&all, |_| true), [[2, 3, 4, 5, 6]]);
+        assert!(joints(&all, |column| column != 4).is_empty());
+        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), |_| false), [[2, 3]]);
+        assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), |_| false), [[1, 2, 3, 4, 5, 0]]);
+        assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), |_| true), [[2, 3], [0, 1]]);
+        assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), |_| true), [[2, 3]]);
+        let robot = ["ur_shoulder_pan_joint", "ur_shoulder_lift_joint", "ur_elbow_joint"];
+        let wrist = ["ur_wrist_1_joint", "ur_wrist_2_joint", "ur_wrist_3_joint"];
+        assert_eq!(joints(&names(&[robot, wrist].concat()), |_| true), [[0, 1, 2, 3, 4, 5]]);
+    }
+
+    #[test]
+    fn an_axis_is_told_from_words_that_end_in_its_letter() {
+        for (text, expected) in [
+            ("X", Some((0, vec![]))),
+            ("Goal y", Some((1, vec!["goal"]))),
+            ("z_dif", Some((2, vec!["dif"]))),
+            ("dX [mm]", Some((0, vec!["d"]))),
+            ("Zsoll", Some((2, vec!["soll"]))),
+            ("x_A", Some((0, vec!["a"]))),
+            ("x_m", Some((0, vec![]))),
+            ("index", None),
+            ("max", None),
+            ("measurement_rx", None),
+            ("Rz", None),
+        ] {
+            let expected = expected.map(|(axis, rest)| (axis, rest.into_iter().map(String::from).collect()));
+            assert_eq!(Name::of(text).axis(), expected, "{text}");
+        }
     }
 }

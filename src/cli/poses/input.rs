@@ -1,14 +1,13 @@
 //! Ranges on the command line, the robot file, and recordings to compare with.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements};
-use crate::store::frame::FrameBuilder;
-use crate::table::{Recording, Table};
+use crate::table::{Loose, Recording, from_file};
 use nalgebra::Vector3;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 
 /// Lower and upper ends; infinite where left empty.
@@ -33,7 +32,7 @@ pub(super) fn ranges(text: &str) -> Result<Ranges, String> {
 pub(super) fn robot(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> {
     let read = |path: &Path| {
         let label = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+        let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
         Ok((label, text))
     };
     let (label, text) = read(path)?;
@@ -48,9 +47,21 @@ pub(super) fn robot(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription
 /// Joints and payloads of a recording, as if measured with `sigma` (m) per axis.
 pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Result<Measurements> {
     let label = path.display().to_string();
-    let table = read(path).map_err(|message| {
-        Error::data(&label, format!("is not a `recording` table of calib ({message}); `ingest` makes one of any recording"))
+    let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
+        Error::Data(faults) => Error::Data(
+            faults
+                .into_iter()
+                .map(|fault| Fault {
+                    message: format!("{}; `ingest` makes a `recording` table of any recording", fault.message),
+                    ..fault
+                })
+                .collect(),
+        ),
+        other => other,
     })?;
+    if !vouched {
+        let _ = writeln!(std::io::stderr(), "warning: {label} carries no content hash: whether it was changed cannot be told");
+    }
     let prismatic: Vec<bool> = robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     if table.prismatic != prismatic {
         let message = format!("has {} joints of other number or kind than the robot file's {}", table.joints, prismatic.len());
@@ -62,22 +73,4 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
     let mut data = table.measurements(&Instrument::default());
     data.sigma = vec![Vector3::repeat(sigma); data.rows()];
     Ok(data)
-}
-
-fn read(path: &Path) -> Result<Recording, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|error| error.to_string())?;
-    let schema = builder.schema().clone();
-    let batches =
-        builder.build().and_then(|reader| Ok(reader.collect::<Result<Vec<_>, _>>()?)).map_err(|error| error.to_string())?;
-    let batch = arrow::compute::concat_batches(&schema, &batches).map_err(|error| error.to_string())?;
-    let mut frame = FrameBuilder::new(Recording::KIND);
-    for (field, column) in schema.fields().iter().zip(batch.columns()) {
-        frame.push(field.name(), column.clone());
-    }
-    let named = |error: Error| match error {
-        Error::Bug(message) => message,
-        other => other.to_string(),
-    };
-    Recording::from_frame(&frame.finish().map_err(named)?).map_err(named)
 }

@@ -1,6 +1,7 @@
 //! What the proposed poses promise, as a short table and as JSON.
 
 use super::{PosesArguments, Work, output};
+use crate::error::counted;
 use crate::estimate::choose::{Score, median};
 use serde_json::json;
 
@@ -30,9 +31,10 @@ pub(super) fn text(work: &Work) -> String {
     let proposal = &work.proposal;
     let asked = work.parameters.len();
     let mut text = format!(
-        "{} poses for {} of {asked} parameters that position data can tell ({})\n",
-        proposal.poses.rows(),
+        "{} for {} of {} that position data can tell ({})\n",
+        counted(proposal.poses.rows(), "pose"),
         proposal.sight.free().len(),
+        counted(asked, "parameter"),
         work.effects.join(", ")
     );
     for (effect, reason) in &work.left_out {

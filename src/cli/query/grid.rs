@@ -1,6 +1,7 @@
 //! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
 
 use crate::audit::{Answer, Value};
+use crate::error::counted;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Significant digits of the largest number of a column.
@@ -27,7 +28,10 @@ pub(super) fn grid(answer: &Answer, rows: usize, width: Option<usize>) -> String
     let columns = answer.names().zip(answer.columns(shown)).map(|(name, values)| drawn(name, &values)).collect();
     let mut text = draw(columns, shown, width);
     if answer.rows() > shown {
-        text.push_str(&format!("{} more rows: --rows N shows N of them, --csv and --json all\n", answer.rows() - shown));
+        text.push_str(&format!(
+            "{}: --rows N shows N of them, --csv and --json all\n",
+            counted(answer.rows() - shown, "more row")
+        ));
     } else if answer.rows() == 0 {
         text.push_str("no rows\n");
     }

@@ -2,12 +2,13 @@
 
 use crate::audit::{Answer, Value};
 use crate::error::{Error, Result};
+use std::borrow::Cow;
 use std::fmt::Display;
 
 /// A header, then the rows; null is an empty cell.
 pub(super) fn csv(answer: &Answer) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(answer.names()).map_err(bug)?;
+    writer.write_record(answer.names().map(|name| inert(Cow::Borrowed(name)))).map_err(bug)?;
     for row in 0..answer.rows() {
         let cells = answer.row(row).map(|value| match value {
             Value::Null => String::new(),
@@ -15,11 +16,17 @@ pub(super) fn csv(answer: &Answer) -> Result<String> {
             Value::Integer(number) => number.to_string(),
             // As short as it can be and still be the same number: 1e-7, not 0.0000001.
             Value::Number(number) => format!("{number:?}"),
-            Value::Text(text) => text.into_owned(),
+            Value::Text(text) => inert(text),
         });
         writer.write_record(cells).map_err(bug)?;
     }
     String::from_utf8(writer.into_inner().map_err(bug)?).map_err(bug)
+}
+
+/// A text that a spreadsheet would run as a formula gets a quote in front, as spreadsheets mark a text.
+fn inert(text: Cow<str>) -> String {
+    let runs = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    if runs { format!("'{text}") } else { text.into_owned() }
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.

@@ -2,7 +2,7 @@
 
 use crate::audit::{QueryColumn, QueryTable};
 use crate::cli::{emit, emit_json};
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::store::Store;
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ fn text(store: &Store, kind: &str, tables: &[&QueryTable]) -> Result<String> {
     let mut columns: Vec<QueryColumn> = Vec::new();
     for table in tables {
         let short = table.short.as_ref().map_or_else(String::new, |short| format!(", also `{short}`"));
-        text.push_str(&format!("  {:width$}  {} rows{short}\n", table.name, table.table.rows));
+        text.push_str(&format!("  {:width$}  {}{short}\n", table.name, counted(table.table.rows, "row")));
         for column in table.columns(store)? {
             if columns.iter().all(|known| known.name != column.name) {
                 columns.push(column);

@@ -3,7 +3,7 @@
 use super::super::surroundings::cores;
 use super::super::{emit, emit_json};
 use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::estimate::threads::in_order;
 use crate::twin::conceal::case::Case;
 use crate::twin::conceal::design::{Content, Design};
@@ -83,7 +83,13 @@ pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
     if arguments.json {
         return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
     }
-    emit(&format!("{} recordings, {points} points: {}\nseal: {}\n", design.cases, recordings.display(), seal.display()))
+    emit(&format!(
+        "{}, {}: {}\nseal: {}\n",
+        counted(design.cases, "recording"),
+        counted(points, "point"),
+        recordings.display(),
+        seal.display()
+    ))
 }
 
 /// Writes the recordings, their truths and the seal; gives the number of points.

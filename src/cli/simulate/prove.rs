@@ -4,7 +4,7 @@ use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
 use super::reveal;
 use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
 use clap::Args;
 use std::io::Write;
@@ -65,7 +65,7 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     if arguments.conceal.json {
         return emit_json(&board.document());
     }
-    emit(&format!("the seal holds: {} files are as they were\n{}", sealed.len(), board.text()))
+    emit(&format!("the seal holds: {}, all as they were\n{}", counted(sealed.len(), "file"), board.text()))
 }
 
 /// The case that a sealed truth is of.

@@ -3,8 +3,8 @@
 use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
 use super::conceal::vacant;
-use crate::error::{Error, Result};
-use crate::pipeline::{Outcome, Override, Plan, RunOptions, Selection, run};
+use crate::error::{Error, Result, counted};
+use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::stage::{STAGES, Simulate, Stage};
 use crate::store::Store;
@@ -60,7 +60,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let store = open_store(arguments.store.as_deref())?;
     let verbosity = if arguments.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
-    let options = RunOptions { selection: Selection::default(), jobs: cores() };
+    let options = RunOptions { selection: Selection::default(), jobs: cores(), purpose: Purpose::Simulate };
     let result = run(&plan, &store, &options, &surroundings(command_line), &progress);
     progress.finish();
     let outcome = result?;
@@ -88,7 +88,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     if arguments.json {
         return emit_json(&json!({ "folder": arguments.out, "points": rows, "true_numbers": truth.0.len() }));
     }
-    emit(&format!("{rows} points, {} true numbers: {}\n", truth.0.len(), arguments.out.display()))
+    emit(&format!("{}, {}: {}\n", counted(rows, "point"), counted(truth.0.len(), "true number"), arguments.out.display()))
 }
 
 fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {

@@ -2,7 +2,8 @@
 
 use super::super::{emit, emit_json};
 use super::seal::{SEALED, Seal};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
+use crate::raw;
 use crate::table::{Scoreboard, ScoreboardRow, Table};
 use crate::twin::reveal::board::Board;
 use crate::twin::reveal::mark::{Case, mark};
@@ -44,7 +45,7 @@ pub(super) fn main(arguments: &RevealArguments) -> Result<()> {
     if arguments.json {
         return emit_json(&board.document());
     }
-    emit(&format!("the seal holds: {} files are as they were\n{}", sealed.len(), board.text()))
+    emit(&format!("the seal holds: {}, all as they were\n{}", counted(sealed.len(), "file"), board.text()))
 }
 
 /// All sealed cases of the set, marked; `files` are the paths that the seal holds.
@@ -62,7 +63,7 @@ pub(super) fn board(folder: &Path, files: &[String], verdicts: &Path) -> Result<
 }
 
 fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
-    let text = std::fs::read_to_string(path).map_err(|error| error.to_string())?;
+    let text = raw::text(path).map_err(|error| error.to_string())?;
     serde_json::from_str(&text).map_err(|error| error.to_string())
 }
 

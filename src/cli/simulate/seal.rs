@@ -1,6 +1,7 @@
 //! The seal of a set of concealed recordings: `seal.json` holds the SHA-256 of every file of it, as `sha256sum` prints them.
 
 use crate::error::{Error, Fault, Result};
+use crate::raw;
 use crate::twin::conceal::design::Design;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -55,7 +56,7 @@ impl Seal {
     pub(super) fn read(folder: &Path) -> Result<Seal> {
         let path = folder.join(SEAL);
         let place = path.display().to_string();
-        let text = fs::read_to_string(&path).map_err(|error| Error::data(&place, error.to_string()))?;
+        let text = raw::text(&path).map_err(|error| Error::data(&place, error.to_string()))?;
         let seal: Seal = serde_json::from_str(&text).map_err(|error| Error::data(&place, error.to_string()))?;
         if seal.calib_seal != FORMAT || seal.hash != HASH {
             return Err(Error::data(place, format!("is no seal of format {FORMAT} with {HASH}")));
@@ -71,7 +72,7 @@ impl Seal {
         for (name, hash) in &seal.files {
             // A seal comes from a file: it may not lead out of its folder.
             let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-            match if inside { fs::read(folder.join(name)) } else { Err(ErrorKind::InvalidFilename.into()) } {
+            match if inside { raw::bytes(&folder.join(name)) } else { Err(ErrorKind::InvalidFilename.into()) } {
                 Ok(bytes) if digest(&bytes) == *hash => (),
                 Ok(_) => faults.push(Fault::new(name, "was changed since it was sealed")),
                 Err(error) => faults.push(Fault::new(name, format!("was sealed, but cannot be read: {error}"))),

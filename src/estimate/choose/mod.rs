@@ -16,6 +16,7 @@ pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
 
 use super::model::Model;
 use crate::robot::{Measurements, Named};
+use crate::statistics::nearest;
 use exchange::{Criterion, Term};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -228,6 +229,5 @@ fn random_sets(drawn: &Measurements, count: usize, seed: u64) -> Vec<Vec<usize>>
 
 /// The middle value, NaN of none.
 pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    nearest(&mut values, 0.5).unwrap_or(f64::NAN)
 }

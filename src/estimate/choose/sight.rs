@@ -1,12 +1,12 @@
 //! What poses would tell: the seen parameters, rows of their whitened Jacobian, and what would follow for the estimate.
 
-use super::median;
 use crate::estimate::factor::{Factor, Tall};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::piece::Unmodelled;
 use crate::estimate::problem::Problem;
 use crate::robot::Measurements;
+use crate::statistics::nearest;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::Vector3;
@@ -132,9 +132,8 @@ impl Sight {
         }
         let length = |(squares, sigma): (&[f64], &Vector3<f64>)| norm((0..3).map(|axis| squares[axis].sqrt() * sigma[axis]));
         let mut lengths: Vec<f64> = squares.chunks_exact(3).zip(&workspace.sigma).map(length).collect();
-        lengths.sort_by(f64::total_cmp);
-        let at = |share: f64| lengths.get((share * (lengths.len() - 1) as f64).round() as usize).copied().unwrap_or(f64::NAN);
-        Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: median(lengths) }
+        let mut at = |share: f64| nearest(&mut lengths, share).unwrap_or(f64::NAN);
+        Score { points, o1, sigma: sigma.collect(), p95: at(0.95), max: at(1.0), median: at(0.5) }
     }
 
     /// Of [`Self::rows`]: the log determinant of what is left of the last `count` parameters when all others were fitted, and their

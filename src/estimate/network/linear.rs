@@ -6,7 +6,7 @@
 
 use super::arm::Arm;
 use super::basis::{Basis, Term};
-use super::training::Samples;
+use super::samples::Samples;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{DenseSolveCore, Llt};
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;

@@ -17,6 +17,7 @@ pub mod perceptron;
 pub mod process;
 pub mod region;
 pub mod rivals;
+pub mod samples;
 pub mod training;
 
 pub use activation::Activation;
@@ -24,4 +25,5 @@ pub use arm::Arm;
 pub use correction::{Applied, Body, Correction, Feature, Map};
 pub use perceptron::{OUTPUTS, Shape};
 pub use rivals::{Judged, Rival, compare};
-pub use training::{Course, Phase, Recipe, Samples, Start, train};
+pub use samples::Samples;
+pub use training::{Course, Phase, Recipe, Start, train};

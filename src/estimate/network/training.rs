@@ -9,6 +9,7 @@ use super::descent::{Iteration, descend};
 use super::loss::{Batch, Loss, Scratch};
 use super::perceptron::{OUTPUTS, Shape};
 use super::region::Region;
+use super::samples::Samples;
 use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation};
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
@@ -32,25 +33,6 @@ impl Start {
         match self {
             Self::Random => "random",
             Self::Swarm(algorithm) => algorithm.name(),
-        }
-    }
-}
-
-/// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
-#[derive(Debug, Clone, Default)]
-pub struct Samples {
-    pub sources: Vec<Vec<f64>>,
-    pub residual: Vec<[f64; OUTPUTS]>,
-}
-
-impl Samples {
-    pub fn rows(&self) -> usize {
-        self.residual.len()
-    }
-    pub fn pick(&self, rows: &[usize]) -> Self {
-        Self {
-            sources: rows.iter().map(|r| self.sources[*r].clone()).collect(),
-            residual: rows.iter().map(|r| self.residual[*r]).collect(),
         }
     }
 }

@@ -14,6 +14,7 @@ use super::fit::{Fate, FitOptions, Fitted, fit};
 use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
+use crate::statistics::{MEDIAN_CHI2, nearest};
 use distance::{Standing, leave_one_out};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -53,8 +54,6 @@ pub struct Screening {
     pub apart: Option<i64>,
 }
 
-/// Median of the squared length of three unit normals.
-const MEDIAN_CHI2_3: f64 = 2.366;
 /// Beyond this many standard deviations a row is out whatever the tails: Student's t with 3 degrees of freedom gets there
 /// four times in 10,000 rows.
 const GROSS: f64 = 20.0;
@@ -183,7 +182,7 @@ fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
     for number in sets {
         let mut distances: Vec<f64> =
             standings.iter().zip(set).filter(|(_, of)| **of == number).map(|(standing, _)| standing.distance).collect();
-        let spread = (quantile(&mut distances, 0.5) / MEDIAN_CHI2_3.sqrt()).max(1.0);
+        let spread = (nearest(&mut distances, 0.5).unwrap_or(0.0) / MEDIAN_CHI2[3].sqrt()).max(1.0);
         for (standing, _) in standings.iter_mut().zip(set).filter(|(_, of)| **of == number) {
             standing.distance /= spread;
             standing.sigma *= spread;
@@ -193,20 +192,12 @@ fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
 
 /// Where far outside the bulk begins.
 fn limit(standings: &[Standing]) -> f64 {
-    (FAR * quantile(&mut bulk(standings), BULK)).min(GROSS)
+    (FAR * nearest(&mut bulk(standings), BULK).unwrap_or(0.0)).min(GROSS)
 }
 
 /// Distances of the rows that are not gross.
 fn bulk(standings: &[Standing]) -> Vec<f64> {
     standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
-}
-
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let place = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
 }
 
 /// Sets with more unexplained rows than mistakes would make.

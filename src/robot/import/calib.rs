@@ -4,6 +4,7 @@ use super::dh::{self, Convention};
 use super::place::{Faults, Place};
 use super::{Chain, Imported, Text, screws, urdf};
 use crate::error::Result;
+use crate::robot::Bound;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::{Quantity, Unit};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -13,8 +14,6 @@ const FORMAT: f64 = 1.0;
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 // m/s2; no robot works where gravity is outside (zero, for "none", is allowed): it catches mm/s2 and g.
 const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
-// rad; ten turns: more is an angle in degrees.
-const MOST_TRAVEL: f64 = 63.0;
 const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
 
 #[derive(Clone, Copy)]
@@ -120,6 +119,7 @@ fn describe(root: &Place, chain: Chain, units: Units) -> RobotDescription {
             drive(joint, value, units);
         }
     }
+    distinct(root, &joints);
     if let Some(list) = root.get("links").given() {
         for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
             if value.given().is_some() {
@@ -151,7 +151,7 @@ fn tool(value: Place, chain: &Chain, units: Units) -> Isometry3<f64> {
         return chain.tip;
     }
     let value = value.map(&["point", "orientation"]);
-    let point = Vector3::from(value.get("point").vector::<3>()).map(|x| units.length.to_si(x));
+    let point = Vector3::from(value.get("point").sized_vector::<3>(Bound::Length, units.length));
     let orientation = value.get("orientation").given().map_or_else(UnitQuaternion::identity, |o| orientation(o, units.angle));
     chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
 }
@@ -160,7 +160,7 @@ fn orientation(value: &Place, angle: Unit) -> UnitQuaternion<f64> {
     let value = value.clone().map(&["rpy", "quaternion"]);
     match (value.get("rpy").given(), value.get("quaternion").given()) {
         (Some(rpy), None) => {
-            let [roll, pitch, yaw] = rpy.vector().map(|x| angle.to_si(x));
+            let [roll, pitch, yaw] = rpy.sized_vector(Bound::Angle, angle);
             UnitQuaternion::from_euler_angles(roll, pitch, yaw)
         }
         (None, Some(quaternion)) => {
@@ -196,15 +196,17 @@ fn drive(joint: &mut JointDescription, value: Place, units: Units) {
         let [lower, upper] = travel.map(|x| unit.to_si(x));
         if lower >= upper {
             limits.fault(format!("expected [lower, upper] with lower < upper, found [{}, {}]", travel[0], travel[1]));
-        } else if joint.kind == JointKind::Revolute && lower.abs().max(upper.abs()) > MOST_TRAVEL {
-            limits.fault(format!("[{}, {}] {unit} is more than ten turns; is it in another unit?", travel[0], travel[1]));
+        } else {
+            let bound = if joint.kind == JointKind::Revolute { Bound::Angle } else { Bound::Length };
+            let beyond = [lower, upper].into_iter().find_map(|end| bound.fault(end));
+            beyond.into_iter().for_each(|message| limits.fault(message));
         }
         joint.limits = Some([lower, upper]);
     }
     let nonzero = |key: &str| {
         let value = value.get(key);
         value.given().map(|value| {
-            let number = value.number();
+            let number = value.sized(Bound::Factor, Unit::One);
             if number == 0.0 {
                 value.fault("expected a number other than 0");
             }
@@ -215,9 +217,23 @@ fn drive(joint: &mut JointDescription, value: Place, units: Units) {
     joint.motor_constant = nonzero("motor_constant");
 }
 
+/// Columns of targets and recordings name joints: a name stands for one.
+fn distinct(root: &Place, joints: &[JointDescription]) {
+    for (k, joint) in joints.iter().enumerate() {
+        if let Some(other) = joints[..k].iter().position(|other| other.name == joint.name) {
+            let places = root.get("joints").given().map_or_else(Vec::new, Place::items);
+            let own = |k: usize| places.get(k).map(|value| value.get("name")).filter(|name| name.given().is_some());
+            // A name that was not given is `J` and the joint's number: the other one has taken it.
+            let (at, other) = own(k).map_or_else(|| (own(other), k), |at| (Some(at), other));
+            let message = format!("joint {} is called `{}` too; expected a name of its own", other + 1, joint.name);
+            at.unwrap_or_else(|| root.clone()).fault(message);
+        }
+    }
+}
+
 fn link(value: Place, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
     let value = value.map(&["mass", "centre", "frame"]);
-    let centre = Point3::from(value.get("centre").vector::<3>()).map(|x| units.length.to_si(x));
+    let centre = Point3::from(value.get("centre").sized_vector::<3>(Bound::Length, units.length));
     let of_link = value.get("frame");
     let in_link = of_link.given().and_then(|f| f.choice(&[("base", false), ("link", true)])).unwrap_or(false);
     let centre = match frame {
@@ -235,7 +251,7 @@ fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
     let mut couplings: Vec<Coupling> = Vec::new();
     for value in list.items() {
         let value = value.map(&["moved", "by", "ratio"]);
-        let ratio = value.get("ratio").given().map_or(0.0, Place::number);
+        let ratio = value.get("ratio").given().map_or(0.0, |ratio| ratio.sized(Bound::Factor, Unit::One));
         if let (Some(moved), Some(by)) = (value.get("moved").joint(joints), value.get("by").joint(joints)) {
             if moved == by {
                 value.fault("a joint cannot move itself; expected two different joints");
@@ -257,8 +273,8 @@ fn payload(value: Place, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f6
         return (0.0, point);
     }
     let value = value.map(&["mass", "offset", "frame"]);
-    let offset = value.get("offset").given().map_or([0.0; 3], |offset| offset.vector());
-    let offset = Vector3::from(offset).map(|x| units.length.to_si(x));
+    let offset = value.get("offset").given().map_or([0.0; 3], |offset| offset.sized_vector(Bound::Length, units.length));
+    let offset = Vector3::from(offset);
     let in_tool = value.get("frame").given().and_then(|f| f.choice(&[("base", false), ("tool", true)])).unwrap_or(false);
     (value.get("mass").not_negative(), point + if in_tool { tool.rotation * offset } else { offset })
 }

@@ -4,6 +4,7 @@ use super::place::{Faults, Place};
 use super::screws::direction;
 use super::{Imported, Text};
 use crate::error::Result;
+use crate::robot::Bound;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::Unit;
 use nalgebra::{Point3, Vector3};
@@ -21,7 +22,7 @@ pub(super) fn read(file: Text) -> Result<Imported> {
     let points = root.get("points").per_joint(n);
     let per_joint = |key: &str| root.get(key).given().map(|list| list.per_joint(n)).unwrap_or_default();
     let (masses, centres, ratios, constants) = (per_joint("mass"), per_joint("com"), per_joint("ratio"), per_joint("kt"));
-    let number = |list: &[Place], i: usize| list.get(i).and_then(Place::given).map(Place::number);
+    let number = |list: &[Place], i: usize| list.get(i).and_then(Place::given).map(|value| value.sized(Bound::Factor, Unit::One));
     let joints = (axes.iter().enumerate())
         .map(|(i, axis)| JointDescription {
             name: format!("J{}", i + 1),
@@ -54,7 +55,7 @@ pub(super) fn read(file: Text) -> Result<Imported> {
 }
 
 fn metres(value: &Place) -> Point3<f64> {
-    Point3::from(value.vector()).map(|x| Unit::Millimetre.to_si(x))
+    Point3::from(value.sized_vector(Bound::Length, Unit::Millimetre))
 }
 
 /// Pairs (moved, by) of joints from 0. The layout states no ratio: the controller is taken to add none.

@@ -5,6 +5,7 @@
 
 use super::place::Place;
 use super::{Chain, ChainJoint};
+use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use crate::units::Unit;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -31,12 +32,13 @@ pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Un
             Some(JointKind::Prismatic) => "d",
             None => "",
         };
-        let number = |key: &str| {
+        let number = |key: &str, bound: Bound, unit: Unit| {
             let value = row.get(key);
-            if key == moved && value.given().is_none() { 0.0 } else { value.number() }
+            if key == moved && value.given().is_none() { 0.0 } else { value.sized(bound, unit) }
         };
-        let about_z = rotation(Vector3::z(), angle.to_si(number("theta"))) * shift(0.0, length.to_si(number("d")));
-        let about_x = rotation(Vector3::x(), angle.to_si(number("alpha"))) * shift(length.to_si(number("a")), 0.0);
+        let (turn, along) = (|key: &str| number(key, Bound::Angle, angle), |key: &str| number(key, Bound::Length, length));
+        let about_z = rotation(Vector3::z(), turn("theta")) * shift(0.0, along("d"));
+        let about_x = rotation(Vector3::x(), turn("alpha")) * shift(along("a"), 0.0);
         let at_joint = if convention == Convention::Standard { frame } else { frame * about_x };
         frame = match convention {
             Convention::Standard => frame * about_z * about_x,

@@ -5,6 +5,8 @@
 
 use super::Text;
 use crate::error::{Error, Fault, Result};
+use crate::robot::Bound;
+use crate::units::Unit;
 use crate::yaml::{self, Mark, Node, Trouble, Value, join};
 use std::cell::RefCell;
 
@@ -149,21 +151,36 @@ impl<'a> Place<'a> {
             }
         }
     }
+    /// A number in SI, of a size that a robot's can have.
+    pub fn sized(&self, bound: Bound, unit: Unit) -> f64 {
+        let value = unit.to_si(self.number());
+        if let Some(message) = bound.fault(value) {
+            self.fault(message);
+        }
+        value
+    }
     /// A mass, kg.
     pub fn not_negative(&self) -> f64 {
-        let number = self.number();
+        let number = self.sized(Bound::Mass, Unit::Kilogram);
         if number < 0.0 {
             self.fault(format!("expected a mass in kg, not less than 0, found {number}"));
         }
         number
     }
     pub fn vector<const N: usize>(&self) -> [f64; N] {
+        self.numbers(Self::number)
+    }
+    /// Numbers in SI, of sizes that a robot's can have.
+    pub fn sized_vector<const N: usize>(&self, bound: Bound, unit: Unit) -> [f64; N] {
+        self.numbers(|item| item.sized(bound, unit))
+    }
+    fn numbers<const N: usize>(&self, number: impl Fn(&Self) -> f64) -> [f64; N] {
         if let Some(Value::List(items)) = self.value()
             && items.len() == N
         {
             let mut vector = [f64::NAN; N];
             for (slot, item) in vector.iter_mut().zip(self.items()) {
-                *slot = item.number();
+                *slot = number(&item);
             }
             return vector;
         }

@@ -2,6 +2,7 @@
 
 use super::place::Place;
 use super::{Chain, ChainJoint};
+use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use crate::units::Unit;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -24,7 +25,7 @@ fn joint(screw: Place, length: Unit) -> ChainJoint {
             if screw.get("axis").given().is_some() || screw.get("point").given().is_some() {
                 screw.fault("has both `twist` and `axis`/`point`; expected one of the two forms");
             }
-            let (of_twist, axis, point) = from_twist(twist);
+            let (of_twist, axis, point) = from_twist(twist, length);
             if kind.is_some_and(|kind| kind != of_twist) {
                 twist.fault("contradicts `kind`: a revolute twist (v; w) has w other than 0, a prismatic one has w = 0");
             }
@@ -34,27 +35,35 @@ fn joint(screw: Place, length: Unit) -> ChainJoint {
             let kind = kind.unwrap_or(JointKind::Revolute);
             let point = screw.get("point");
             // The place of a prismatic axis changes nothing.
-            let point = if kind == JointKind::Prismatic && point.given().is_none() { [0.0; 3] } else { point.vector() };
+            let unread = kind == JointKind::Prismatic && point.given().is_none();
+            let point = if unread { [0.0; 3] } else { point.sized_vector(Bound::Length, length) };
             (kind, direction(&screw.get("axis")), Point3::from(point))
         }
     };
-    let point = point.map(|x| length.to_si(x));
     ChainJoint { name: None, kind, axis, point, limits: None, frame: None, body: None }
 }
 
 /// A direction of any length but zero, as a unit vector.
 pub(super) fn direction(value: &Place) -> Vector3<f64> {
-    let vector = Vector3::from(value.vector::<3>());
-    if vector.norm() < SMALL {
+    unit(Vector3::from(value.vector::<3>())).unwrap_or_else(|| {
         value.fault("has no direction: its length is zero");
-        return Vector3::repeat(f64::NAN);
-    }
-    vector.normalize()
+        Vector3::repeat(f64::NAN)
+    })
 }
 
-/// Kind, unit axis and the point of the axis nearest to the origin, in the file's length unit.
-fn from_twist(value: &Place) -> (JointKind, Vector3<f64>, Point3<f64>) {
-    let twist = value.vector::<6>();
+/// The vector with the length 1, also where the square of its length is beyond any number; none of no direction.
+pub(super) fn unit(vector: Vector3<f64>) -> Option<Vector3<f64>> {
+    // Not a number is not zero: its fault was noted when it was read.
+    if vector.iter().any(|x| x.is_nan()) {
+        return Some(vector);
+    }
+    let size = vector.amax();
+    if size < SMALL { None } else { Some((vector / size).normalize()) }
+}
+
+/// Kind, unit axis and the point of the axis nearest to the origin, m.
+fn from_twist(value: &Place, length: Unit) -> (JointKind, Vector3<f64>, Point3<f64>) {
+    let twist = value.sized_vector::<6>(Bound::Factor, Unit::One);
     let (v, w) = (Vector3::new(twist[0], twist[1], twist[2]), Vector3::new(twist[3], twist[4], twist[5]));
     if w.norm() < SMALL {
         if v.norm() < SMALL {
@@ -66,5 +75,9 @@ fn from_twist(value: &Place) -> (JointKind, Vector3<f64>, Point3<f64>) {
     if pitch.abs() > SMALL * (1.0 + v.norm() / w.norm()) {
         value.fault(format!("moves {pitch} along its axis per rad; expected a pure rotation, v perpendicular to w, or w = 0"));
     }
-    (JointKind::Revolute, w.normalize(), Point3::from(w.cross(&v) / w.norm_squared()))
+    let point = Point3::from(w.cross(&v) / w.norm_squared()).map(|x| length.to_si(x));
+    if let Some(message) = point.iter().find_map(|x| Bound::Length.fault(*x)) {
+        value.fault(format!("its axis is away from the base: {message}"));
+    }
+    (JointKind::Revolute, w.normalize(), point)
 }

@@ -2,15 +2,14 @@
 //! `origin` from the parent link's frame, its `axis` in its own. What hangs rigidly on a moved link adds to that link's mass;
 //! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
 
+use super::screws::unit;
 use super::{Chain, ChainJoint, Text};
 use crate::error::{Error, Fault, Result, nearest};
+use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
-use std::collections::BTreeMap;
-
-// A direction shorter than this carries no direction.
-const SMALL: f64 = 1e-9;
+use std::collections::{BTreeMap, BTreeSet};
 
 struct Joint<'a> {
     node: Node<'a, 'a>,
@@ -79,8 +78,12 @@ impl<'a> Reader<'a> {
     /// Every joint of the file, by the link it moves.
     fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, Joint<'a>>> {
         let mut joints = BTreeMap::new();
+        let mut names = BTreeSet::new();
         for node in root.children().filter(|node| node.has_tag_name("joint")) {
             let name = self.attribute(node, "name")?;
+            if !names.insert(name) {
+                self.fault(node, format!("joint `{name}` is there twice"));
+            }
             let parent = self.child(node, "parent").and_then(|end| self.attribute(end, "link"))?;
             let child = self.child(node, "child").and_then(|end| self.attribute(end, "link"))?;
             for end in [parent, child] {
@@ -141,16 +144,17 @@ impl<'a> Reader<'a> {
             let Some(kind) = self.kind(joint) else { continue };
             let axis = match joint.node.children().find(|node| node.has_tag_name("axis")) {
                 None => Vector3::x(),
-                Some(node) => Vector3::from(self.numbers(node, "xyz", [1.0, 0.0, 0.0])),
+                Some(node) => Vector3::from(self.numbers(node, "xyz", [1.0, 0.0, 0.0], None)),
             };
-            if axis.norm() < SMALL {
+            let axis = unit(axis).unwrap_or_else(|| {
                 self.fault(joint.node, format!("joint `{}`: the axis has no direction, its length is zero", joint.name));
-            }
+                Vector3::x()
+            });
             let body = self.body(joints, links, path, joint.child, frame);
             chain.push(ChainJoint {
                 name: Some(joint.name.into()),
                 kind,
-                axis: frame * axis.normalize(),
+                axis: frame * axis,
                 point: frame * Point3::origin(),
                 limits: self.limits(joint),
                 frame: Some(frame),
@@ -185,8 +189,9 @@ impl<'a> Reader<'a> {
         if joint.node.attribute("type") == Some("continuous") || !node.has_attribute("lower") && !node.has_attribute("upper") {
             return None;
         }
-        let [lower] = self.numbers(node, "lower", [0.0]);
-        let [upper] = self.numbers(node, "upper", [0.0]);
+        let bound = if joint.node.attribute("type") == Some("prismatic") { Bound::Length } else { Bound::Angle };
+        let [lower] = self.numbers(node, "lower", [0.0], Some(bound));
+        let [upper] = self.numbers(node, "upper", [0.0], Some(bound));
         if lower > upper {
             self.fault(node, format!("joint `{}`: expected lower <= upper, found {lower} and {upper}", joint.name));
         }
@@ -209,7 +214,7 @@ impl<'a> Reader<'a> {
             if let Some(inertial) = links[link].children().find(|node| node.has_tag_name("inertial")) {
                 let centre = frame * self.origin(inertial) * Point3::origin();
                 let own = match self.child(inertial, "mass") {
-                    Some(node) => self.numbers(node, "value", [f64::NAN])[0],
+                    Some(node) => self.numbers(node, "value", [f64::NAN], Some(Bound::Mass))[0],
                     None => f64::NAN,
                 };
                 if own < 0.0 {
@@ -246,13 +251,13 @@ impl<'a> Reader<'a> {
 
     fn origin(&mut self, node: Node<'a, 'a>) -> Isometry3<f64> {
         let Some(origin) = node.children().find(|child| child.has_tag_name("origin")) else { return Isometry3::identity() };
-        let [roll, pitch, yaw] = self.numbers(origin, "rpy", [0.0; 3]);
-        let shift = Vector3::from(self.numbers(origin, "xyz", [0.0; 3]));
+        let [roll, pitch, yaw] = self.numbers(origin, "rpy", [0.0; 3], Some(Bound::Angle));
+        let shift = Vector3::from(self.numbers(origin, "xyz", [0.0; 3], Some(Bound::Length)));
         Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
     }
 
     /// The numbers of an attribute, or `fallback` where the attribute is missing (NaN there: it may not be).
-    fn numbers<const N: usize>(&mut self, node: Node<'a, 'a>, name: &str, fallback: [f64; N]) -> [f64; N] {
+    fn numbers<const N: usize>(&mut self, node: Node<'a, 'a>, name: &str, fallback: [f64; N], bound: Option<Bound>) -> [f64; N] {
         let Some(text) = node.attribute(name) else {
             if fallback.iter().any(|x| x.is_nan()) {
                 self.attribute(node, name);
@@ -261,6 +266,10 @@ impl<'a> Reader<'a> {
         };
         let numbers: Option<Vec<f64>> =
             text.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let beyond = numbers.iter().flatten().find_map(|number| bound?.fault(*number));
+        if let Some(message) = beyond {
+            self.fault(node, format!("<{} {name}>: {message}", node.tag_name().name()));
+        }
         numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok()).unwrap_or_else(|| {
             let what = if N == 1 { "a finite number".into() } else { format!("{N} finite numbers") };
             self.fault(node, format!("<{} {name}>: expected {what}, found `{text}`", node.tag_name().name()));

@@ -1,7 +1,7 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::Arm;
-use super::layout::{ColumnRef, FileLayout};
+use super::layout::{ColumnRef, FileLayout, ScalarColumn};
 use super::orientation::Convention;
 use super::slot::{PerJoint, Slot};
 use crate::error::{Error, Fault, Result, nearest};
@@ -42,6 +42,16 @@ pub(super) struct Cell {
     pub unit: Unit,
     pub optional: bool,
     /// The column, as people call it: `x_mm`, or `column 4`.
+    pub name: String,
+    /// What is added to it.
+    pub difference: Option<Difference>,
+}
+
+/// A column whose numbers are added to those of another, times the sign.
+pub(super) struct Difference {
+    pub column: usize,
+    pub sign: f64,
+    pub unit: Unit,
     pub name: String,
 }
 
@@ -107,8 +117,9 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
         } else if let Some(reference) = &scalar.column
             && let Some(column) = binder.column(reference, name, scalar.optional)
         {
+            let difference = binder.difference(scalar, name)?;
             let name = binder.name(column);
-            binder.binding.cells.push(Cell { slot, index, column, unit, optional: scalar.optional, name });
+            binder.binding.cells.push(Cell { slot, index, column, unit, optional: scalar.optional, name, difference });
         }
     }
     if let Some(orientation) = &columns.orientation
@@ -120,7 +131,8 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
             if let Some(column) = binder.column(reference, "orientation", false) {
                 let (slot, name) = (Slot::Turn(number), binder.name(column));
                 let index = slot.index(arm.joints());
-                binder.binding.cells.push(Cell { slot, index, column, unit, optional: orientation.optional, name });
+                let optional = orientation.optional;
+                binder.binding.cells.push(Cell { slot, index, column, unit, optional, name, difference: None });
             }
         }
     }
@@ -182,6 +194,12 @@ impl Binder<'_> {
             }
         }
         None
+    }
+    fn difference(&mut self, scalar: &ScalarColumn, quantity: &str) -> Result<Option<Difference>> {
+        let Some((reference, sign)) = scalar.difference() else { return Ok(None) };
+        let unit = unit(scalar.difference_unit.as_deref().or(scalar.unit.as_deref()))?;
+        let column = self.column(reference, quantity, false);
+        Ok(column.map(|column| Difference { column, sign, unit, name: self.name(column) }))
     }
     fn hint(&self, reference: &ColumnRef) -> String {
         match (reference, &self.head.names) {
@@ -249,9 +267,8 @@ impl Binder<'_> {
             let unit = unit(symbol.as_deref())?;
             if let Some(column) = self.column(reference, name, false) {
                 let slot = slot(joint);
-                let cell =
-                    Cell { slot, index: slot.index(count), column, unit, optional: joints.optional, name: self.name(column) };
-                self.binding.cells.push(cell);
+                let (index, optional, name) = (slot.index(count), joints.optional, self.name(column));
+                self.binding.cells.push(Cell { slot, index, column, unit, optional, name, difference: None });
             }
         }
         Ok(())

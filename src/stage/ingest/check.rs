@@ -44,6 +44,13 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     if file.comment.as_deref() == Some("") {
         faults.push(Fault::new(format!("{place}.comment"), "an empty text; every line would be a comment"));
     }
+    if file.header_in_comment && (file.comment.is_none() || !file.header) {
+        let message = match file.header {
+            true => "say how a comment begins, e.g. `comment: \"//\"`",
+            false => "there is no header",
+        };
+        faults.push(Fault::new(format!("{place}.header_in_comment"), message));
+    }
     if !file.header && file.skip_below_header > 0 {
         faults.push(Fault::new(format!("{place}.skip_below_header"), "there is no header; use `skip`"));
     }
@@ -120,6 +127,31 @@ fn scalar_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, p
     unit(scalar.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
     if scalar.value.is_some_and(|value| !value.is_finite()) {
         faults.push(Fault::new(format!("{place}.value"), "not a finite number"));
+    }
+    difference_faults(scalar, quantity, file, place, faults);
+}
+
+fn difference_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    let Some((other, sign)) = scalar.difference() else {
+        if scalar.difference_unit.is_some() {
+            faults.push(Fault::new(format!("{place}.difference_unit"), "there is no `minus` or `plus`"));
+        }
+        return;
+    };
+    let name = if sign < 0.0 { "minus" } else { "plus" };
+    if quantity != Quantity::Length {
+        faults.push(Fault::new(place, "`minus` and `plus` are for lengths, e.g. x, y, z"));
+        return;
+    }
+    if scalar.minus.is_some() && scalar.plus.is_some() {
+        faults.push(Fault::new(place, "`minus` and `plus` at once; say one of them"));
+    }
+    if scalar.column.is_none() {
+        faults.push(Fault::new(place, format!("`{name}` goes with `column`: the target that the difference is taken from")));
+    }
+    column(Some(other), file, &format!("{place}.{name}"), faults);
+    if let Some(symbol) = &scalar.difference_unit {
+        unit(Some(symbol), quantity, &format!("{place}.difference_unit"), faults);
     }
 }
 

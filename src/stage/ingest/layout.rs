@@ -15,8 +15,8 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
-    /// Path of the file: UTF-8 text (with or without a byte-order mark), rows ending in LF or CRLF; or a flat Parquet file, for
-    /// which only `columns` matters.
+    /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; or a flat
+    /// Parquet file, for which only `columns` matters.
     pub file: RawFile,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
@@ -36,6 +36,9 @@ pub struct FileLayout {
     /// Lines that begin with this text are skipped, e.g. `#`.
     #[serde(default)]
     pub comment: Option<String>,
+    /// The header is written as a comment: it begins with the text of `comment`, which is no part of the first name.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub header_in_comment: bool,
     /// Which column holds which quantity.
     pub columns: Columns,
 }
@@ -46,6 +49,10 @@ fn comma() -> String {
 
 fn yes() -> bool {
     true
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 /// The decimal mark.
@@ -133,6 +140,16 @@ pub struct ScalarColumn {
     /// Name or number of the column.
     #[serde(default)]
     pub column: Option<ColumnRef>,
+    /// A column whose number is taken off, for lengths: where the file holds the target in `column` and, instead of the measured
+    /// point, target less measured point here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minus: Option<ColumnRef>,
+    /// A column whose number is added, for lengths: measured point less target.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plus: Option<ColumnRef>,
+    /// Unit of the column `minus` or `plus`; without it `unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub difference_unit: Option<String>,
     /// The number of every row, instead of a column.
     #[serde(default)]
     pub value: Option<f64>,
@@ -267,7 +284,7 @@ pub enum Join {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Duplicates {
-    /// None is used: nobody can say which is right.
+    /// None is used, since nobody can say which is right; of rows that are copies of each other the first.
     #[default]
     Reject,
     /// The first usable one is used.
@@ -289,6 +306,13 @@ pub enum Limits {
     Reject,
     /// Used without a word.
     Ignore,
+}
+
+impl ScalarColumn {
+    /// The column that is added to `column`, or taken off (-1).
+    pub(super) fn difference(&self) -> Option<(&ColumnRef, f64)> {
+        self.minus.as_ref().map(|column| (column, -1.0)).or_else(|| self.plus.as_ref().map(|column| (column, 1.0)))
+    }
 }
 
 impl Columns {

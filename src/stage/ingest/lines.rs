@@ -3,6 +3,7 @@
 //! A quoted field may hold the delimiter, line ends and `""` for a quote. Empty lines and comments are no rows.
 
 use super::check::{Delimiter, delimiter};
+use super::encoding;
 use super::layout::FileLayout;
 use crate::error::{Error, Result};
 use std::io::{BufRead, BufReader, Read};
@@ -19,6 +20,8 @@ pub(super) struct Lines {
     label: String,
     delimiter: Delimiter,
     comment: Option<Vec<u8>>,
+    /// The next row is the header, and a comment.
+    header_in_comment: bool,
     /// Physical lines read so far.
     pub lines: u64,
     /// Bytes read so far.
@@ -66,7 +69,7 @@ impl Record {
     }
     /// The row for people, cut at 200 characters.
     pub(super) fn text(&self) -> String {
-        String::from_utf8_lossy(self.text.get(..self.text.len().min(1000)).unwrap_or_default()).chars().take(200).collect()
+        encoding::shown(&self.text).chars().take(200).collect()
     }
 }
 
@@ -75,7 +78,8 @@ impl Lines {
     pub(super) fn open(reader: Buffered, label: &str, layout: &FileLayout) -> Result<Self> {
         let delimiter = delimiter(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
         let comment = layout.comment.as_ref().map(|text| text.as_bytes().to_vec());
-        let mut lines = Self { reader, label: label.into(), delimiter, comment, lines: 0, bytes: 0 };
+        let header_in_comment = layout.header_in_comment;
+        let mut lines = Self { reader, label: label.into(), delimiter, comment, header_in_comment, lines: 0, bytes: 0 };
         lines.byte_order_mark()?;
         lines.skip(layout.skip)?;
         Ok(lines)
@@ -83,7 +87,7 @@ impl Lines {
     fn byte_order_mark(&mut self) -> Result<()> {
         let head = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
         if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-            return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark)"));
+            return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark), Windows-1252"));
         }
         if head.starts_with(&[0xef, 0xbb, 0xbf]) {
             self.reader.consume(3);
@@ -124,6 +128,22 @@ impl Lines {
         }
         Ok(true)
     }
+    /// Takes the mark of a comment off the header.
+    fn uncomment(&mut self, record: &mut Record) -> Result<()> {
+        if !self.header_in_comment || record.text.trim_ascii().is_empty() {
+            return Ok(());
+        }
+        self.header_in_comment = false;
+        let mark = self.comment.as_deref().unwrap_or_default();
+        if !record.text.starts_with(mark) {
+            let place = format!("{}:{}", self.label, self.lines);
+            let mark = encoding::shown(mark);
+            let message = format!("the header does not begin with `{mark}`; allowed: so, or `header_in_comment: false`");
+            return Err(Error::data(place, message));
+        }
+        record.text.drain(..mark.len());
+        Ok(())
+    }
     /// The next row; false at the end of the file.
     pub(super) fn next(&mut self, record: &mut Record) -> Result<bool> {
         loop {
@@ -132,6 +152,7 @@ impl Lines {
                 return Ok(false);
             }
             record.line = self.lines;
+            self.uncomment(record)?;
             let comment = self.comment.as_ref().is_some_and(|mark| record.text.starts_with(mark));
             // A line of delimiters alone is a blank row, also where the delimiter is a tab.
             let delimited = matches!(self.delimiter, Delimiter::Byte(byte) if byte != b' ' && record.text.contains(&byte));
@@ -243,6 +264,7 @@ mod tests {
             skip: 0,
             skip_below_header: 0,
             comment: comment.map(Into::into),
+            header_in_comment: false,
             columns: Default::default(),
         };
         let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);

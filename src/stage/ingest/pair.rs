@@ -13,6 +13,8 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct Twin {
     pub file: u32,
     pub line: u32,
+    /// That row has the same values too, and is used.
+    pub copied: bool,
 }
 
 /// What the files together decide about the usable rows of one of them.
@@ -88,7 +90,7 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
     fates
 }
 
-/// Sorts keys by id and leaves one of each id, or none.
+/// Sorts keys by id and leaves one of each id, or none. Copies of one row are one row: they do not contradict each other.
 fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
     keys.sort_unstable();
     let mut dropped = Vec::new();
@@ -96,15 +98,17 @@ fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
         let ([first, .., last], keep) = (same, duplicates) else {
             continue;
         };
+        let copies = same.iter().all(|key| key.content == first.content);
         let stays = match keep {
-            Duplicates::Reject => None,
+            Duplicates::Reject if !copies => None,
             Duplicates::Last => Some(last),
             _ => Some(first),
         };
         for key in same.iter().filter(|key| Some(*key) != stays) {
             let twin = stays.unwrap_or(if key == first { last } else { first });
+            let copied = stays.is_some_and(|stays| stays.content == key.content);
             if let Some(fate) = fates.get_mut(key.file as usize) {
-                fate.twins.insert(key.number, Twin { file: twin.file, line: twin.line });
+                fate.twins.insert(key.number, Twin { file: twin.file, line: twin.line, copied });
             }
             dropped.push(*key);
         }
@@ -195,7 +199,7 @@ mod tests {
 
     #[test]
     fn of_equal_ids_one_or_none_stays() {
-        let key = |hash, number| Key { hash, check: 0, file: 0, number, line: number + 1 };
+        let key = |hash, number| Key { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
         let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
         let stays = |duplicates| {
             let (mut keys, mut fates) = (keys.clone(), [Fate::default()]);

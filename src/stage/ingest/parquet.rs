@@ -4,21 +4,23 @@
 
 use super::lines::{Record, failed};
 use crate::error::{Error, Result};
+use crate::raw::{self, ParquetFile};
 use arrow::array::RecordBatch;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use std::fmt::{Display, Write};
 use std::io::Read;
 
+/// Rows held in memory at a time.
+const BATCH: usize = 1 << 10;
+
 /// Reads one file from its names to its last row.
 pub(super) struct Columns {
-    reader: ParquetRecordBatchReader,
+    reader: ParquetFile,
     label: String,
     names: Option<Vec<String>>,
     batch: Option<(RecordBatch, usize)>,
     /// Rows read so far.
     pub rows: u64,
-    total: u64,
     size: u64,
     cell: String,
 }
@@ -28,17 +30,14 @@ impl Columns {
         let mut content = Vec::new();
         source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
         let size = content.len() as u64;
-        let builder =
-            ParquetRecordBatchReaderBuilder::try_new(bytes::Bytes::from(content)).map_err(|error| broken(label, error))?;
-        let names = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
-        let total = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
-        let reader = builder.build().map_err(|error| broken(label, error))?;
+        let reader = raw::parquet(bytes::Bytes::from(content), BATCH).map_err(|error| broken(label, error))?;
+        let names = reader.schema.fields().iter().map(|field| field.name().clone()).collect();
         let (rows, cell) = (0, String::new());
-        Ok(Self { reader, label: label.into(), names: Some(names), batch: None, rows, total, size, cell })
+        Ok(Self { reader, label: label.into(), names: Some(names), batch: None, rows, size, cell })
     }
     /// Progress as a part of the file, bytes.
     pub(super) fn bytes(&self) -> u64 {
-        (u128::from(self.size) * u128::from(self.rows) / u128::from(self.total.max(1))) as u64
+        (u128::from(self.size) * u128::from(self.rows) / u128::from(self.reader.rows.max(1))) as u64
     }
     /// The names of the columns, then row by row; false at the end of the file.
     pub(super) fn next(&mut self, record: &mut Record) -> Result<bool> {

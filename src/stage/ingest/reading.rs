@@ -2,6 +2,7 @@
 
 use super::arm::Arm;
 use super::bind::{Head, bind};
+use super::encoding;
 use super::layout::{Decimal, FileLayout, Limits};
 use super::lines::{Lines, Record, failed};
 use super::parquet::Columns;
@@ -81,7 +82,7 @@ impl<'a> Reading<'a> {
         }
         let mut head = Head { label: label.clone(), line: record.line, width: record.len(), names: None };
         if header {
-            let name = |index| String::from_utf8_lossy(record.field(index).unwrap_or_default()).into_owned();
+            let name = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
             let mut names: Vec<String> = (0..record.len()).map(name).collect();
             // A delimiter at the end of the header makes no column.
             while names.last().is_some_and(String::is_empty) {
@@ -117,6 +118,18 @@ impl<'a> Reading<'a> {
         self.row.number += 1;
         Ok(Some(self.reader.read(&self.record, &mut self.row)))
     }
+}
+
+/// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
+pub(super) fn header(layout: &FileLayout, arm: Option<&Arm>, limits: Limits, context: &Context) -> Result<()> {
+    let source = context.services.open(&layout.file)?;
+    if let Some(arm) = arm {
+        return Reading::open(source, layout, arm, limits).map(drop);
+    }
+    let (mut layout, arm) = (layout.clone(), Arm { prismatic: vec![false], limits: vec![[f64::NEG_INFINITY, f64::INFINITY]] });
+    let columns = &mut layout.columns;
+    (columns.q, columns.current, columns.direction, columns.velocity) = (None, None, None, None);
+    Reading::open(source, &layout, &arm, limits).map(drop)
 }
 
 /// Counts units of work up to the next sign of progress.

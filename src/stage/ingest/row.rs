@@ -2,6 +2,7 @@
 
 use super::arm::Arm;
 use super::bind::{Binding, Text};
+use super::encoding;
 use super::layout::{Decimal, Limits};
 use super::lines::Record;
 use super::number::{self, Fault};
@@ -25,6 +26,7 @@ pub(super) enum Reason {
     OutOfRange,
     OutOfOrder,
     DuplicateId,
+    DuplicateRow,
     Unmatched,
 }
 
@@ -40,6 +42,7 @@ impl Reason {
             Self::OutOfRange => "out_of_range",
             Self::OutOfOrder => "out_of_order",
             Self::DuplicateId => "duplicate_id",
+            Self::DuplicateRow => "duplicate_row",
             Self::Unmatched => "unmatched",
         }
     }
@@ -131,29 +134,12 @@ impl RowReader<'_> {
 
     fn numbers(&self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
         for cell in &self.binding.cells {
-            let text = record.field(cell.column).unwrap_or_default();
-            let shown = || String::from_utf8_lossy(text).chars().take(40).collect::<String>();
-            let value = match number::parse(text, self.decimal) {
-                Ok(value) => cell.unit.to_si(value),
-                Err(Fault::Blank) if cell.optional => continue,
-                Err(Fault::Blank) => return refuse(Reason::Blank, format!("{} is blank", cell.name)),
-                Err(Fault::Text) => {
-                    return refuse(Reason::NotANumber, format!("{}: `{}` is not a number", cell.name, shown()));
-                }
-                Err(Fault::Comma) => {
-                    let detail =
-                        format!("{}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", cell.name, shown());
-                    return refuse(Reason::NotANumber, detail);
-                }
-                Err(Fault::Point) => {
-                    let detail =
-                        format!("{}: `{}` has a decimal point; allowed: `decimal: point` in the settings", cell.name, shown());
-                    return refuse(Reason::NotANumber, detail);
-                }
-                Err(Fault::NotFinite) => {
-                    return refuse(Reason::NotANumber, format!("{}: `{}` is not a finite number", cell.name, shown()));
-                }
-            };
+            let Some(own) = self.number(record, cell.column, &cell.name, cell.optional)? else { continue };
+            let mut value = cell.unit.to_si(own);
+            if let Some(other) = &cell.difference {
+                let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
+                value += other.sign * other.unit.to_si(added);
+            }
             if let Slot::Q(joint) = cell.slot
                 && self.arm.prismatic.get(joint) == Some(&false)
                 && value.abs() > TURNS
@@ -169,13 +155,41 @@ impl RowReader<'_> {
                 } else {
                     format!("{} to {} {unit}", round(unit.from_si(lower)), round(unit.from_si(upper)))
                 };
-                return refuse(Reason::OutOfRange, format!("{}: `{}`; allowed: {allowed}", cell.name, shown()));
+                let text = |column: usize| shown(record, column);
+                let found = match &cell.difference {
+                    None => format!("{}: `{}`", cell.name, text(cell.column)),
+                    Some(other) => {
+                        let sign = if other.sign < 0.0 { "-" } else { "+" };
+                        let names = format!("{} {sign} {}", cell.name, other.name);
+                        format!("{names}: `{}` {sign} `{}`", text(cell.column), text(other.column))
+                    }
+                };
+                return refuse(Reason::OutOfRange, format!("{found}; allowed: {allowed}"));
             }
             if let Some(slot) = row.values.get_mut(cell.index) {
                 *slot = value;
             }
         }
         Ok(())
+    }
+
+    /// The number in a column, in the file's unit; nothing where it may be blank and is.
+    fn number(&self, record: &Record, column: usize, name: &str, optional: bool) -> Result<Option<f64>, Refusal> {
+        let shown = || shown(record, column);
+        let detail = match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
+            Ok(value) => return Ok(Some(value)),
+            Err(Fault::Blank) if optional => return Ok(None),
+            Err(Fault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
+            Err(Fault::Text) => format!("{name}: `{}` is not a number", shown()),
+            Err(Fault::Comma) => {
+                format!("{name}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", shown())
+            }
+            Err(Fault::Point) => {
+                format!("{name}: `{}` has a decimal point; allowed: `decimal: point` in the settings", shown())
+            }
+            Err(Fault::NotFinite) => format!("{name}: `{}` is not a finite number", shown()),
+        };
+        refuse(Reason::NotANumber, detail)
     }
 
     /// Makes the rotation vector of the file's convention.
@@ -276,6 +290,11 @@ fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
     }
 }
 
+/// A field for people, cut at 40 characters.
+fn shown(record: &Record, column: usize) -> String {
+    encoding::shown(record.field(column).unwrap_or_default()).chars().take(40).collect()
+}
+
 fn round(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
@@ -285,10 +304,10 @@ fn text(source: &Option<Text>, record: &Record, name: &str, complete: bool, into
         Some(Text::Value(value)) => into.push_str(value),
         Some(Text::Column { column, optional }) => {
             let bytes = record.field(*column).unwrap_or_default();
-            match std::str::from_utf8(bytes) {
-                Ok("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
-                Ok(text) => into.push_str(text),
-                Err(_) => return refuse(Reason::NotText, format!("{name} is not UTF-8 text")),
+            match encoding::text(bytes).as_deref() {
+                Some("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
+                Some(text) => into.push_str(text),
+                None => return refuse(Reason::NotText, format!("{name} is neither UTF-8 nor Windows-1252 text")),
             }
         }
         None => {}

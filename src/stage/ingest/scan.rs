@@ -1,11 +1,11 @@
 //! First reading of a file: which rows are usable, and what is needed to find duplicates and partners.
 //!
-//! Memory: 24 bytes a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all; the second
+//! Memory: 32 bytes a row where ids are mapped, 16 where files are joined by time, 1 where they are joined at all; the second
 //! file of a join is held with its numbers. Where the arm moves, 16 bytes a joint and row for its velocities.
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{FileLayout, Join};
+use super::layout::{Columns, FileLayout, Join};
 use super::motion::{Samples, Track};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
@@ -24,6 +24,8 @@ pub(super) struct Key {
     /// Data row in its file, from 1.
     pub number: u32,
     pub line: u32,
+    /// Hash of what the row says, but for its place in the recording.
+    pub content: u64,
 }
 
 /// How many rows were refused for a reason, and the first of them.
@@ -68,8 +70,18 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    fn push(&mut self, row: &Row) {
+    fn push(&mut self, row: &Row, columns: &Columns, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
+        for (into, mapped, text) in [
+            (&mut self.ids, named, &row.id),
+            (&mut self.usage, columns.usage.is_some(), &row.usage),
+            (&mut self.target, columns.target.is_some(), &row.target),
+            (&mut self.anchor, columns.anchor.is_some(), &row.anchor),
+        ] {
+            if mapped {
+                into.push(text.clone());
+            }
+        }
     }
 }
 
@@ -78,6 +90,8 @@ pub(super) struct Scan {
     pub label: String,
     pub lines: u64,
     pub read: u64,
+    /// The last data row that is not blank all over, as a spreadsheet leaves them at the end.
+    pub last: u64,
     pub tally: Tally,
     pub keys: Vec<Key>,
     /// Time and number of usable rows, for a join by time.
@@ -121,6 +135,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
         label,
         lines: 0,
         read: 0,
+        last: 0,
         tally: Tally::new(),
         keys: Vec::new(),
         times: Vec::new(),
@@ -163,19 +178,10 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
             scan.usable.push(judged.is_ok());
         }
         if let Some(packed) = &mut scan.packed {
-            packed.push(row);
-            if named {
-                packed.ids.push(row.id.clone());
-            }
-            if layout.columns.usage.is_some() {
-                packed.usage.push(row.usage.clone());
-            }
-            if layout.columns.target.is_some() {
-                packed.target.push(row.target.clone());
-            }
-            if layout.columns.anchor.is_some() {
-                packed.anchor.push(row.anchor.clone());
-            }
+            packed.push(row, &layout.columns, named);
+        }
+        if !reading.record.is_blank(0) {
+            scan.last = row.number;
         }
         pace.row(reading.bytes());
     }
@@ -214,9 +220,27 @@ fn narrow(number: u64, label: &str) -> Result<u32> {
 fn key(row: &Row, file: usize, label: &str) -> Result<Key> {
     let digest = blake3::hash(row.id.as_bytes());
     let mut bytes = digest.as_bytes().iter().copied();
-    let hash = bytes.by_ref().take(8).fold(0u64, |hash, byte| hash << 8 | u64::from(byte));
+    let hash = first_eight(&mut bytes);
     let check = bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte));
-    Ok(Key { hash, check, file: file as u32, number: narrow(row.number, label)?, line: narrow(row.line, label)? })
+    let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
+    Ok(Key { hash, check, file: file as u32, number, line, content: content(row) })
+}
+
+/// Hash of the numbers and texts of a row.
+fn content(row: &Row) -> u64 {
+    let mut hasher = blake3::Hasher::new();
+    for value in &row.values {
+        hasher.update(&value.to_bits().to_le_bytes());
+    }
+    for text in [&row.usage, &row.target, &row.anchor] {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    first_eight(&mut hasher.finalize().as_bytes().iter().copied())
+}
+
+fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
+    bytes.by_ref().take(8).fold(0u64, |hash, byte| hash << 8 | u64::from(byte))
 }
 
 impl Scan {

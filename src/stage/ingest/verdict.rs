@@ -2,7 +2,7 @@
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{Columns, Limits};
+use super::layout::{Columns, Join, Limits};
 use super::pair::Fate;
 use super::row::Reason;
 use super::scan::{Count, Scan};
@@ -22,16 +22,39 @@ pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
 pub(super) fn judge(settings: &Ingest, scans: &[Scan], fates: &[Fate], arm: &Arm, context: &Context) -> Result<()> {
-    let mut faults = Vec::new();
-    for ((scan, fate), layout) in scans.iter().zip(fates).zip(&settings.files) {
+    let mut faults = unequal(settings, scans);
+    for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
         let angles = implausible(scan, &layout.columns, settings.limits);
-        let fault = angles.or_else(|| too_many_rejected(settings, scan, fate));
+        let fault = angles.or_else(|| too_many_rejected(settings, scans, fates, index));
         if fault.is_none() {
             warn(scan, &layout.columns, settings.limits, arm, context);
         }
         faults.extend(fault);
     }
+    // What a file lacks is said once, not by every file that is joined to it.
+    let mut seen = Vec::new();
+    faults.retain(|fault| {
+        !seen.contains(fault) && {
+            seen.push(fault.clone());
+            true
+        }
+    });
     if faults.is_empty() { Ok(()) } else { Err(Error::Data(faults)) }
+}
+
+/// Rows that belong together by their order alone are as many in each file, whatever became of them.
+fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
+    let (Some(Join::Order {}), Some((first, others))) = (&settings.join, scans.split_first()) else { return Vec::new() };
+    let other = others.iter().filter(|other| other.last != first.last);
+    let faults = other.map(|other| {
+        let message = format!(
+            "{} data rows, {} has {}: rows cannot be joined by order; allowed: as many rows in each file, or `join: {{by: id}}` or \
+             `{{by: time, tolerance_s: ...}}`",
+            other.last, first.label, first.last
+        );
+        Fault::new(&other.label, message)
+    });
+    faults.collect()
 }
 
 fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> {
@@ -68,21 +91,34 @@ fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> 
     None
 }
 
-fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Fault> {
+fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: usize) -> Option<Fault> {
+    let (scan, fate) = (scans.get(index)?, fates.get(index)?);
     let accepted = accepted(scan, fate);
     let rejected = scan.read - accepted;
     if accepted > 0 && rejected as f64 <= settings.max_rejected_fraction * scan.read as f64 {
         return None;
     }
     let twins = fate.twins.len() as u64;
+    let copies = fate.twins.values().filter(|twin| twin.copied).count() as u64;
+    let unmatched = scan.used() - accepted - twins;
+    // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
+    let partner = scans.iter().enumerate().filter(|(other, _)| *other != index && (index == 0 || *other == 0));
+    let partner = partner.map(|(_, other)| other).min_by_key(|other| other.used());
+    let cut = partner.filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
     let mut counts = scan.tally.clone();
-    let first_twin = fate.twins.values().map(|twin| u64::from(twin.line)).min().unwrap_or_default();
+    let first = |copied: bool| {
+        let of_kind = fate.twins.values().filter(|twin| twin.copied == copied);
+        of_kind.map(|twin| u64::from(twin.line)).min().unwrap_or_default()
+    };
+    let lonely =
+        partner.map_or_else(|| "no partner in another file".to_string(), |other| format!("no partner in {}", other.label));
     for (reason, rows, first_line, detail) in [
-        (Reason::DuplicateId, twins, first_twin, "point ids that occur more than once"),
-        (Reason::Unmatched, scan.used() - accepted - twins, 0, "no partner in another file"),
+        (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
+        (Reason::DuplicateRow, copies, first(true), "rows that are there once more".to_string()),
+        (Reason::Unmatched, unmatched, 0, lonely),
     ] {
         if rows > 0 {
-            counts.insert(reason, Count { rows, first_line, first_detail: detail.into() });
+            counts.insert(reason, Count { rows, first_line, first_detail: detail });
         }
     }
     let mut reasons: Vec<_> = counts.iter().collect();
@@ -94,14 +130,28 @@ fn too_many_rejected(settings: &Ingest, scan: &Scan, fate: &Fate) -> Option<Faul
             format!("{} {} ({place}{})", count.rows, reason.word(), count.first_detail)
         })
         .collect();
-    let share =
-        if accepted == 0 { "no row is left".to_string() } else { format!("{rejected} of {} rows are rejected", scan.read) };
+    let share = match (accepted, cut) {
+        (0, _) => "no row is left".to_string(),
+        (_, Some(_)) => {
+            format!(
+                "has partners for {} of the {} rows of {}, {rejected} of which are rejected",
+                scan.read - unmatched,
+                scan.read,
+                scan.label
+            )
+        }
+        _ => format!("{rejected} of {} rows are rejected", scan.read),
+    };
     let allowed = settings.max_rejected_fraction * 100.0;
-    let place = match reasons.first() {
-        Some((_, count)) if count.first_line > 0 => format!("{}:{}", scan.label, count.first_line),
+    let place = match (cut, reasons.first()) {
+        (Some(cut), _) => cut.label.clone(),
+        (_, Some((_, count))) if count.first_line > 0 => format!("{}:{}", scan.label, count.first_line),
         _ => scan.label.clone(),
     };
-    Some(Fault::new(place, format!("{share}; allowed: up to {allowed} %; reasons: {}", listed.join("; "))))
+    Some(Fault::new(
+        place,
+        format!("{share}; allowed: up to {allowed} % (`max_rejected_fraction`); reasons: {}", listed.join("; ")),
+    ))
 }
 
 fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Context) {

@@ -91,8 +91,13 @@ impl Decided<'_> {
         if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
             let there =
                 if twin.file as usize == index { String::new() } else { format!(" of {}", self.name(twin.file as usize)) };
-            let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
-            return Err(Refusal { reason: Reason::DuplicateId, detail });
+            return Err(if twin.copied {
+                let detail = format!("a copy of line {}{there}: the same id, the same values", twin.line);
+                Refusal { reason: Reason::DuplicateRow, detail }
+            } else {
+                let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
+                Refusal { reason: Reason::DuplicateId, detail }
+            });
         }
         if fate.is_whole(row.number as usize) {
             return Ok(());

@@ -2,7 +2,7 @@
 
 use super::numbers::{Numbers, index};
 use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::estimate::network::arm::{Arm, Hinge};
 use crate::estimate::network::basis::{Term, Wave, Way};
 use crate::estimate::network::correction::{Body, Correction, Dress, Feature, JointMotion, Map, Networks, Scaling};
@@ -92,7 +92,7 @@ fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Netw
         let scale = |joint: usize| Ok(numbers.shared("joint_scale", joint + 1)? / source_unit(joint, prismatic));
         let scales = (0..arm.hinges.len()).map(scale).collect::<Result<Vec<f64>>>()?;
         if scales.len() != prismatic.len() {
-            let message = format!("motions of {} joints, of a robot that has {}", scales.len(), prismatic.len());
+            let message = format!("motions of {}, of a robot that has {}", counted(scales.len(), "joint"), prismatic.len());
             return Err(Error::data("network", message));
         }
         joints = Some(JointMotion { arm, scales });

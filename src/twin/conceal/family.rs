@@ -11,9 +11,10 @@ mod unlisted;
 use crate::robot::description::RobotDescription;
 use crate::twin::arm::Arm;
 use crate::twin::effect::Physical;
+use crate::twin::equilibrium::settle;
 use crate::twin::noise::Noise;
 use crate::twin::plan::Point;
-use crate::twin::statics::{Row, settle};
+use crate::twin::statics::Row;
 use crate::twin::truth::ARCSEC;
 
 /// A column of the recording that may be missing.

@@ -3,10 +3,12 @@
 
 use crate::robot::description::RobotDescription;
 use crate::twin::arm::Arm;
-use crate::twin::effect::{Motion, Physical};
+use crate::twin::effect::Physical;
+use crate::twin::equilibrium::settle;
 use crate::twin::matrix;
+use crate::twin::motion::Motion;
 use crate::twin::plan::Point;
-use crate::twin::statics::{Row, settle};
+use crate::twin::statics::Row;
 use crate::twin::tracker::Tracker;
 use crate::twin::truth::TrueRobot;
 

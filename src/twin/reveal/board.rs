@@ -205,10 +205,3 @@ impl Board {
         self.cases.iter().filter(|case| !case.right(DUE))
     }
 }
-
-/// The number at this share of an ascending list, linear between neighbours.
-pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    let place = share * (sorted.len().checked_sub(1)?) as f64;
-    let (low, high) = (sorted.get(place.floor() as usize)?, sorted.get(place.ceil() as usize)?);
-    Some(low + (high - low) * place.fract())
-}

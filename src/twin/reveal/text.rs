@@ -1,7 +1,8 @@
 //! The scoreboard for people and for programs.
 
-use super::board::{BINS, Board, Company, Counts, DUE, Share, quantile};
+use super::board::{BINS, Board, Company, Counts, DUE, Share};
 use super::mark::Case;
+use crate::statistics::quantile;
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -3,7 +3,7 @@
 use calib::report::fleet::html;
 use calib::table::{FleetChanges, FleetRow, FleetTable};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 fn row(number: usize) -> FleetRow {
@@ -64,14 +64,14 @@ fn a_browser_sorts_and_filters_the_page_without_a_request() {
     let drive = "<script>document.querySelectorAll('th button')[4].click();\
         const s = document.getElementById('search'); s.value = 'rejected'; s.dispatchEvent(new Event('input'));</script></body>";
     let page = page().replace("</body>", drive);
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("browser-fleet");
-    std::fs::create_dir_all(&folder).unwrap();
-    let file = folder.join("fleet.html");
+    // Where a browser that is kept out of `/tmp` can read it.
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let file = folder.path().join("fleet.html");
     std::fs::write(&file, page).unwrap();
     let output = Command::new(chromium)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
         .args(["--disable-background-networking", "--proxy-server=127.0.0.1:9", "--enable-logging=stderr", "--dump-dom"])
-        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
         .arg(format!("file://{}", file.display()))
         .output()
         .unwrap();

@@ -22,7 +22,10 @@ fn a_file_that_is_none_says_what_it_is() {
     assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row; allowed: at least one");
     assert_eq!(with("\n\n", TWO), "a.csv: has no header: its 2 lines are empty, comments or skipped");
     let utf16 = Desk::default().with("a.csv", [0xff, 0xfe, b'i', 0]);
-    assert_eq!(refusal(&utf16, TWO, robot("rr", 1.0)), "a.csv: is UTF-16; allowed: UTF-8 (with or without a byte-order mark)");
+    assert_eq!(
+        refusal(&utf16, TWO, robot("rr", 1.0)),
+        "a.csv: is UTF-16; allowed: UTF-8 (with or without a byte-order mark), Windows-1252"
+    );
     let open = with(&format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"), TWO);
     assert_eq!(open, "a.csv:3: a quoted field is not closed");
     let endless = with(&format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21)), TWO);
@@ -55,7 +58,7 @@ fn another_number_of_joints_is_an_error_of_the_file() {
 fn an_unannounced_decimal_comma_is_an_error_that_says_so() {
     let yaml = TWO.replace("  - file: a.csv\n", "  - file: a.csv\n    delimiter: \";\"\n");
     let file = "id;q1;q2;x;y;z\nP1;0,365;1;2;3;4\nP2;1;2,5;2;3;4\n";
-    let expected = "a.csv:2: no row is left; allowed: up to 50 %; reasons: 2 not_a_number \
+    let expected = "a.csv:2: no row is left; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 not_a_number \
                     (line 2: q1: `0,365` has a decimal comma; allowed: `decimal: comma` in the settings)";
     assert_eq!(with(file, &yaml), expected);
     let announced = yaml.replace("delimiter", "decimal: comma\n    delimiter");
@@ -86,7 +89,7 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
 #[test]
 fn too_few_usable_rows_are_an_error_with_the_reasons() {
     let text = format!("{}B1,,2,3,4,5\nB2,,2,3,4,5\nB3,1,2\ng1,1,2,3,4,5\n", good(3));
-    let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 %; reasons: 2 blank (line 5: q1 is blank); \
+    let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 blank (line 5: q1 is blank); \
                     2 duplicate_id (line 2: point ids that occur more than once); 1 short_row (line 7: 3 fields; allowed: 6)";
     assert_eq!(refusal(&rows(&text), TWO, robot("rr", 1.0)), expected);
     take(&rows(&text), &format!("{TWO}max_rejected_fraction: 0.8\n"), robot("rr", 1.0)).unwrap();

@@ -1,6 +1,6 @@
 //! Duplicates, joins, shapes of files, and long files.
 
-use super::{HEAD, TWO, good, robot, rows, settings, take};
+use super::{HEAD, TWO, good, refusal, robot, rows, settings, take};
 use crate::desk::{Desk, table};
 use calib::stage::ingest::IngestReads;
 use calib::table::{Recording, Rejected};
@@ -154,7 +154,7 @@ fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
 fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
     let desk = Desk::default()
         .with("run/z_arm.csv", "q1\n1\nbad\n3\n4\n")
-        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
+        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\nD,4,4,4\n,,,\n");
     let yaml = PAIR.replace("      KEY: {column: kLEFT}\n", "").replace("KEY", "point_id").replace("RIGHT", "");
     let taken = take(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0)).unwrap();
     assert_eq!(taken.recording.point_id, ["A", "C"]);
@@ -163,10 +163,52 @@ fn rows_join_by_order_and_a_bad_row_takes_its_partner_along() {
         refused(&taken.rejected),
         [
             ("b_tracker.csv", 3, "unmatched", "data row 2 of z_arm.csv is missing or rejected"),
+            ("b_tracker.csv", 6, "blank", "the whole row is blank"),
             ("z_arm.csv", 3, "not_a_number", "q1: `bad` is not a number"),
             ("z_arm.csv", 5, "unmatched", "data row 4 of b_tracker.csv is missing or rejected"),
         ]
     );
+}
+
+#[test]
+fn files_of_unequal_length_are_not_joined_by_order() {
+    let desk = Desk::default()
+        .with("run/z_arm.csv", "q1\n1\n2\n3\n4\n")
+        .with("run/b_tracker.csv", "k,x,y,z\nA,1,1,1\nB,2,2,2\nC,3,3,3\n");
+    let yaml = PAIR.replace("      KEY: {column: kLEFT}\n", "").replace("KEY", "point_id").replace("RIGHT", "");
+    let message = refusal(&desk, &(yaml + "join: {by: order}\n"), robot("r", 2.0));
+    let expected = "run/b_tracker.csv: 3 data rows, run/z_arm.csv has 4: rows cannot be joined by order; allowed: as many rows in each \
+                    file, or `join: {by: id}` or `{by: time, tolerance_s: ...}`";
+    assert_eq!(message, expected);
+}
+
+#[test]
+fn of_rows_that_are_copies_of_each_other_one_is_used() {
+    let text = "A,1,2,3,4,1\nB,1,2,3,4,2\nA,1.0, 2,3,4,1\nC,1,2,3,4,5\nC,1,2,3,4,6\nC,1,2,3,4,5\nD,1,2,3,4,5\nE,1,2,3,4,5\nF,1,2,3,4,5\n";
+    let used = |word: &str| {
+        let taken = take(&rows(text), &format!("{TWO}duplicates: {word}\n"), robot("rr", 1.0)).unwrap();
+        let lines = taken.rejected.0.iter().map(|row| (row.line, row.reason.clone(), row.detail.clone())).collect::<Vec<_>>();
+        (taken.recording.sequence, lines)
+    };
+    let copy = |line: i64, other: i64| {
+        (line, "duplicate_row".to_string(), format!("a copy of line {other}: the same id, the same values"))
+    };
+    let twin = |line: i64, other: i64| (line, "duplicate_id".to_string(), format!("point id `C` also stands on line {other}"));
+    assert_eq!(used("reject"), (vec![1, 2, 7, 8, 9], vec![copy(4, 2), twin(5, 7), twin(6, 5), twin(7, 5)]));
+    assert_eq!(used("first"), (vec![1, 2, 4, 7, 8, 9], vec![copy(4, 2), twin(6, 5), copy(7, 5)]));
+    assert_eq!(used("keep"), (vec![1, 2, 3, 4, 5, 6, 7, 8, 9], vec![]));
+}
+
+#[test]
+fn a_cut_file_is_blamed_for_the_partners_that_it_lacks() {
+    let arm = |rows: usize| "k,q1\n".to_string() + &(0..rows).map(|k| format!("P{k},{}\n", k % 3)).collect::<String>();
+    let points = "k,x,y,z\n".to_string() + &(0..20).map(|k| format!("P{k},1,{k},1\n")).collect::<String>();
+    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
+    let desk = Desk::default().with("run/z_arm.csv", arm(5)).with("run/b_tracker.csv", points);
+    let message = refusal(&desk, &yaml, robot("r", 2.0));
+    let expected = "run/z_arm.csv: has partners for 5 of the 20 rows of run/b_tracker.csv, 15 of which are rejected; allowed: up to 50 % \
+                    (`max_rejected_fraction`); reasons: 15 unmatched (no partner in run/z_arm.csv)";
+    assert_eq!(message, expected);
 }
 
 #[test]

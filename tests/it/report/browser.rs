@@ -4,6 +4,7 @@ use super::{html, tables::tables};
 use calib::stage::Report;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use tempfile::TempDir;
 
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
@@ -29,18 +30,17 @@ fn browser(chromium: &Path, folder: &Path, arguments: &[&str], page: &Path) -> O
         .expect("chromium runs")
 }
 
-/// A folder of a test with the page in it.
-fn folder(name: &str, page: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("browser-{name}"));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    std::fs::write(folder.join("report.html"), page).expect("a page");
+/// A folder of a test with the page in it, where a browser that is kept out of `/tmp` can read it.
+fn folder(page: &str) -> TempDir {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("a folder");
+    std::fs::write(folder.path().join("report.html"), page).expect("a page");
     folder
 }
 
 /// The page as the browser understood it, and its console, one message a line.
-fn open(chromium: &Path, name: &str, page: &str) -> (String, Vec<String>) {
-    let folder = folder(name, page);
-    let output = browser(chromium, &folder, &["--dump-dom"], &folder.join("report.html"));
+fn open(chromium: &Path, page: &str) -> (String, Vec<String>) {
+    let folder = folder(page);
+    let output = browser(chromium, folder.path(), &["--dump-dom"], &folder.path().join("report.html"));
     let log = String::from_utf8_lossy(&output.stderr);
     let console = log.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect();
     (String::from_utf8_lossy(&output.stdout).into_owned(), console)
@@ -53,13 +53,13 @@ fn a_browser_shows_the_report_without_complaint_and_without_a_request() {
         return;
     };
     let page = html(Report::default(), tables("Heavy 6R, cell 4"));
-    let (dom, console) = open(&chromium, "whole", &page);
+    let (dom, console) = open(&chromium, &page);
     assert_eq!(dom.matches("<svg ").count(), page.matches("<svg ").count());
     assert_eq!(console, Vec::<String>::new());
 
     // The page's own policy forbids every request, so that one would show on the console.
     let asking = page.replace("</main>", "<img src=\"http://127.0.0.1:9/a.png\"></main>");
-    let (_, console) = open(&chromium, "asking", &asking);
+    let (_, console) = open(&chromium, &asking);
     assert!(console.iter().any(|line| line.contains("Content Security Policy")), "{console:?}");
 }
 
@@ -80,9 +80,9 @@ fn the_report_fits_a_desk_and_a_telephone_and_is_legible_by_day_and_night() {
         return;
     };
     let page = html(Report::default(), tables("Heavy 6R, cell 4 with a name that is longer than a telephone is wide"));
-    let folder = folder("fits", &page);
+    let folder = folder(&page);
     for (dark, scheme) in [(false, &[][..]), (true, &["--blink-settings=preferredColorScheme=0"][..])] {
-        let seen = seen(&chromium, &folder, scheme);
+        let seen = seen(&chromium, folder.path(), scheme);
         assert_eq!(seen.len(), 2, "{seen:?}");
         for view in seen {
             assert_eq!(view["dark"], dark, "{view}");
@@ -101,9 +101,10 @@ fn the_report_prints() {
         println!("skipped: no chromium on PATH");
         return;
     };
-    let folder = folder("prints", &html(Report::default(), tables("Heavy 6R, cell 4")));
+    let folder = folder(&html(Report::default(), tables("Heavy 6R, cell 4")));
+    let folder = folder.path();
     let file = folder.join("report.pdf");
-    browser(&chromium, &folder, &[&format!("--print-to-pdf={}", file.display())], &folder.join("report.html"));
+    browser(&chromium, folder, &[&format!("--print-to-pdf={}", file.display())], &folder.join("report.html"));
     let printed = std::fs::read(&file).expect("a PDF");
     let pages = printed.windows(12).filter(|bytes| bytes == b"/Type /Page\n").count();
     assert!(printed.starts_with(b"%PDF") && (4..20).contains(&pages), "{pages} pages");

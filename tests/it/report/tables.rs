@@ -146,14 +146,16 @@ fn verdict() -> Verdict {
         after_max_mm: Some(0.08),
         leftover_rms_mm: 0.034,
         chi_square: 1.02,
-        p_before: 1e-12,
-        p_after: 0.4,
+        p_before: Some(1e-12),
+        p_after: Some(0.4),
         repeatability_rad: 2e-6,
         repeats: 0,
         points: 300,
         not_observable: "temperature: none was recorded\ntracker_scale: <measure> a scale bar".into(),
         signature: None,
         next_measurements: None,
+        withdrawn: Some("payload_error at tool: <smaller> than its own uncertainty".into()),
+        clock: Some("s".into()),
     }])
 }
 

@@ -4,6 +4,7 @@ use super::Apart;
 use crate::cli::poses::output::{self, Drive};
 use crate::cli::poses::show::closing;
 use crate::diagnose::other_means;
+use crate::error::counted;
 use crate::estimate::choose::{Proposed, TOLD, Told};
 use serde_json::{Value, json};
 
@@ -44,13 +45,13 @@ impl Apart<'_> {
         let (was, will, count) = (least(before), least(&proposed.after), proposed.poses.rows());
         if will >= TOLD {
             let already = if was >= TOLD { "; the recording alone should do" } else { "" };
-            out.push(format!("these {count} poses tell them apart{already}"));
+            out.push(format!("measured at {}, they are told apart{already}", counted(count, "pose")));
         } else {
             let needed = ((TOLD - was) / (will - was) * count as f64).ceil();
             let more =
                 if needed < MOST { format!("some {needed:.0} such poses would") } else { "no number of poses would".into() };
             let size = if alike.contains(&true) { ", if what shows is as large as this recording would have it" } else { "" };
-            out.push(format!("{count} poses do not tell them apart: {more}{size}"));
+            out.push(format!("measured at {}, they are not told apart: {more}{size}", counted(count, "pose")));
             out.extend(other.map(|means| format!("instead: {means}")));
         }
         out
@@ -65,7 +66,7 @@ impl Apart<'_> {
             self.sigma
         ));
         let count = self.told.proposed.as_ref().map_or(0, |proposed| proposed.poses.rows());
-        let mut rows = vec![(format!("the recording, {} points", self.rows), self.told.before)];
+        let mut rows = vec![(format!("the recording, {}", counted(self.rows, "point")), self.told.before)];
         if let Some(proposed) = &self.told.proposed {
             rows.push((format!("and {count} random poses, median of 200"), proposed.random));
             rows.push((format!("and the {count} proposed"), proposed.after));

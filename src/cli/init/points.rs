@@ -1,0 +1,167 @@
+//! Which columns are the measured point: of a target, its difference, a nominal point and a measured one only the last is.
+
+use super::names::Name;
+use super::words;
+
+/// Columns of x, y and z under one name, and what the name says of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Family {
+    pub columns: [usize; 3],
+    pub words: Vec<String>,
+    pub role: Role,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Measured,
+    /// The name does not say.
+    Plain,
+    Wanted,
+    Difference,
+    Sigma,
+}
+
+/// A way to the measured point.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Way {
+    pub columns: [usize; 3],
+    /// Columns of the difference, and whether they are taken off.
+    pub difference: Option<([usize; 3], bool)>,
+}
+
+/// Ways to the measured point, best first; what to ask where it is not plain; what else is known of points.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Points {
+    pub ways: Vec<Way>,
+    pub question: Option<String>,
+    /// Whether the name of the best one says that it was measured.
+    pub said: bool,
+    /// A point that is wanted only.
+    pub wanted: Option<[usize; 3]>,
+    pub sigma: Option<[usize; 3]>,
+}
+
+/// All coordinates that come in threes.
+pub(super) fn families(names: &[Name]) -> Vec<Family> {
+    let mut groups: Vec<(Vec<String>, [Vec<usize>; 3])> = Vec::new();
+    for (column, name) in names.iter().enumerate() {
+        let Some((axis, mut rest)) = name.axis() else { continue };
+        rest.sort();
+        match groups.iter_mut().find(|(words, _)| *words == rest) {
+            Some((_, columns)) => columns[axis].push(column),
+            None => {
+                let mut columns: [Vec<usize>; 3] = Default::default();
+                columns[axis].push(column);
+                groups.push((rest, columns));
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for (words, [x, y, z]) in groups {
+        // Names that stand twice make two points.
+        for ((x, y), z) in x.iter().zip(&y).zip(&z) {
+            found.push(Family { columns: [*x, *y, *z], role: role(&words), words: words.clone() });
+        }
+    }
+    found.sort_by_key(|family| family.columns[0]);
+    found
+}
+
+fn role(rest: &[String]) -> Role {
+    let has = |listed: &[&str]| rest.iter().any(|word| listed.contains(&word.as_str()));
+    match (has(&words::SIGMA), has(&words::DIFFERENCE), has(&words::MEASURED), has(&words::WANTED)) {
+        (true, ..) => Role::Sigma,
+        (_, true, ..) => Role::Difference,
+        (_, _, true, false) => Role::Measured,
+        (_, _, false, true) => Role::Wanted,
+        _ => Role::Plain,
+    }
+}
+
+/// The measured point among them.
+pub(super) fn points(names: &[Name]) -> Points {
+    let mut families = families(names);
+    let of = |families: &[Family], role: Role| -> Vec<Family> {
+        families.iter().filter(|family| family.role == role).cloned().collect()
+    };
+    // `x_t` beside `x_dif` is the target; alone it may be the tracker's.
+    let others = families.iter().any(|family| family.role == Role::Difference || family.words.is_empty());
+    for family in &mut families {
+        if family.role == Role::Plain && family.words == ["t"] && others {
+            family.role = Role::Wanted;
+        }
+    }
+    let [measured, plain, wanted, differences, sigma] =
+        [Role::Measured, Role::Plain, Role::Wanted, Role::Difference, Role::Sigma].map(|role| of(&families, role));
+    let direct = |family: &Family| Way { columns: family.columns, difference: None };
+    let by = |target: &Family, difference: &Family| {
+        let minus = difference.words.iter().any(|word| words::TARGET_LESS_MEASURED.contains(&word.as_str()));
+        Way { columns: target.columns, difference: Some((difference.columns, minus)) }
+    };
+    let sides = "minus: target less measured point; plus: measured point less target";
+    let mut found = Points {
+        wanted: wanted.first().map(|family| family.columns),
+        sigma: sigma.first().map(|family| family.columns),
+        said: !measured.is_empty(),
+        ..Points::default()
+    };
+    let candidates = if measured.is_empty() { &plain } else { &measured };
+    found.ways = candidates.iter().map(direct).collect();
+    if candidates.len() > 1 {
+        found.question = Some("several points fit; which one was measured?".into());
+    } else if measured.is_empty() && !plain.is_empty() {
+        if let (Some(difference), true) = (differences.first(), wanted.is_empty()) {
+            found.ways.push(by(&plain[0], difference));
+            found.question = Some(format!("is this the measured point, or the target of the differences beside it ({sides})?"));
+        } else if !plain[0].words.is_empty() && wanted.is_empty() {
+            found.question = Some("is this the measured point, or the target?".into());
+        }
+    } else if candidates.is_empty()
+        && let (Some(target), Some(difference)) = (wanted.first(), differences.first())
+    {
+        found.ways = vec![by(target, difference)];
+        found.question = Some(format!("the measured point by its target and the difference ({sides})"));
+        found.ways.extend(differences.iter().skip(1).map(|difference| by(target, difference)));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(texts: &[&str]) -> Points {
+        points(&texts.iter().map(|text| Name::of(text)).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn the_measured_point_is_never_its_target() {
+        let way = |columns: [usize; 3]| vec![Way { columns, difference: None }];
+        for texts in [
+            ["X_soll", "Y_soll", "Z_soll", "X_ist", "Y_ist", "Z_ist"],
+            ["Goal x", "Goal y", "Goal z", "x", "y", "z"],
+            ["xt", "yt", "zt", "X [mm]", "Y [mm]", "Z [mm]"],
+            ["x_t", "y_t", "z_t", "x", "y", "z"],
+            ["std_x", "std_y", "std_z", "x_act", "y_act", "z_act"],
+        ] {
+            let found = found(&texts);
+            assert_eq!((found.ways, found.question), (way([3, 4, 5]), None), "{texts:?}");
+        }
+        let target = found(&["x_t", "y_t", "z_t", "x_dif", "y_dif", "z_dif"]);
+        assert_eq!(target.ways, [Way { columns: [0, 1, 2], difference: Some(([3, 4, 5], true)) }]);
+        assert!(target.question.is_some());
+        let alone = found(&["x_soll", "y_soll", "z_soll"]);
+        assert_eq!((alone.ways.len(), alone.wanted), (0, Some([0, 1, 2])));
+        assert!(found(&["x", "y"]).ways.is_empty());
+    }
+
+    #[test]
+    fn points_that_fit_alike_are_asked_about() {
+        let two = found(&["smrA_x", "smrA_y", "smrA_z", "smrB_x", "smrB_y", "smrB_z"]);
+        assert_eq!((two.ways.len(), two.question.is_some()), (2, true));
+        let twice = found(&["X", "Y", "Z", "X", "Y", "Z"]);
+        assert_eq!((twice.ways[1].columns, twice.question.is_some()), ([3, 4, 5], true));
+        let beside = found(&["X", "Y", "Z", "dX", "dY", "dZ"]);
+        assert_eq!(beside.ways[1].difference, Some(([3, 4, 5], false)));
+    }
+}

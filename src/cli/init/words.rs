@@ -1,0 +1,242 @@
+//! The words that people use in headers, in small letters: English, German, French, Spanish, Italian.
+
+/// Units by how people write them in a header.
+const UNITS: [(&str, &str); 28] = [
+    ("mm", "mm"),
+    ("millimeter", "mm"),
+    ("m", "m"),
+    ("meter", "m"),
+    ("um", "um"),
+    ("\u{b5}m", "um"),
+    ("\u{3bc}m", "um"),
+    ("in", "in"),
+    ("inch", "in"),
+    ("deg", "deg"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("degr\u{e9}s", "deg"),
+    ("grad", "deg"),
+    ("grados", "deg"),
+    ("\u{b0}", "deg"),
+    ("\u{ba}", "deg"),
+    ("rad", "rad"),
+    ("kg", "kg"),
+    ("c", "C"),
+    ("\u{b0}c", "C"),
+    ("\u{ba}c", "C"),
+    ("degc", "C"),
+    ("s", "s"),
+    ("sec", "s"),
+    ("ms", "ms"),
+    ("a", "A"),
+    ("nm", "Nm"),
+];
+
+/// The unit that a text in small letters stands for.
+pub(super) fn unit(text: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(written, _)| *written == text.trim()).map(|(_, unit)| *unit)
+}
+
+/// What the joints' columns are usually called; the number of the joint follows.
+pub(super) const JOINTS: [&str; 14] =
+    ["q", "a", "j", "joint", "axis", "theta", "achse", "gelenk", "axe", "asse", "eje", "jnt", "joint_angle", "articulaci\u{f3}n"];
+
+/// Names of joints without numbers.
+pub(super) const NAMED_JOINTS: [&[&str]; 3] = [
+    &["s", "l", "u", "r", "b", "t"],
+    &["s", "l", "e", "u", "r", "b", "t"],
+    &["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"],
+];
+
+/// What a numbered column that is no joint position is called.
+pub(super) const NO_JOINTS: [&str; 22] = [
+    "i",
+    "dir",
+    "dq",
+    "qd",
+    "vel",
+    "velocity",
+    "cur",
+    "current",
+    "strom",
+    "torque",
+    "tau",
+    "temp",
+    "motor",
+    "load",
+    "err",
+    "error",
+    "sigma",
+    "std",
+    "acc",
+    "e",
+    "drehmoment",
+    "speed",
+];
+
+/// What stands beside the name of an axis where several points are in one table.
+pub(super) const MEASURED: [&str; 19] = [
+    "ist",
+    "actual",
+    "act",
+    "meas",
+    "measured",
+    "measurement",
+    "mess",
+    "gemessen",
+    "real",
+    "tracker",
+    "laser",
+    "lt",
+    "mes",
+    "mesure",
+    "mesur\u{e9}",
+    "mesur\u{e9}e",
+    "medido",
+    "medida",
+    "misurato",
+];
+pub(super) const WANTED: [&str; 29] = [
+    "soll",
+    "nom",
+    "nominal",
+    "cmd",
+    "command",
+    "commanded",
+    "target",
+    "wanted",
+    "ref",
+    "reference",
+    "programmed",
+    "goal",
+    "desired",
+    "setpoint",
+    "planned",
+    "plan",
+    "cad",
+    "theo",
+    "theoretical",
+    "th\u{e9}orique",
+    "te\u{f3}rico",
+    "teorico",
+    "consigne",
+    "robot",
+    "controller",
+    "steuerung",
+    "sim",
+    "simulated",
+    "model",
+];
+pub(super) const DIFFERENCE: [&str; 18] = [
+    "dif",
+    "diff",
+    "difference",
+    "differenz",
+    "d",
+    "delta",
+    "dev",
+    "deviation",
+    "abw",
+    "abweichung",
+    "err",
+    "error",
+    "fehler",
+    "\u{e9}cart",
+    "ecart",
+    "desv",
+    "desviaci\u{f3}n",
+    "erreur",
+];
+/// Differences that are usually target less measured point; others are measured point less target.
+pub(super) const TARGET_LESS_MEASURED: [&str; 4] = ["dif", "diff", "difference", "differenz"];
+pub(super) const SIGMA: [&str; 12] =
+    ["std", "stdev", "stddev", "sigma", "sd", "u", "unc", "uncertainty", "unsicherheit", "rms", "\u{3c3}", "s"];
+
+/// What columns of points' names are called.
+pub(super) const IDS: [&str; 38] = [
+    "point",
+    "point_id",
+    "pointid",
+    "point_name",
+    "pointname",
+    "id",
+    "name",
+    "pose",
+    "pose_id",
+    "nr",
+    "no",
+    "number",
+    "nummer",
+    "num",
+    "punkt",
+    "punktname",
+    "punktnummer",
+    "punkt_nr",
+    "messpunkt",
+    "bezeichnung",
+    "index",
+    "label",
+    "target",
+    "measurement",
+    "pt",
+    "pts",
+    "p",
+    "nom",
+    "nombre",
+    "nome",
+    "punto",
+    "point_no",
+    "row",
+    "sample",
+    "messung",
+    "repere",
+    "rep\u{e8}re",
+    "n",
+];
+pub(super) const PAYLOADS: [&str; 23] = [
+    "payload",
+    "payload_mass",
+    "load",
+    "mass",
+    "weight",
+    "last",
+    "traglast",
+    "nutzlast",
+    "zuladung",
+    "gewicht",
+    "masse",
+    "lastmasse",
+    "charge",
+    "charge_utile",
+    "poids",
+    "carga",
+    "carga_util",
+    "carga_\u{fa}til",
+    "peso",
+    "masa",
+    "carico",
+    "load_mass",
+    "tool_load",
+];
+pub(super) const TEMPERATURES: [&str; 7] =
+    ["temp", "temperature", "temperatur", "temp\u{e9}rature", "temperatura", "temps_c", "raumtemperatur"];
+pub(super) const TIMES: [&str; 15] = [
+    "time",
+    "t",
+    "timestamp",
+    "stamp",
+    "zeit",
+    "zeitstempel",
+    "messzeit",
+    "uhrzeit",
+    "temps",
+    "horodatage",
+    "heure",
+    "tiempo",
+    "hora",
+    "tempo",
+    "clock",
+];
+pub(super) const USAGES: [&str; 5] = ["use", "usage", "set", "verwendung", "split"];
+/// Which of several reflectors was measured.
+pub(super) const REFLECTORS: [&str; 6] = ["target", "smr", "reflector", "reflektor", "retro", "prism"];

@@ -1,0 +1,237 @@
+//! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
+
+use super::{
+    Arm, Chain, Circumstance, Coverage, Found, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse, least_change,
+    one_step,
+};
+use crate::effect::LONG_AFTER;
+use crate::robot::RobotModel;
+use crate::spatial::Pose;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use rayon::prelude::*;
+
+/// m and rad: a target farther off is said to be not reached.
+const REACHED: f64 = 1e-6;
+
+/// rad: a stretched wrist turns a pose by less, 1 deg; a pose farther turned is another one.
+const TURNED_AWAY: f64 = std::f64::consts::PI / 180.0;
+
+/// rad or m: a smaller move has no direction.
+const STILL: f64 = 1e-9;
+
+/// A target as it was given, SI.
+#[derive(Debug, Clone, Default)]
+pub struct Target {
+    pub q: Option<Vec<f64>>,
+    /// Base frame.
+    pub point: Option<Vector3<f64>>,
+    pub rotation: Option<Matrix3<f64>>,
+    pub payload: Option<f64>,
+    pub temperature: Option<f64>,
+    pub time: Option<f64>,
+    pub direction: Option<Vec<f64>>,
+    pub current: Option<Vec<f64>>,
+}
+
+/// How to correct, and what holds where a target does not say.
+#[derive(Debug, Clone)]
+pub struct Manner {
+    /// Cartesian columns are the targets though there are joints; these then say near which posture.
+    pub cartesian: bool,
+    /// Whether joint targets keep the nominal orientation.
+    pub oriented: bool,
+    pub one_step: bool,
+    pub payload: f64,
+    pub temperature: Option<f64>,
+    pub time: Option<f64>,
+    /// Whether the model knows times: one of a recording without a clock knows rows.
+    pub clock: bool,
+    pub direction: Option<f64>,
+    /// Where the first Cartesian target is searched from.
+    pub start: Option<Vec<f64>>,
+}
+
+/// A command and what is known of it, SI.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// None where the target is not reached: no joints are better than wrong ones.
+    pub q: Option<Vec<f64>>,
+    /// How far the uncorrected command would be off by the model.
+    pub uncorrected: f64,
+    pub residual: f64,
+    pub iterations: usize,
+    pub sigma: Option<f64>,
+    /// What is wrong with it; empty if nothing.
+    pub remark: String,
+}
+
+/// Corrects targets in their order: what a target does not say follows from the one before.
+pub struct Corrector<'a> {
+    arm: &'a Arm,
+    coverage: Option<Coverage>,
+    uncertainty: Option<Uncertainty>,
+    manner: Manner,
+    /// Nominal joints of the target before.
+    last: Option<Vec<f64>>,
+    direction: Vec<f64>,
+    pub tally: Tally,
+}
+
+/// What became of all targets.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    pub targets: u64,
+    pub uncorrected_sum: f64,
+    pub uncorrected_max: f64,
+    /// Of those that are reached.
+    pub residual_max: f64,
+    pub not_reached: u64,
+    pub turned: u64,
+    pub beyond_limits: u64,
+    pub beyond_measured: u64,
+}
+
+struct Job {
+    /// None: the point that the nominal robot reaches at `home`.
+    wanted: Option<Wanted>,
+    home: Vec<f64>,
+    circumstance: Circumstance,
+}
+
+impl<'a> Corrector<'a> {
+    pub fn new(arm: &'a Arm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
+        let joints = arm.model().robot.joints();
+        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: Tally::default() }
+    }
+
+    pub fn has_uncertainty(&self) -> bool {
+        self.uncertainty.is_some()
+    }
+
+    /// Answers in the order of the targets, which follow those of the batch before.
+    pub fn batch(&mut self, targets: Vec<Target>) -> Vec<Answer> {
+        let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
+        let this: &Self = self;
+        let answers: Vec<Answer> = jobs
+            .par_iter()
+            .map_init(
+                || (this.arm.reach(), Nominal::new(&this.arm.model().robot)),
+                |(reach, nominal), job| this.solve(reach, nominal, job),
+            )
+            .collect();
+        for answer in &answers {
+            self.tally.add(answer);
+        }
+        answers
+    }
+
+    fn prepare(&mut self, target: Target) -> Job {
+        let robot: &RobotModel = &self.arm.model().robot;
+        let n = robot.joints();
+        let (wanted, home) = match (target.q, target.point) {
+            (Some(q), point) if !(self.manner.cartesian && point.is_some()) => (None, q),
+            (q, point) => {
+                let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
+                let oriented = target.rotation.is_some();
+                let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
+                let wanted = Wanted { pose, oriented };
+                let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
+                (Some(wanted), home)
+            }
+        };
+        if let Some(last) = &self.last {
+            for (direction, (now, before)) in self.direction.iter_mut().zip(home.iter().zip(last)) {
+                if (now - before).abs() > STILL {
+                    *direction = (now - before).signum();
+                }
+            }
+        }
+        self.last.get_or_insert_default().clone_from(&home);
+        let fixed = self.manner.direction.map(|direction| vec![direction; n]);
+        let circumstance = Circumstance {
+            payload: target.payload.unwrap_or(self.manner.payload),
+            temperature: target.temperature.or(self.manner.temperature),
+            time: target.time.or(self.manner.time).filter(|_| self.manner.clock).unwrap_or(LONG_AFTER),
+            direction: target.direction.or(fixed).unwrap_or_else(|| self.direction.clone()),
+            current: target.current,
+        };
+        Job { wanted, home, circumstance }
+    }
+
+    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> Answer {
+        reach.under(&job.circumstance);
+        let wanted = job.wanted.unwrap_or_else(|| Wanted { pose: nominal.place(&job.home), oriented: self.manner.oriented });
+        let found: Found = if self.manner.one_step {
+            one_step(reach, nominal, &wanted, &job.home)
+        } else {
+            Self::reached(reach, &wanted, &job.home)
+        };
+        let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
+        let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
+        let mut remarks = Vec::new();
+        let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
+        let faces = !turned || found.turn <= TURNED_AWAY;
+        let reached = off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
+        if !reached {
+            remarks.push(if faces { format!("not reached, {:.3} mm off", found.residual * 1e3) } else { "not reached".into() });
+        }
+        if turned {
+            remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
+        }
+        if reached {
+            remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
+            remarks.extend(self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance)));
+            let share = reach.share();
+            if share < 1.0 {
+                remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+            }
+        }
+        Answer {
+            q: reached.then_some(found.q),
+            uncorrected: found.before,
+            residual: found.residual,
+            iterations: found.iterations,
+            sigma,
+            remark: remarks.join("; "),
+        }
+    }
+}
+
+impl Corrector<'_> {
+    /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
+    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> Found {
+        let found = least_change(reach, wanted, home, home);
+        if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
+            return found;
+        }
+        let point = Wanted { oriented: false, ..*wanted };
+        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
+        let turn = wanted.turn_left(&reach.place(&q));
+        Found { q, residual, turn, before, iterations: iterations + found.iterations }
+    }
+}
+
+impl Tally {
+    fn add(&mut self, answer: &Answer) {
+        self.targets += 1;
+        self.uncorrected_sum += answer.uncorrected;
+        self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
+        if answer.q.is_some() {
+            self.residual_max = self.residual_max.max(answer.residual);
+        }
+        self.not_reached += u64::from(answer.q.is_none());
+        self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
+        self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
+        self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
+    }
+}
+
+/// How far (m) the nominal robot stays away from a Cartesian target: one step does not say whether there is a way.
+fn left_by_nominal(nominal: &mut Nominal, job: &Job) -> f64 {
+    job.wanted.map_or(0.0, |wanted| (nominal.place(&job.home).translation - wanted.pose.translation).norm())
+}
+
+/// A about z, then B about the new y, then C about the new x (rad): KUKA's A, B, C.
+pub fn turns(a: f64, b: f64, c: f64) -> Matrix3<f64> {
+    Rotation3::from_euler_angles(c, b, a).into_inner()
+}

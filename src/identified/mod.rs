@@ -1,0 +1,201 @@
+//! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
+
+mod standing;
+
+pub use standing::standing_of;
+
+use crate::compensate::{Arm, Coverage, Uncertainty};
+use crate::effect::Load;
+use crate::error::{Error, Result, nearest};
+use crate::estimate::Model;
+use crate::estimate::network::Correction;
+use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
+use crate::raw;
+use crate::robot::description::RobotDescription;
+use crate::robot::import::{Text, read_calib, read_case};
+use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::stage::{Diagnose, Stage};
+use crate::store::frame::Frame;
+use crate::store::{Store, TableRef};
+use crate::table::{Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
+use std::path::{Path, PathBuf};
+
+/// What was identified, and from what.
+pub struct Identified {
+    pub robot: RobotDescription,
+    pub parameters: Parameters,
+    pub model: Model,
+    pub correction: Option<Correction>,
+    /// The recording, where it is known.
+    pub data: Option<Measurements>,
+    /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
+    pub origin: String,
+    /// What the person must know of it.
+    pub warnings: Vec<String>,
+}
+
+/// A table of parameters as a file, and the robot that they are of.
+pub struct Files {
+    pub parameters: PathBuf,
+    pub robot: PathBuf,
+    /// Takes tables that carry no content hash.
+    pub unchecked: bool,
+}
+
+/// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
+pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
+    let writes = |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
+    let steps: Vec<usize> = (0..plan.stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
+    if steps.is_empty() {
+        return Err(Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"));
+    }
+    Ok(steps)
+}
+
+impl Identified {
+    /// The model of a run that is done: of `step`, else of the step that stands for it, else of the last stage that writes parameters.
+    pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
+        let run = &manifest.run_id;
+        if manifest.status != RunStatus::Done {
+            let status = if manifest.status == RunStatus::Failed { "failed" } else { "running or was killed" };
+            return Err(Error::spec(run, format!("the run {status}, it is not done")));
+        }
+        let stands = if step.is_none() { standing_of(manifest, store)? } else { None };
+        let (stage, table) = chosen(manifest, step, stands.as_ref())?;
+        let load = |table: &TableRef| load(store, table, manifest);
+        let last = |kind: &str| manifest.stages.iter().flat_map(|stage| &stage.outputs).rfind(|output| output.kind == kind);
+        let robot = last(Robot::KIND).ok_or_else(|| Error::spec(run, "the run has no table `robot`"))?;
+        let robot = Robot::from_frame(&load(&robot.table)?)?.to_description()?;
+        let parameters = Parameters::from_frame(&load(table)?)?;
+        // A correction was learned on top of one model and belongs to no other.
+        let withdrawn = |id: &str| stands.iter().flat_map(|stands| &stands.withdrawn).any(|gone| gone.step == id);
+        let learned = manifest.stages.iter().filter(|stage| !withdrawn(&stage.id)).rfind(|stage| {
+            stage.inputs.iter().any(|input| input.table.table_hash == table.table_hash)
+                && stage.outputs.iter().any(|output| output.kind == Network::KIND)
+        });
+        let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
+        let recording = last(Recording::KIND).map(|output| Recording::from_frame(&load(&output.table)?)).transpose()?;
+        let prismatic: Vec<bool> =
+            (0..robot.joints.len()).map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint)).collect();
+        let correction = match network {
+            Some(network) => Network::from_frame(&load(&network.table)?)?.correction(&prismatic)?,
+            None => None,
+        };
+        let data = recording.map(|table| table.measurements(&Instrument::default()));
+        let origin = format!("run {run}, stage {}", stage.id);
+        let warnings = stands.iter().flat_map(|stands| &stands.withdrawn).map(ToString::to_string).collect();
+        Ok(Self { correction, data, warnings, ..Self::of(robot, parameters, origin)? })
+    }
+
+    /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
+    pub fn of_files(files: &Files) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let loose = from_file::<Parameters>(&files.parameters)?;
+        let parameters = files.vouched(&files.parameters, loose, &mut warnings)?;
+        let robot = if ending(&files.robot) == "parquet" {
+            let loose = from_file::<Robot>(&files.robot)?;
+            files.vouched(&files.robot, loose, &mut warnings)?.to_description()?
+        } else {
+            read_robot(&files.robot)?
+        };
+        let origin = format!("table {}", files.parameters.display());
+        Ok(Self { warnings, ..Self::of(robot, parameters, origin)? })
+    }
+
+    fn of(robot: RobotDescription, parameters: Parameters, origin: String) -> Result<Self> {
+        if parameters.is_beside() {
+            let message = "these parameters correct the simulation of sim_x, sim_y, sim_z, not the model of the robot file, which alone can be \
+                           compensated and exported: take another stage's with --step, or diagnose the recording without these columns";
+            return Err(Error::spec(origin, message));
+        }
+        let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
+        Ok(Self { robot, parameters, model, correction: None, data: None, origin, warnings: Vec::new() })
+    }
+
+    pub fn coverage(&self) -> Option<Coverage> {
+        self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
+    }
+
+    /// The uncertainty of what the model predicts; none where it was not identified from a recording that is at hand.
+    pub fn uncertainty(&self, arm: &Arm) -> Option<Uncertainty> {
+        let data = self.data.as_ref()?;
+        let specs = self.model.stack.specs();
+        let known = |name: &str| self.parameters.0.iter().any(|row| row.name == name && row.sigma.is_some());
+        let free: Vec<usize> = (0..specs.len()).filter(|k| known(&specs[*k].name)).collect();
+        let mut off: Vec<f64> =
+            self.model.predict(data).iter().zip(&data.position).map(|(model, measured)| (model - measured).norm()).collect();
+        off.sort_by(f64::total_cmp);
+        // Of a point with one sigma per axis, half the errors are shorter: suspects do not count.
+        const MEDIAN: f64 = 1.538;
+        let sigma = off.get(off.len() / 2)? / MEDIAN;
+        Uncertainty::new(arm, &free, data, sigma)
+    }
+}
+
+/// The stage whose parameters are taken, and the parameters.
+fn chosen<'m>(
+    manifest: &'m Manifest,
+    step: Option<&str>,
+    stands: Option<&Standing>,
+) -> Result<(&'m StageReport, &'m TableRef)> {
+    let with = |stage: &'m StageReport| {
+        stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|output| (stage, &output.table))
+    };
+    let found: Vec<(&StageReport, &TableRef)> = manifest.stages.iter().filter_map(with).collect();
+    let Some(step) = step else {
+        let standing = stands.and_then(|stands| found.iter().find(|(stage, _)| stage.id == stands.model));
+        let diagnosed = found.iter().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
+        let taken = standing.or(diagnosed).or(found.last()).copied();
+        return taken.ok_or_else(|| Error::spec(&manifest.run_id, "the run identified nothing"));
+    };
+    found.iter().find(|(stage, _)| stage.id == *step).copied().ok_or_else(|| {
+        let ids: Vec<&str> = found.iter().map(|(stage, _)| stage.id.as_str()).collect();
+        let hint = nearest(step, ids.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+        Error::spec("--step", format!("no stage `{step}` writes parameters; {hint}allowed: {}", ids.join(", ")))
+    })
+}
+
+/// A table of a run, of which nothing is made anew here: one that is damaged or gone is refused.
+fn load(store: &Store, table: &TableRef, manifest: &Manifest) -> Result<Frame> {
+    let path = store.object(table)?;
+    if !store.is_whole(table)? {
+        let message = format!(
+            "is not the table that run {} wrote: it is damaged or was taken away. `calib run {}` makes it anew",
+            manifest.run_id, manifest.pipeline.file
+        );
+        return Err(Error::data(path.display().to_string(), message));
+    }
+    store.load(table)
+}
+
+impl Files {
+    /// A table whose numbers are those that calib wrote, or that the person takes as they are.
+    fn vouched<T>(&self, path: &Path, loose: Loose<T>, warnings: &mut Vec<String>) -> Result<T> {
+        let place = path.display().to_string();
+        match (loose.vouched, self.unchecked) {
+            (true, _) => {}
+            (false, true) => {
+                warnings.push(format!("{place} carries no content hash: whether its numbers were changed cannot be told"))
+            }
+            (false, false) => {
+                let message = "carries no content hash, as a file has that another program wrote: whether its numbers were changed since they were \
+                               identified cannot be told, and they move a robot. Take the file that calib wrote (`tables/` in the store), or say \
+                               --unchecked";
+                return Err(Error::data(place, message));
+            }
+        }
+        Ok(loose.table)
+    }
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase()
+}
+
+/// Reads the practice layout (`.json`), or calib's YAML.
+fn read_robot(path: &Path) -> Result<RobotDescription> {
+    let label = path.display().to_string();
+    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
+    let file = Text { label: &label, text: &text };
+    Ok(if ending(path) == "json" { read_case(file)?.robot } else { read_calib(file, None)?.robot })
+}

@@ -1,0 +1,89 @@
+//! What can be seen of a plan's input files without running it: the robot, the headers of the data. All faults at once.
+
+use super::plan::{InputFile, PlannedStage};
+use super::{Plan, services};
+use crate::error::{Error, Fault, Result};
+use crate::stage::{Context, Output, RawFile, Services, Sink, Source};
+use crate::store::frame::Frame;
+use std::sync::{Mutex, PoisonError};
+
+/// Looks at every stage's files. Gives what stages warn of; fails with the faults of all files, as faults of the author's where one
+/// of them is (a robot file), else as faults of the data.
+pub fn look(plan: &Plan) -> Result<Vec<String>> {
+    let mut tables: Vec<Option<Vec<Frame>>> = Vec::new();
+    let (mut spec, mut data, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
+    for stage in &plan.stages {
+        let services = Onlooker { id: &stage.id, files: &stage.files, warnings: Mutex::default() };
+        let context = Context { id: &stage.id, seed: 0, jobs: 1, services: &services };
+        let seen = stage.stage.look(frames(plan, stage, &tables), &context);
+        let warned = services.warnings.into_inner().unwrap_or_else(PoisonError::into_inner);
+        warnings.extend(warned.into_iter().map(|line| format!("{}: {line}", stage.id)));
+        tables.push(match seen {
+            Ok(outputs) => outputs.and_then(in_memory),
+            Err(Error::Spec(faults)) => {
+                spec.extend(faults);
+                None
+            }
+            Err(Error::Data(faults)) => {
+                data.extend(faults);
+                None
+            }
+            Err(other) => return Err(other),
+        });
+    }
+    let authors = !spec.is_empty();
+    let mut faults: Vec<Fault> = Vec::new();
+    for fault in spec.into_iter().chain(data) {
+        // A file that two stages read has its faults once.
+        if !faults.contains(&fault) {
+            faults.push(fault);
+        }
+    }
+    match (faults.is_empty(), authors) {
+        (true, _) => Ok(warnings),
+        (_, true) => Err(Error::Spec(faults)),
+        _ => Err(Error::Data(faults)),
+    }
+}
+
+/// The tables that a stage reads, if those before it could give them all.
+fn frames(plan: &Plan, stage: &PlannedStage, tables: &[Option<Vec<Frame>>]) -> Option<Vec<Vec<(String, Frame)>>> {
+    let inputs = stage.inputs.iter().map(|input| {
+        let frames = input.from.iter().map(|origin| {
+            let frame = tables.get(origin.stage)?.as_ref()?.get(origin.port)?;
+            Some((plan.stages.get(origin.stage)?.id.clone(), frame.clone()))
+        });
+        frames.collect()
+    });
+    inputs.collect()
+}
+
+fn in_memory(outputs: Vec<Output>) -> Option<Vec<Frame>> {
+    let frames = outputs.into_iter().map(|output| match output {
+        Output::Frame(frame) => Some(frame),
+        Output::Streamed(_) => None,
+    });
+    frames.collect()
+}
+
+/// Opens files, writes nothing and keeps what a stage warns of.
+struct Onlooker<'a> {
+    id: &'a str,
+    files: &'a [InputFile],
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Services for Onlooker<'_> {
+    fn open(&self, file: &RawFile) -> Result<Source> {
+        services::open(self.id, self.files, file)
+    }
+    fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
+        Err(Error::Bug(format!("stage {} writes a table of {kind} while it is only looked at", self.id)))
+    }
+    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
+    fn advance(&self, _done: u64, _message: &str) {}
+    fn note(&self, _line: String) {}
+    fn warn(&self, line: String) {
+        self.warnings.lock().unwrap_or_else(PoisonError::into_inner).push(line);
+    }
+}

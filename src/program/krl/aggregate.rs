@@ -1,0 +1,202 @@
+//! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
+
+use super::super::token::{Sort, Source, Token};
+use super::super::{Found, Kind, Literal, quoted};
+use super::line::opens;
+use std::ops::Range;
+
+const AXES: [&str; 6] = ["A1", "A2", "A3", "A4", "A5", "A6"];
+const FRAME: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
+const EXTERNALS: [&str; 6] = ["E1", "E2", "E3", "E4", "E5", "E6"];
+const STATUS: [&str; 2] = ["S", "T"];
+
+/// A type of targets, by its fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Type {
+    axes: bool,
+    externals: usize,
+    status: bool,
+}
+
+impl Type {
+    pub const FRAME: Self = Self { axes: false, externals: 0, status: false };
+
+    /// By name, in capitals; none for types of no target.
+    pub fn of(name: &str) -> Option<Self> {
+        let (axes, externals) = match name {
+            "POS" => (false, 0),
+            "E3POS" => (false, 3),
+            "E6POS" => (false, 6),
+            "AXIS" => (true, 0),
+            "E3AXIS" => (true, 3),
+            "E6AXIS" => (true, 6),
+            _ => return None,
+        };
+        Some(Self { axes, externals, status: !axes })
+    }
+
+    pub fn is_of_axes(self) -> bool {
+        self.axes
+    }
+
+    fn coordinates(self) -> [&'static str; 6] {
+        if self.axes { AXES } else { FRAME }
+    }
+
+    fn others(self) -> impl Iterator<Item = &'static str> {
+        STATUS.into_iter().filter(move |_| self.status).chain(EXTERNALS.into_iter().take(self.externals))
+    }
+}
+
+/// The tokens of an aggregate, braces included.
+pub(super) struct Aggregate<'t> {
+    source: Source<'t>,
+    tokens: &'t [Token],
+    prefix: Option<String>,
+    /// Between the commas.
+    fields: Vec<&'t [Token]>,
+}
+
+impl<'t> Aggregate<'t> {
+    pub fn new(source: Source<'t>, tokens: &'t [Token]) -> Self {
+        let mut inner = &tokens[1..tokens.len() - 1];
+        let mut prefix = None;
+        if let [name, colon, rest @ ..] = inner
+            && name.sort == Sort::Word
+            && colon.is(b':')
+        {
+            (prefix, inner) = (Some(source.upper(name)), rest);
+        }
+        let mut depth = 0;
+        let fields = inner
+            .split(|token| {
+                depth += opens(token);
+                depth == 0 && token.is(b',')
+            })
+            .collect();
+        Self { source, tokens, prefix, fields }
+    }
+
+    /// The type before the colon, in capitals.
+    pub fn prefix(&self) -> Option<String> {
+        self.prefix.clone()
+    }
+
+    /// Names of the fields that have one, in capitals.
+    fn names(&self) -> impl Iterator<Item = String> {
+        self.fields
+            .iter()
+            .filter_map(|field| field.first())
+            .filter(|token| token.sort == Sort::Word)
+            .map(|token| self.source.upper(token))
+    }
+
+    fn has_axes(&self) -> bool {
+        self.names().any(|name| AXES.contains(&name.as_str()))
+    }
+
+    /// What it is as operand of a motion.
+    pub fn by_fields(&self) -> Type {
+        let axes = self.has_axes();
+        Type { axes, externals: 6, status: !axes }
+    }
+
+    /// X, Y, Z, A, B, C and nothing else: a FRAME as much as a POS.
+    pub fn is_frame(&self) -> bool {
+        let names: Vec<String> = self.names().collect();
+        names.iter().any(|name| name == "X") && names.iter().all(|name| FRAME.contains(&name.as_str()))
+    }
+
+    /// Whether its fields are those of a target.
+    pub fn may_be_target(&self) -> bool {
+        let names: Vec<String> = self.names().collect();
+        let of = |sets: &[&[&str]], name: &String| sets.iter().any(|set| set.contains(&name.as_str()));
+        names.iter().any(|name| of(&[&AXES, &FRAME[..3]], name))
+            || (!names.is_empty() && names.iter().all(|name| of(&[&FRAME, &STATUS, &EXTERNALS], name)))
+    }
+
+    /// How its type is stated.
+    pub fn advice(&self) -> &'static str {
+        if self.has_axes() {
+            "`{E6AXIS: ...}`"
+        } else {
+            "`{E6POS: ...}` for a target, `{FRAME: ...}` for a frame, which stays as it is"
+        }
+    }
+
+    /// The bytes of a field's value.
+    fn value(&self, field: &[Token]) -> Range<usize> {
+        self.source.over(&field[1..], field[0].span.end)
+    }
+
+    /// Takes it as a target of type `kind`, or says everything that is wrong with it.
+    pub fn take(&self, kind: Type, found: &mut Found) {
+        let open = self.tokens[0].span.start;
+        let before = found.faults.len();
+        let mut numbers: Vec<(String, f64, Range<usize>)> = Vec::new();
+        let mut at = self.tokens[0].span.end;
+        for field in &self.fields {
+            let Some(first) = field.first() else {
+                found.fault(at, "a field is empty");
+                continue;
+            };
+            at = field.last().map_or(at, |token| token.span.end);
+            if let Some(number) = self.field(kind, field, first, found) {
+                if numbers.iter().any(|(name, ..)| *name == number.0) {
+                    found.fault(first.span.start, format!("{} is given twice", number.0));
+                }
+                numbers.push(number);
+            }
+        }
+        if found.faults.len() > before {
+            return;
+        }
+        let given = |name: &str| numbers.iter().find(|(given, ..)| given == name);
+        for (name, value, span) in numbers.iter().filter(|(name, value, _)| EXTERNALS.contains(&name.as_str()) && *value != 0.0) {
+            let message = format!("{name} is {value}: calib assumed that external axes stand at 0 and do not move the robot");
+            found.warn(span.start, message);
+        }
+        let names = kind.coordinates();
+        let missing: Vec<&str> = names.into_iter().filter(|name| given(name).is_none()).collect();
+        if !missing.is_empty() {
+            found.partial(open, format!("the target has no {}; a target is corrected whole or not at all", missing.join(", ")));
+            return;
+        }
+        let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
+        found.literals.push(Literal { kind: if kind.axes { Kind::Joints } else { Kind::Frame }, values, spans });
+    }
+
+    /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.
+    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Found) -> Option<(String, f64, Range<usize>)> {
+        let bytes = self.source.bytes;
+        if first.sort != Sort::Word {
+            found.fault(first.span.start, format!("{} has no name", quoted(bytes, self.source.over(field, 0))));
+            return None;
+        }
+        let name = self.source.upper(first);
+        if !kind.coordinates().into_iter().chain(kind.others()).any(|known| known == name) {
+            let allowed: Vec<&str> = kind.coordinates().into_iter().chain(kind.others()).collect();
+            let given = quoted(bytes, first.span.clone());
+            found.fault(first.span.start, format!("unknown field {given} (allowed: {})", allowed.join(", ")));
+            return None;
+        }
+        let value = &field[1..];
+        if let Some((number, span)) = self.source.number(value) {
+            return Some((name, number, span));
+        }
+        let span = self.value(field);
+        // `T 'B101010'`: a bit pattern.
+        if STATUS.contains(&name.as_str())
+            && matches!(value, [only] if only.sort == Sort::Text && bytes[only.span.start] == b'\'')
+        {
+            return Some((name, 0.0, span));
+        }
+        let message = if value.is_empty() {
+            format!("{name} has no number")
+        } else {
+            format!("{name} is {}, expected a number", quoted(bytes, span.clone()))
+        };
+        found.fault(span.start, message);
+        None
+    }
+}

@@ -1,0 +1,311 @@
+//! KUKA KRL: a statement a line. Targets are the aggregates `{...}` of motions, and of variables of a type of targets.
+//!
+//! Types: POS, E3POS, E6POS and AXIS, E3AXIS, E6AXIS, by the aggregate's own prefix (`{E6POS: X 1,...}`), else by the variable's declaration
+//! in the same file, else by the motion. FRAME is a target only as operand of a motion. Variables of the system (`$BASE`, `$H_POS`),
+//! relative motions (`LIN_REL`) and motions of external axes (`ASYPTP`) are left alone. What the geometric operator `:` joins is no
+//! absolute pose: such targets are refused, and so is every aggregate that may be a target and of which the file does not tell.
+
+mod aggregate;
+mod frames;
+mod line;
+
+use super::token::{Sort, Source, Token, tokens};
+use super::{DEPTH, Found, Language, quoted};
+use aggregate::{Aggregate, Type};
+use line::{closing, declared, member, opens, variable};
+use std::collections::BTreeMap;
+
+/// Motions, and how many positions each has.
+const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
+
+/// What moves by a distance, or no axis of the robot.
+const LEFT: [&str; 8] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL", "SCIRC_REL", "SPL_REL", "ASYPTP"];
+
+/// What may stand behind a position: how it is blended.
+const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
+
+const RELATIVE: &str = "the geometric operator `:` makes a relative pose of its operand; calib corrects absolute ones alone";
+
+/// Frames of the system that are kept in files.
+const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
+
+pub(super) fn read(bytes: &[u8]) -> Found {
+    let mut found = Found::default();
+    let source = Source { bytes, language: Language::Krl };
+    let tokens = tokens(source, &mut found);
+    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == Sort::LineEnd).filter(|line| !line.is_empty()).collect();
+    let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for line in &lines {
+        if let Some((kind, names)) = declared(source, line) {
+            for name in names {
+                let known = types.entry(name).or_default();
+                if !known.contains(&kind) {
+                    known.push(kind.clone());
+                }
+            }
+        }
+    }
+    let mut reader = Reader { source, types, found };
+    for line in lines {
+        reader.line(line);
+    }
+    reader.found
+}
+
+struct Reader<'p> {
+    source: Source<'p>,
+    /// Variable -> types it is declared with anywhere in the file.
+    types: BTreeMap<String, Vec<String>>,
+    found: Found,
+}
+
+impl Reader<'_> {
+    fn line(&mut self, line: &[Token]) {
+        if !self.braces_match(line) {
+            return;
+        }
+        frames::set(self.source, line, &mut self.found);
+        let head = self.source.upper(&line[0]);
+        if LEFT.contains(&head.as_str()) {
+            return;
+        }
+        if let Some((_, positions)) = MOTIONS.iter().find(|(name, _)| *name == head) {
+            // `PTP = 3` names a variable.
+            if !line.get(1).is_some_and(|next| next.is(b'=')) {
+                return self.motion(line, *positions);
+            }
+        }
+        self.other(line, &head);
+    }
+
+    fn braces_match(&mut self, line: &[Token]) -> bool {
+        let mut open: Vec<&Token> = Vec::new();
+        let before = self.found.faults.len();
+        for token in line {
+            if token.is(b'{') {
+                open.push(token);
+                if open.len() == DEPTH {
+                    self.found.fault(token.span.start, "brackets are nested too deep");
+                }
+            } else if token.is(b'}') && open.pop().is_none() {
+                self.found.fault(token.span.start, "`}` without `{`");
+            }
+        }
+        for token in open {
+            self.found.fault(token.span.start, "`{` without `}` on its line");
+        }
+        self.found.faults.len() == before
+    }
+
+    fn motion(&mut self, line: &[Token], positions: usize) {
+        if let Some(colon) = self.geometric(line) {
+            self.found.fault(colon, RELATIVE);
+            return;
+        }
+        let end = line.iter().position(|token| self.source.is_word(token, &["WITH"])).unwrap_or(line.len());
+        let (mut depth, mut operand, mut begins) = (0, 0, true);
+        let mut k = 1;
+        while k < end {
+            let token = &line[k];
+            if !token.is(b'{') {
+                depth += opens(token);
+                if depth == 0 && token.is(b',') {
+                    (operand, begins) = (operand + 1, true);
+                } else {
+                    begins = false;
+                }
+                k += 1;
+                continue;
+            }
+            let close = closing(line, k);
+            let behind = line.get(close + 1).filter(|_| close + 1 < end);
+            let whole = begins && operand < positions;
+            if !whole || depth != 0 {
+                self.found.fault(token.span.start, "an aggregate that is no position of this motion");
+            } else if let Some(stray) = behind.filter(|next| !(next.is(b',') || self.source.is_word(next, &BLENDING))) {
+                let text = quoted(self.source.bytes, stray.span.clone());
+                self.found.fault(stray.span.start, format!("{text} behind a position is not understood"));
+            } else {
+                self.position(&line[k..=close]);
+            }
+            (k, begins) = (close + 1, false);
+        }
+        self.settings(&line[end..]);
+    }
+
+    /// An operand of a motion.
+    fn position(&mut self, tokens: &[Token]) {
+        let aggregate = Aggregate::new(self.source, tokens);
+        let kind = match aggregate.prefix() {
+            None => aggregate.by_fields(),
+            Some(name) => match Type::of(&name).or((name == "FRAME").then_some(Type::FRAME)) {
+                Some(kind) => kind,
+                None => {
+                    let message = format!("type {name} is not understood as a position");
+                    self.found.fault(tokens[0].span.start, message);
+                    return;
+                }
+            },
+        };
+        aggregate.take(kind, &mut self.found);
+    }
+
+    /// What stands behind WITH sets variables of the system: `$BASE = {...}`, `$VEL = {...}`.
+    fn settings(&mut self, tokens: &[Token]) {
+        let mut k = 0;
+        while k < tokens.len() {
+            if tokens[k].is(b'{') {
+                let close = closing(tokens, k);
+                let system = k > 1 && tokens[k - 1].is(b'=') && self.source.upper(&tokens[k - 2]).starts_with('$');
+                if !system && Aggregate::new(self.source, &tokens[k..=close]).may_be_target() {
+                    self.found.fault(tokens[k].span.start, "an aggregate that is no position of this motion");
+                }
+                k = close;
+            }
+            k += 1;
+        }
+    }
+
+    /// Where a geometric operator stands.
+    fn geometric(&self, line: &[Token]) -> Option<usize> {
+        let label = line.len() == 2;
+        let heading = line.iter().any(|token| self.source.is_word(token, &["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"]));
+        let mut depth = 0;
+        line.iter().filter(|_| !label && !heading).find_map(|token| {
+            match token.sort {
+                Sort::Sign(b'{') => depth += 1,
+                Sort::Sign(b'}') => depth -= 1,
+                _ => {}
+            }
+            (depth == 0 && token.is(b':')).then_some(token.span.start)
+        })
+    }
+
+    /// A declaration, an assignment, or what is neither.
+    fn other(&mut self, line: &[Token], head: &str) {
+        let declares = declared(self.source, line).map(|(kind, _)| kind);
+        let has_aggregate = line.iter().any(|token| token.is(b'{'));
+        if let Some(at) = self.geometric(line) {
+            match has_aggregate {
+                _ if declares.as_deref() == Some("FRAME") || self.sets_frame(line) => {}
+                true => self.found.fault(at, RELATIVE),
+                false => self.found.warn(at, "left as it is: a pose that the program computes by the geometric operator `:`"),
+            }
+            return;
+        }
+        if !has_aggregate {
+            return self.component(line, head);
+        }
+        let mut k = 0;
+        while k < line.len() {
+            if line[k].is(b'{') {
+                let close = closing(line, k);
+                let before = self.found.literals.len();
+                self.value(&line[..k], &line[k..=close], declares.as_deref());
+                let taken = self.found.literals.len() > before;
+                if let Some(stray) = line.get(close + 1).filter(|next| taken && !next.is(b',')) {
+                    let text = quoted(self.source.bytes, stray.span.clone());
+                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                }
+                k = close;
+            }
+            k += 1;
+        }
+    }
+
+    /// Whether a line sets a variable that is known to be no target.
+    fn sets_frame(&self, line: &[Token]) -> bool {
+        let name = self.source.upper(&line[0]);
+        name.starts_with('$') || FRAME_TABLES.contains(&name.as_str()) || self.stated(&name) == Some("FRAME")
+    }
+
+    /// The one type that a variable has in this file.
+    fn stated(&self, name: &str) -> Option<&str> {
+        match self.types.get(name).map(Vec::as_slice) {
+            Some([one]) => Some(one),
+            _ => None,
+        }
+    }
+
+    /// An aggregate behind `before`, in a line that declares a type or none.
+    fn value(&mut self, before: &[Token], tokens: &[Token], declares: Option<&str>) {
+        let aggregate = Aggregate::new(self.source, tokens);
+        let at = tokens[0].span.start;
+        let (name, member) = variable(self.source, before).unwrap_or_default();
+        let prefix = aggregate.prefix();
+        if name.starts_with('$') {
+            // Of its frames `system` has told.
+            if aggregate.by_fields().is_of_axes() || prefix.as_deref().and_then(Type::of).is_some() {
+                self.found.warn(at, format!("left as it is: `{name}` is a variable of the system"));
+            }
+            return;
+        }
+        if FRAME_TABLES.contains(&name.as_str()) {
+            self.found.warn(at, frames::assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
+            return;
+        }
+        let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);
+        match prefix.or(by_name) {
+            Some(kind) => match Type::of(&kind) {
+                Some(kind) => aggregate.take(kind, &mut self.found),
+                None => {
+                    if kind == "FDAT" {
+                        frames::of_point(self.source, tokens, &mut self.found);
+                    } else if kind != "FRAME" && aggregate.may_be_target() {
+                        self.found.warn(at, format!("left as it is: {kind} is no type of targets that calib knows"));
+                    }
+                    self.nested(tokens);
+                }
+            },
+            None if aggregate.may_be_target() => {
+                let what = if name.is_empty() { "this aggregate".into() } else { format!("`{name}`") };
+                self.found.fault(at, format!("the type of {what} is not stated in this file; write {}", aggregate.advice()));
+            }
+            None => self.nested(tokens),
+        }
+    }
+
+    /// Aggregates inside one that is no target: a target by its prefix, a frame, or of a kind that is not told.
+    fn nested(&mut self, tokens: &[Token]) {
+        let mut k = 1;
+        while k < tokens.len() {
+            if tokens[k].is(b'{') {
+                let close = closing(tokens, k);
+                let inner = &tokens[k..=close];
+                let aggregate = Aggregate::new(self.source, inner);
+                match aggregate.prefix().as_deref().map(Type::of) {
+                    Some(Some(kind)) => aggregate.take(kind, &mut self.found),
+                    // The centre of mass and the inertia of a LOAD.
+                    None if self.source.is_word(&tokens[k - 1], &["CM", "J"]) => {}
+                    None if aggregate.is_frame() => {
+                        self.found.warn(inner[0].span.start, "left as it is: taken for a FRAME inside a structure");
+                    }
+                    None if aggregate.may_be_target() => {
+                        let message = format!("the type of this aggregate is not stated; write {}", aggregate.advice());
+                        self.found.fault(inner[0].span.start, message);
+                    }
+                    _ => self.nested(inner),
+                }
+                k = close;
+            }
+            k += 1;
+        }
+    }
+
+    /// `XP1.Z = 50`: one number of a target.
+    fn component(&mut self, line: &[Token], head: &str) {
+        let Some((Some(member), Some(_))) = member(self.source, &line[1..]) else { return };
+        let of_target = ["X", "Y", "Z", "A", "B", "C", "A1", "A2", "A3", "A4", "A5", "A6"].contains(&member.as_str());
+        if !of_target || head.starts_with('$') || self.sets_frame(line) {
+            return;
+        }
+        let at = line[0].span.start;
+        let types = self.types.get(head).map(Vec::as_slice).unwrap_or_default();
+        if types.iter().any(|name| Type::of(name).is_some()) {
+            self.found
+                .partial(at, format!("sets {member} of the target `{head}` alone; a target is corrected whole or not at all"));
+        } else if types.is_empty() {
+            self.found.warn(at, format!("left as it is: sets {member} of `{head}`, whose type this file does not state"));
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
+
+use std::ops::Range;
+
+/// What the numbers of a target mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Six joints, deg.
+    Joints,
+    /// X, Y, Z (mm), A about z, B about the new y, C about the new x (deg).
+    Frame,
+    /// x, y, z (mm), q1..q4 (w, x, y, z).
+    Quaternion,
+}
+
+/// A target of a program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Literal {
+    pub kind: Kind,
+    /// In the order of the kind.
+    pub values: Vec<f64>,
+    /// Where each value stands, sign included.
+    pub spans: Vec<Range<usize>>,
+}
+
+impl Literal {
+    /// The byte at which its first number stands.
+    pub fn at(&self) -> usize {
+        self.spans.iter().map(|span| span.start).min().unwrap_or_default()
+    }
+
+    /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-5 mm is 0.01 um.
+    fn decimals(&self, k: usize) -> usize {
+        match self.kind {
+            Kind::Joints => 6,
+            Kind::Frame | Kind::Quaternion if k < 3 => 5,
+            Kind::Frame => 6,
+            Kind::Quaternion => 9,
+        }
+    }
+
+    /// The numbers that change, as text, in the order of the program.
+    pub(super) fn replacements(&self, values: &[f64]) -> Vec<(Range<usize>, String)> {
+        assert_eq!(values.len(), self.values.len(), "a number for every number");
+        let mut out: Vec<(Range<usize>, String)> = Vec::new();
+        for (k, (new, old)) in values.iter().zip(&self.values).enumerate() {
+            let decimals = self.decimals(k);
+            // Half a unit of the last decimal: nothing that would be written differs.
+            if (new - old).abs() > 0.5 * 10f64.powi(-(decimals as i32)) {
+                out.push((self.spans[k].clone(), fixed(*new, decimals)));
+            }
+        }
+        out.sort_by_key(|(span, _)| span.start);
+        out
+    }
+}
+
+/// With so many decimals, and no sign before a zero.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.bytes().all(|byte| matches!(byte, b'0' | b'.')) => rest.into(),
+        _ => text,
+    }
+}

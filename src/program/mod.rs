@@ -1,0 +1,210 @@
+//! Programs of robot controllers, read strictly and rewritten: only the numbers of targets change, every other byte stays.
+//!
+//! KUKA KRL ([`krl`]) and ABB RAPID ([`rapid`]). A target is accepted where its literal is understood exactly: every field known, named
+//! once, one number each. What cannot be told to be a target or not refuses the program; nothing is guessed. A program is parsed
+//! whole before anything is solved, so that all its faults come at once.
+
+mod krl;
+mod literal;
+mod pose;
+mod rapid;
+mod token;
+
+pub use literal::{Kind, Literal};
+pub use pose::solve;
+
+use std::ops::Range;
+
+/// The languages of controllers that are known here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Language {
+    Krl,
+    Rapid,
+}
+
+impl Language {
+    /// By the ending of a file's name, in any case.
+    pub fn of_ending(ending: &str) -> Option<Self> {
+        match ending.to_ascii_lowercase().as_str() {
+            "src" | "dat" | "sub" => Some(Self::Krl),
+            "mod" | "modx" | "sys" | "sysx" | "prg" => Some(Self::Rapid),
+            _ => None,
+        }
+    }
+}
+
+/// What becomes of a target that states some of its numbers, as `LIN {X 10}`: the controller keeps the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Partial {
+    Refused,
+    Left,
+}
+
+/// Brackets in brackets, at most: targets in arrays of three dimensions have six.
+const DEPTH: usize = 16;
+
+/// Something said of a place in a program; line and column count from 1, columns in bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    pub line: usize,
+    pub column: usize,
+    pub message: String,
+}
+
+/// Why a program was refused.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Refusal {
+    /// In the order of the program.
+    pub faults: Vec<Note>,
+    /// How many of the faults are partial targets, which [`Partial::Left`] accepts.
+    pub partial: usize,
+}
+
+/// A program with what was found in it.
+#[derive(Debug)]
+pub struct Program<'p> {
+    bytes: &'p [u8],
+    /// In the order of the program.
+    literals: Vec<Literal>,
+    warnings: Vec<Note>,
+}
+
+/// The answer to one literal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solved {
+    /// The corrected numbers, in the units and the order of [`Literal::values`].
+    pub values: Vec<f64>,
+    /// What is to be known of it; empty if nothing.
+    pub remark: String,
+}
+
+/// A program with its targets corrected.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rewritten {
+    pub bytes: Vec<u8>,
+    /// In the order of the program.
+    pub warnings: Vec<Note>,
+}
+
+/// What a language's reader gathers, by byte.
+#[derive(Debug, Default)]
+struct Found {
+    literals: Vec<Literal>,
+    warnings: Vec<(usize, String)>,
+    faults: Vec<(usize, String)>,
+    partial: Vec<(usize, String)>,
+}
+
+impl Found {
+    fn warn(&mut self, at: usize, message: impl Into<String>) {
+        self.warnings.push((at, message.into()));
+    }
+
+    fn fault(&mut self, at: usize, message: impl Into<String>) {
+        self.faults.push((at, message.into()));
+    }
+
+    fn partial(&mut self, at: usize, message: impl Into<String>) {
+        self.partial.push((at, message.into()));
+    }
+}
+
+impl<'p> Program<'p> {
+    /// Reads a program whole; fails with every fault of it.
+    pub fn parse(bytes: &'p [u8], language: Language, partial: Partial) -> Result<Self, Refusal> {
+        let mut found = match language {
+            Language::Krl => krl::read(bytes),
+            Language::Rapid => rapid::read(bytes),
+        };
+        let mut refusal = Refusal::default();
+        match partial {
+            Partial::Refused => {
+                refusal.partial = found.partial.len();
+                found.faults.append(&mut found.partial);
+            }
+            Partial::Left => {
+                found.warnings.extend(found.partial.into_iter().map(|(at, what)| (at, format!("left as it is: {what}"))))
+            }
+        }
+        refusal.faults = placed(bytes, found.faults);
+        if !refusal.faults.is_empty() {
+            return Err(refusal);
+        }
+        found.literals.sort_by_key(|literal| literal.at());
+        Ok(Self { bytes, literals: found.literals, warnings: placed(bytes, found.warnings) })
+    }
+
+    /// The targets that are to be corrected.
+    pub fn literals(&self) -> &[Literal] {
+        &self.literals
+    }
+
+    /// What was assumed, or left as it is.
+    pub fn warnings(&self) -> &[Note] {
+        &self.warnings
+    }
+
+    /// The program with every literal's numbers replaced by its answer's; fails where one has none, with all the reasons.
+    ///
+    /// A number that is, to the decimals written, what it was stays as it was written.
+    pub fn rewritten(&self, answers: Vec<Result<Solved, String>>) -> Result<Rewritten, Refusal> {
+        assert_eq!(answers.len(), self.literals.len(), "one answer a literal");
+        let (mut faults, mut remarks) = (Vec::new(), Vec::new());
+        let mut bytes = Vec::with_capacity(self.bytes.len() + 16 * answers.len());
+        let mut from = 0;
+        for (literal, answer) in self.literals.iter().zip(answers) {
+            let solved = match answer {
+                Ok(solved) => solved,
+                Err(message) => {
+                    faults.push((literal.at(), message));
+                    continue;
+                }
+            };
+            for (span, text) in literal.replacements(&solved.values) {
+                bytes.extend_from_slice(&self.bytes[from..span.start]);
+                // `A1-0.1`: the sign parts the name from the number.
+                if bytes.last().is_some_and(u8::is_ascii_alphanumeric) && !text.starts_with('-') {
+                    bytes.push(b' ');
+                }
+                bytes.extend_from_slice(text.as_bytes());
+                from = span.end;
+            }
+            if !solved.remark.is_empty() {
+                remarks.push((literal.at(), solved.remark));
+            }
+        }
+        if !faults.is_empty() {
+            return Err(Refusal { faults: placed(self.bytes, faults), partial: 0 });
+        }
+        bytes.extend_from_slice(&self.bytes[from..]);
+        let mut warnings = self.warnings.clone();
+        warnings.extend(placed(self.bytes, remarks));
+        warnings.sort_by_key(|note| (note.line, note.column));
+        Ok(Rewritten { bytes, warnings })
+    }
+}
+
+/// Bytes as lines and columns, in order.
+fn placed(bytes: &[u8], mut said: Vec<(usize, String)>) -> Vec<Note> {
+    said.sort();
+    let (mut line, mut start, mut from) = (1, 0, 0);
+    said.into_iter()
+        .map(|(at, message)| {
+            for (k, _) in bytes[from..at].iter().enumerate().filter(|(_, byte)| **byte == b'\n') {
+                (line, start) = (line + 1, from + k + 1);
+            }
+            from = at;
+            Note { line, column: at - start + 1, message }
+        })
+        .collect()
+}
+
+/// A piece of a program for a message: on one line, and not without end.
+fn quoted(bytes: &[u8], span: Range<usize>) -> String {
+    const MOST: usize = 40;
+    let text = String::from_utf8_lossy(&bytes[span]);
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let text: String = words.join(" ").chars().map(|c| if c.is_control() { '?' } else { c }).collect();
+    let short: String = text.chars().take(MOST).collect();
+    if short.len() < text.len() { format!("`{short}..`") } else { format!("`{short}`") }
+}

@@ -1,0 +1,64 @@
+//! The numbers of a program as targets of the arm, and commands as numbers of a program.
+//!
+//! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
+//! controller, which believes in the nominal robot, drives the corrected joints.
+
+use super::{Kind, Literal, Solved};
+use crate::compensate::{Answer, Chain, Corrector, Nominal, Target, turns};
+use crate::robot::RobotModel;
+use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+
+/// Every literal corrected, in their order; an error says why there is no command.
+pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<Solved, String>> {
+    let answers = corrector.batch(literals.iter().map(target).collect());
+    let solved = |(literal, answer): (&Literal, &Answer)| match &answer.q {
+        Some(q) => Ok(Solved { values: values(literal, robot, q), remark: answer.remark.clone() }),
+        None => Err(answer.remark.clone()),
+    };
+    literals.iter().zip(&answers).map(solved).collect()
+}
+
+fn target(literal: &Literal) -> Target {
+    let v = &literal.values;
+    let point = || Some(Vector3::new(v[0], v[1], v[2]) * 1e-3);
+    match literal.kind {
+        Kind::Joints => Target { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..Target::default() },
+        Kind::Frame => {
+            let rotation = turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians());
+            Target { point: point(), rotation: Some(rotation), ..Target::default() }
+        }
+        Kind::Quaternion => {
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
+            Target { point: point(), rotation: Some(turn.to_rotation_matrix().into_inner()), ..Target::default() }
+        }
+    }
+}
+
+fn values(literal: &Literal, robot: &RobotModel, q: &[f64]) -> Vec<f64> {
+    if literal.kind == Kind::Joints {
+        return q.iter().map(|q| q.to_degrees()).collect();
+    }
+    let pose = Nominal::new(robot).place(q);
+    let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
+    let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
+    let given = &literal.values[3..];
+    if literal.kind == Kind::Frame {
+        let (c, b, a) = rotation.euler_angles();
+        // Of the angles that turn alike those next to the given, so that 180 does not become -180.
+        let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();
+        let alike = [[a, b, c], [a + PI, PI - b, c + PI]].map(|angles| {
+            let angles: Vec<f64> = angles.iter().zip(given).map(|(angle, given)| near(angle.to_degrees(), *given)).collect();
+            let apart: f64 = angles.iter().zip(given).map(|(a, b)| (a - b).abs()).sum();
+            (apart, angles)
+        });
+        let [first, second] = alike;
+        out.extend(if second.0 < first.0 { second.1 } else { first.1 });
+    } else {
+        let turn = UnitQuaternion::from_rotation_matrix(&rotation);
+        let new = [turn.w, turn.i, turn.j, turn.k];
+        let sign = if new.iter().zip(given).map(|(a, b)| a * b).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
+        out.extend(new.iter().map(|part| sign * part));
+    }
+    out
+}

@@ -1,0 +1,181 @@
+//! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
+
+use super::super::token::{Source, Token};
+use super::super::{Found, Kind, Literal, quoted};
+use std::ops::Range;
+
+/// deg or mm: the external axis is not connected.
+const NOT_CONNECTED: f64 = 9e9;
+
+/// How far from 1 the length of a quaternion may be: four decimals are enough.
+const UNIT: f64 = 1e-3;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Want {
+    Joints,
+    Pose,
+}
+
+impl Want {
+    pub fn name(self) -> &'static str {
+        if self == Self::Joints { "jointtarget" } else { "robtarget" }
+    }
+
+    /// How many numbers each list has.
+    fn shape(self) -> &'static [usize] {
+        if self == Self::Joints { &[6, 6] } else { &[3, 4, 4, 6] }
+    }
+}
+
+enum Item<'t> {
+    List(List<'t>),
+    Leaf(&'t [Token]),
+}
+
+/// A list that opens at the first of its tokens.
+pub(super) struct List<'t> {
+    source: Source<'t>,
+    span: Range<usize>,
+    /// How many it has, brackets included.
+    pub tokens: usize,
+    items: Vec<Item<'t>>,
+}
+
+impl<'t> List<'t> {
+    /// Reads the list that opens at `tokens[0]`; its brackets match.
+    pub fn read(source: Source<'t>, tokens: &'t [Token]) -> Self {
+        let mut items = Vec::new();
+        let (mut k, mut from, mut round) = (1, 1, 0);
+        let mut inner: Option<List> = None;
+        while k < tokens.len() {
+            let token = &tokens[k];
+            if token.is(b'[') && k == from {
+                let list = Self::read(source, &tokens[k..]);
+                k += list.tokens;
+                inner = Some(list);
+                continue;
+            }
+            // A list inside an expression, `Offs([..],..)`: a leaf holds it whole.
+            if token.is(b'[') {
+                k += Self::read(source, &tokens[k..]).tokens;
+                continue;
+            }
+            round += i32::from(token.is(b'(') || token.is(b'{')) - i32::from(token.is(b')') || token.is(b'}'));
+            let closes = token.is(b']');
+            if closes || (token.is(b',') && round == 0) {
+                items.push(match inner.take() {
+                    Some(list) if list.tokens == k - from => Item::List(list),
+                    _ => Item::Leaf(&tokens[from..k]),
+                });
+                from = k + 1;
+            }
+            k += 1;
+            if closes {
+                break;
+            }
+        }
+        Self { source, span: source.over(&tokens[..k], 0), tokens: k, items }
+    }
+
+    fn lists(&self) -> impl Iterator<Item = &List<'t>> {
+        self.items.iter().filter_map(|item| if let Item::List(list) = item { Some(list) } else { None })
+    }
+
+    /// What it, or a list inside it, has the form of: names may stand for some of its lists.
+    pub fn has_form(&self) -> Option<Want> {
+        let form = |want: &Want| {
+            let shape = want.shape();
+            let fits = |(item, size): (&Item, &usize)| match item {
+                Item::List(list) => list.items.len() == *size && list.lists().next().is_none(),
+                Item::Leaf(_) => true,
+            };
+            self.items.len() == shape.len() && self.lists().next().is_some() && self.items.iter().zip(shape).all(fits)
+        };
+        [Want::Joints, Want::Pose].into_iter().find(form).or_else(|| self.lists().find_map(List::has_form))
+    }
+
+    /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
+    pub fn take(&self, want: Want, array: bool, found: &mut Found) {
+        let flat = |item: &Item| match item {
+            Item::List(list) => list.lists().next().is_none(),
+            Item::Leaf(_) => true,
+        };
+        if self.items.iter().all(flat) || !array {
+            return self.target(want, found);
+        }
+        for item in &self.items {
+            match item {
+                Item::List(list) => list.take(want, array, found),
+                Item::Leaf(tokens) => {
+                    let span = self.source.over(tokens, self.span.start);
+                    found.fault(span.start, format!("{} in an array of targets", quoted(self.source.bytes, span)));
+                }
+            }
+        }
+    }
+
+    fn target(&self, want: Want, found: &mut Found) {
+        let before = found.faults.len();
+        let shape = want.shape();
+        let mut numbers: Vec<Vec<(f64, Range<usize>)>> = Vec::new();
+        for (item, size) in self.items.iter().zip(shape) {
+            match item {
+                Item::List(list) if list.items.len() == *size => numbers.push(list.numbers(found)),
+                Item::List(list) => {
+                    let message = format!("{} numbers, expected {size} here in a {}", list.items.len(), want.name());
+                    found.fault(list.span.start, message);
+                }
+                Item::Leaf(tokens) => {
+                    let span = self.source.over(tokens, self.span.start);
+                    let text = quoted(self.source.bytes, span.clone());
+                    found.fault(span.start, format!("{text} in a {}, expected a list of {size} numbers", want.name()));
+                }
+            }
+        }
+        if self.items.len() != shape.len() {
+            let sizes: Vec<String> = shape.iter().map(usize::to_string).collect();
+            let message = format!("expected a {}: lists of {} numbers", want.name(), sizes.join(", "));
+            found.fault(self.span.start, message);
+        }
+        if found.faults.len() > before {
+            return;
+        }
+        for (value, span) in numbers.last().into_iter().flatten().filter(|(value, _)| *value != NOT_CONNECTED) {
+            let message = format!("external axis at {value}: calib assumed that external axes do not move the robot");
+            found.warn(span.start, message);
+        }
+        let used = if want == Want::Joints { 1 } else { 2 };
+        let (values, spans): (Vec<f64>, Vec<Range<usize>>) = numbers.into_iter().take(used).flatten().unzip();
+        if want == Want::Pose {
+            let length = values[3..].iter().map(|part| part * part).sum::<f64>().sqrt();
+            if (length - 1.0).abs() > UNIT {
+                found.fault(spans[3].start, format!("the quaternion has length {length:.4}, expected 1"));
+                return;
+            }
+        }
+        let kind = if want == Want::Joints { Kind::Joints } else { Kind::Quaternion };
+        found.literals.push(Literal { kind, values, spans });
+    }
+
+    fn numbers(&self, found: &mut Found) -> Vec<(f64, Range<usize>)> {
+        let mut out = Vec::new();
+        for item in &self.items {
+            let (tokens, at) = match item {
+                Item::Leaf(tokens) => (*tokens, self.span.start),
+                Item::List(list) => {
+                    found.fault(list.span.start, "a list, expected a number");
+                    continue;
+                }
+            };
+            match self.source.number(tokens) {
+                Some(number) => out.push(number),
+                None if tokens.is_empty() => found.fault(at, "a number is missing in this list"),
+                None => {
+                    let span = self.source.over(tokens, at);
+                    found.fault(span.start, format!("{} is no number", quoted(self.source.bytes, span)));
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,357 @@
+//! ABB RAPID: statements up to `;`, over lines. Targets are the literals `[...]` of robtargets and jointtargets, also in arrays.
+//!
+//! A literal is a target where it is declared or assigned to a variable that this file declares as one, or stands as position of a motion
+//! instruction. Everything else that has the form of one is refused: RAPID gives a literal no type of its own. `Offs` and `RelTool` of a
+//! named target stay: the controller adds the offset to the corrected target, so that the robot goes to the shifted point with the
+//! correction of the unshifted one; a warning names the line.
+
+mod list;
+
+use super::token::{Sort, Source, Token, tokens};
+use super::{DEPTH, Found, Language, quoted};
+use list::{List, Want};
+use std::collections::BTreeMap;
+
+/// Motion instructions by how they begin, and which of the positional arguments are positions.
+const MOTIONS: [(&str, &[usize]); 10] = [
+    ("MOVEEXTJ", &[]),
+    ("MOVEC", &[0, 1]),
+    ("MOVE", &[0]),
+    ("TRIGGC", &[0, 1]),
+    ("TRIGGL", &[0]),
+    ("TRIGGJ", &[0]),
+    ("SEARCHC", &[2, 3]),
+    ("SEARCHL", &[2]),
+    ("ARCC", &[0, 1]),
+    ("ARCL", &[0]),
+];
+
+/// Begins as a motion and is none.
+const NO_MOTION: &str = "TRIGGCHECKIO";
+
+/// Keywords behind which a statement begins.
+const BLOCKS: [&str; 15] = [
+    "THEN",
+    "DO",
+    "ELSE",
+    "ENDIF",
+    "ENDFOR",
+    "ENDWHILE",
+    "ENDTEST",
+    "ENDPROC",
+    "ENDFUNC",
+    "ENDTRAP",
+    "ENDMODULE",
+    "ENDRECORD",
+    "BACKWARD",
+    "ERROR",
+    "UNDO",
+];
+
+/// Types whose literals may have the form of a target and are none.
+const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
+
+pub(super) fn read(bytes: &[u8]) -> Found {
+    let mut found = Found::default();
+    let source = Source { bytes, language: Language::Rapid };
+    let tokens = tokens(source, &mut found);
+    let statements = statements(source, &tokens);
+    let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for statement in &statements {
+        if let Some(declaration) = declaration(source, statement) {
+            let known = types.entry(declaration.name).or_default();
+            if !known.contains(&declaration.kind) {
+                known.push(declaration.kind);
+            }
+        }
+    }
+    let mut reader = Reader { source, types, found };
+    for statement in statements {
+        reader.statement(statement);
+    }
+    reader.found
+}
+
+/// The statements of a program, each without its `;` and without the heads of blocks before it.
+fn statements<'t>(source: Source, tokens: &'t [Token]) -> Vec<&'t [Token]> {
+    let mut out: Vec<&[Token]> = Vec::new();
+    let mut start = 0;
+    let mut k = 0;
+    while k < tokens.len() {
+        let token = &tokens[k];
+        let end = if token.is(b';') {
+            Some((k, k + 1))
+        } else if token.is(b':') || source.is_word(token, &BLOCKS) {
+            Some((k + 1, k + 1))
+        } else {
+            heading(source, &tokens[k..]).map(|length| (k + length, k + length))
+        };
+        k += 1;
+        if let Some((end, next)) = end {
+            out.push(&tokens[start..end]);
+            (start, k) = (next, next);
+        }
+    }
+    out.push(&tokens[start..]);
+    out.retain(|statement| !statement.is_empty());
+    out
+}
+
+/// How many tokens the head of a module or a routine has; none where there is no such head.
+fn heading(source: Source, tokens: &[Token]) -> Option<usize> {
+    let kind = &tokens[0];
+    let mut length = if source.is_word(kind, &["MODULE", "PROC", "TRAP"]) {
+        2
+    } else if source.is_word(kind, &["FUNC"]) {
+        3
+    } else {
+        return None;
+    };
+    if tokens.get(length).is_some_and(|token| token.is(b'(')) {
+        length += tokens[length..].iter().position(|token| token.is(b')'))? + 1;
+    }
+    Some(length.min(tokens.len()))
+}
+
+struct Declaration<'t> {
+    /// In capitals, as the name.
+    kind: String,
+    name: String,
+    /// Behind `:=`.
+    value: Option<&'t [Token]>,
+}
+
+fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration<'t>> {
+    let scoped = statement.iter().take_while(|token| source.is_word(token, &["LOCAL", "TASK"])).count();
+    let [storage, kind, name, rest @ ..] = &statement[scoped..] else { return None };
+    if !source.is_word(storage, &["VAR", "PERS", "CONST"]) || kind.sort != Sort::Word || name.sort != Sort::Word {
+        return None;
+    }
+    let value = rest.iter().position(|token| token.sort == Sort::Pair(b':')).map(|k| &rest[k + 1..]);
+    Some(Declaration { kind: source.upper(kind), name: source.upper(name), value })
+}
+
+struct Reader<'p> {
+    source: Source<'p>,
+    /// Variable -> types it is declared with anywhere in the file.
+    types: BTreeMap<String, Vec<String>>,
+    found: Found,
+}
+
+impl Reader<'_> {
+    fn statement(&mut self, statement: &[Token]) {
+        if !self.brackets_match(statement) {
+            return;
+        }
+        self.frames(statement);
+        if let Some(Declaration { kind, value, .. }) = declaration(self.source, statement) {
+            return self.set(value.unwrap_or_default(), Some(&kind));
+        }
+        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {
+            Some(k) if !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => self.assignment(statement, k),
+            _ => self.instruction(statement),
+        }
+    }
+
+    fn brackets_match(&mut self, statement: &[Token]) -> bool {
+        let mut open: Vec<&Token> = Vec::new();
+        let before = self.found.faults.len();
+        for token in statement {
+            if token.is(b'[') {
+                open.push(token);
+                if open.len() == DEPTH {
+                    self.found.fault(token.span.start, "brackets are nested too deep");
+                }
+            } else if token.is(b']') && open.pop().is_none() {
+                self.found.fault(token.span.start, "`]` without `[`");
+            }
+        }
+        for token in open {
+            self.found.fault(token.span.start, "`[` without `]` in its statement");
+        }
+        self.found.faults.len() == before
+    }
+
+    /// Work objects, tools and displacements that a statement names.
+    fn frames(&mut self, statement: &[Token]) {
+        const BASE: &str = "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
+        for (k, token) in statement.iter().enumerate().filter(|(_, token)| token.is(b'\\')) {
+            let rest = &statement[k + 1..];
+            let Some(name) = rest.first() else { continue };
+            let value = quoted(self.source.bytes, rest.get(2).map_or(name.span.clone(), |value| value.span.clone()));
+            if self.source.is_word(name, &["WOBJ"]) && !rest.get(2).is_some_and(|value| self.source.is_word(value, &["WOBJ0"])) {
+                self.found.warn(token.span.start, format!("work object {value}: {BASE}"));
+            } else if self.source.is_word(name, &["TOOL"]) {
+                self.found.warn(token.span.start, format!("tool {value}: calib assumed that it is the tool of the robot file"));
+            }
+        }
+        let head = &statement[0];
+        if self.source.is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
+            let name = quoted(self.source.bytes, head.span.clone());
+            self.found.warn(head.span.start, format!("{name} displaces what follows: {BASE}"));
+        }
+    }
+
+    /// A value for a variable of type `kind`; none: of a type that this file does not state.
+    fn set(&mut self, value: &[Token], kind: Option<&str>) {
+        let want = match kind {
+            Some("ROBTARGET") => Some(Want::Pose),
+            Some("JOINTTARGET") => Some(Want::Joints),
+            _ => None,
+        };
+        match (want, value.first()) {
+            (Some(want), Some(first)) if first.is(b'[') => {
+                let list = List::read(self.source, value);
+                if list.tokens < value.len() {
+                    let stray = &value[list.tokens];
+                    let text = quoted(self.source.bytes, stray.span.clone());
+                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                } else {
+                    list.take(want, true, &mut self.found);
+                }
+            }
+            _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
+            _ => {
+                let of = kind.map_or_else(|| "whose type this file does not state".into(), |kind| format!("of type {kind}"));
+                self.computed(value, want.is_some());
+                self.others(value, format!("a variable {of}"));
+            }
+        }
+    }
+
+    /// Literals that are no targets by where they stand: those of the form of one are refused.
+    fn others(&mut self, tokens: &[Token], place: String) {
+        let mut k = 0;
+        while k < tokens.len() {
+            if tokens[k].is(b'[') {
+                let list = List::read(self.source, &tokens[k..]);
+                if let Some(want) = list.has_form() {
+                    let message =
+                        format!("has the form of a {} and stands in {place}; declare it: `CONST {0} p := [...]`", want.name());
+                    self.found.fault(tokens[k].span.start, message);
+                }
+                k += list.tokens;
+            } else {
+                k += 1;
+            }
+        }
+    }
+
+    /// `p := ...`, `p.trans.z := ...`.
+    fn assignment(&mut self, statement: &[Token], assign: usize) {
+        let (variable, value) = (&statement[..assign], &statement[assign + 1..]);
+        let name = self.source.upper(&variable[0]);
+        let members: Vec<String> = variable.windows(2).filter(|w| w[0].is(b'.')).map(|w| self.source.upper(&w[1])).collect();
+        let types = self.types.get(&name).map(Vec::as_slice).unwrap_or_default();
+        let Some(member) = members.first() else {
+            let kind = if let [one] = types { Some(one.clone()) } else { None };
+            return self.set(value, kind.as_deref());
+        };
+        let at = variable[0].span.start;
+        let target = types.iter().any(|kind| matches!(kind.as_str(), "ROBTARGET" | "JOINTTARGET"));
+        let part = ["TRANS", "ROT", "ROBAX"].contains(&member.as_str());
+        let given = quoted(self.source.bytes, self.source.over(variable, at));
+        if target && part {
+            self.found.partial(at, format!("{given} sets a part of a target alone; a target is corrected whole or not at all"));
+        } else if part && types.is_empty() {
+            self.found.warn(at, format!("left as it is: {given}, of a type that this file does not state"));
+        } else {
+            self.others(value, "a member of a variable".into());
+        }
+    }
+
+    fn instruction(&mut self, statement: &[Token]) {
+        let name = self.source.upper(&statement[0]);
+        let motion = MOTIONS.iter().find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION);
+        let Some((begin, positions)) = motion else {
+            return self.others(statement, format!("`{name}`, no motion instruction that calib knows"));
+        };
+        if *begin == "MOVEEXTJ" {
+            self.found.warn(statement[0].span.start, "moves external axes alone: calib assumed that they do not move the robot");
+            return;
+        }
+        let want = if name.contains("ABSJ") { Want::Joints } else { Want::Pose };
+        let mut number = 0;
+        for argument in arguments(&statement[1..]) {
+            let Some(first) = argument.first() else {
+                number += 1;
+                continue;
+            };
+            // `MoveL \Conc, p10, ...`
+            if first.is(b'\\') {
+                self.others(argument, format!("an argument of `{name}`"));
+                continue;
+            }
+            if positions.contains(&number) {
+                self.position(argument, want);
+            } else {
+                self.others(argument, format!("an argument of `{name}` that is no position"));
+            }
+            number += 1;
+        }
+    }
+
+    fn position(&mut self, argument: &[Token], want: Want) {
+        if argument[0].is(b'[') {
+            let list = List::read(self.source, argument);
+            match argument.get(list.tokens) {
+                Some(stray) if !stray.is(b'\\') => {
+                    let text = quoted(self.source.bytes, stray.span.clone());
+                    self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
+                }
+                _ => {
+                    list.take(want, false, &mut self.found);
+                    self.others(&argument[list.tokens..], "an optional argument".into());
+                }
+            }
+            return;
+        }
+        self.computed(argument, true);
+        self.others(argument, "an expression".into());
+    }
+
+    /// A call in the place of a target; where that is not sure, those that give one.
+    fn computed(&mut self, tokens: &[Token], target: bool) {
+        let [function, bracket, ..] = tokens else { return };
+        let name = quoted(self.source.bytes, function.span.clone());
+        if !bracket.is(b'(') {
+            return;
+        }
+        if self.source.is_word(function, &["OFFS", "RELTOOL"]) {
+            let message = "shifts its target; where that one is corrected, the shifted one gets the same correction";
+            self.found.warn(function.span.start, format!("left as it is: {name} {message}"));
+        } else if target {
+            self.found.warn(function.span.start, format!("left as it is: {name} computes the target"));
+        }
+    }
+}
+
+/// Tokens with the depth of brackets at each: the brackets themselves are outside.
+fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
+    let mut depth = 0;
+    tokens.iter().map(move |token| match token.sort {
+        Sort::Sign(b'[' | b'(' | b'{') => {
+            depth += 1;
+            (token, depth - 1)
+        }
+        Sort::Sign(b']' | b')' | b'}') => {
+            depth -= 1;
+            (token, depth)
+        }
+        _ => (token, depth),
+    })
+}
+
+/// Between the commas outside of brackets.
+fn arguments(tokens: &[Token]) -> Vec<&[Token]> {
+    let commas: Vec<usize> =
+        depths(tokens).enumerate().filter(|(_, (token, depth))| *depth == 0 && token.is(b',')).map(|(k, _)| k).collect();
+    let mut start = 0;
+    let mut out = Vec::with_capacity(commas.len() + 1);
+    for comma in commas {
+        out.push(&tokens[start..comma]);
+        start = comma + 1;
+    }
+    out.push(&tokens[start..]);
+    out
+}

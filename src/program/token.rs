@@ -1,0 +1,207 @@
+//! Tokens of KRL and RAPID: words, numbers, strings and signs, each with its bytes; comments and blanks are none.
+//!
+//! A number is one token, everything that clings to it included (`10mm`, `0x1F`, `1.2.3`), so that what is no number by the
+//! language's grammar is seen whole:
+//! KRL: digits [`.` digits] [`E` [sign] digits] (KUKA System Software, Operating and Programming Instructions for System Integrators);
+//! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
+//! binary integers are no coordinates). Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
+
+use super::{Found, Language};
+use std::ops::Range;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sort {
+    Word,
+    /// Not yet known to be a number of the language.
+    Number,
+    /// `"..."`, or `'...'` of KRL.
+    Text,
+    /// A sign, of one byte.
+    Sign(u8),
+    /// `:=`, `==`, `<=`, `>=`, `<>`, by their first byte.
+    Pair(u8),
+    /// Of KRL, whose statements end with their line.
+    LineEnd,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Token {
+    pub sort: Sort,
+    pub span: Range<usize>,
+}
+
+impl Token {
+    pub fn is(&self, sign: u8) -> bool {
+        self.sort == Sort::Sign(sign)
+    }
+}
+
+/// What is read, and how its words are compared: KRL and RAPID know no case.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'p> {
+    pub bytes: &'p [u8],
+    pub language: Language,
+}
+
+impl Source<'_> {
+    /// A token's text in capitals.
+    pub fn upper(&self, token: &Token) -> String {
+        String::from_utf8_lossy(&self.bytes[token.span.clone()]).to_ascii_uppercase()
+    }
+
+    pub fn is_word(&self, token: &Token, words: &[&str]) -> bool {
+        let text = &self.bytes[token.span.clone()];
+        token.sort == Sort::Word && words.iter().any(|word| word.as_bytes().eq_ignore_ascii_case(text))
+    }
+
+    /// The number that these tokens are, sign included, and its bytes; none where they are anything else.
+    pub fn number(&self, tokens: &[Token]) -> Option<(f64, Range<usize>)> {
+        let (negative, token) = match tokens {
+            [token] => (false, token),
+            [sign, token] if sign.is(b'-') => (true, token),
+            [sign, token] if sign.is(b'+') => (false, token),
+            _ => return None,
+        };
+        let text = &self.bytes[token.span.clone()];
+        if token.sort != Sort::Number || !is_number(text, self.language) {
+            return None;
+        }
+        let value = std::str::from_utf8(text).ok()?.parse::<f64>().ok().filter(|value| value.is_finite())?;
+        let start = tokens[0].span.start;
+        Some((if negative { -value } else { value }, start..token.span.end))
+    }
+
+    /// The bytes from the first to the last of some tokens.
+    pub fn over(&self, tokens: &[Token], otherwise: usize) -> Range<usize> {
+        match (tokens.first(), tokens.last()) {
+            (Some(first), Some(last)) => first.span.start..last.span.end,
+            _ => otherwise..otherwise,
+        }
+    }
+}
+
+fn is_number(text: &[u8], language: Language) -> bool {
+    let digits = |text: &[u8]| text.iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let whole = digits(text);
+    let mut rest = &text[whole..];
+    let mut fraction = None;
+    if rest.first() == Some(&b'.') {
+        let count = digits(&rest[1..]);
+        (fraction, rest) = (Some(count), &rest[1 + count..]);
+    }
+    let mantissa = match (language, fraction) {
+        (_, None) => whole > 0,
+        (Language::Krl, Some(count)) => whole > 0 && count > 0,
+        (Language::Rapid, Some(count)) => whole + count > 0,
+    };
+    if matches!(rest.first(), Some(b'e' | b'E')) {
+        rest = &rest[1..];
+        if matches!(rest.first(), Some(b'+' | b'-')) {
+            rest = &rest[1..];
+        }
+        let count = digits(rest);
+        return mantissa && count > 0 && count == rest.len();
+    }
+    mantissa && rest.is_empty()
+}
+
+/// Letters of names; bytes beyond ASCII are such, RAPID has those of ISO 8859-1.
+fn in_word(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'$') || byte >= 0x80
+}
+
+/// The tokens of a program; what makes their reading doubtful is a fault.
+pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
+    let Source { bytes, language } = source;
+    let krl = language == Language::Krl;
+    let comment = if krl { b';' } else { b'!' };
+    let byte = |at: usize| bytes.get(at).copied();
+    let mut out: Vec<Token> = Vec::with_capacity(bytes.len() / 4);
+    let mut at = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+    let mut line_begins = true;
+    doubtful(bytes, found);
+    while let Some(here) = byte(at) {
+        let start = at;
+        let begins = std::mem::replace(&mut line_begins, here == b'\n');
+        at += 1;
+        let sort = match here {
+            b'\n' if krl => Sort::LineEnd,
+            b' ' | b'\t' | b'\r' | b'\n' => continue,
+            // KRL: `&ACCESS`, `&PARAM` and the like at the head of a file, no statements.
+            b'&' if krl && begins && out.iter().all(|token| token.sort == Sort::LineEnd) => {
+                at = line_end(bytes, at);
+                continue;
+            }
+            here if here == comment => {
+                at = line_end(bytes, at);
+                continue;
+            }
+            b'"' | b'\'' if here == b'"' || krl => {
+                let end = line_end(bytes, at);
+                match bytes[at..end].iter().position(|byte| *byte == here) {
+                    Some(length) => at += length + 1,
+                    None => {
+                        found.fault(start, format!("`{}` is not closed on its line", here as char));
+                        at = end;
+                    }
+                }
+                Sort::Text
+            }
+            b'.' | b'0'..=b'9' if here != b'.' || byte(at).is_some_and(|next| next.is_ascii_digit()) => {
+                at = number_end(bytes, start);
+                Sort::Number
+            }
+            here if in_word(here) => {
+                at += bytes[at..].iter().take_while(|byte| in_word(**byte)).count();
+                Sort::Word
+            }
+            _ => match (here, byte(at)) {
+                (b':' | b'=' | b'<' | b'>', Some(b'=')) if here != b':' || !krl => {
+                    at += 1;
+                    Sort::Pair(here)
+                }
+                (b'<', Some(b'>')) => {
+                    at += 1;
+                    Sort::Pair(here)
+                }
+                _ => Sort::Sign(here),
+            },
+        };
+        out.push(Token { sort, span: start..at });
+    }
+    out
+}
+
+/// Bytes that readers take differently: what one takes for the end of a line, another takes into the comment.
+fn doubtful(bytes: &[u8], found: &mut Found) {
+    for (at, byte) in bytes.iter().enumerate() {
+        match byte {
+            0 => found.fault(at, "a zero byte: no program text (UTF-16 is not read)"),
+            b'\r' if bytes.get(at + 1) != Some(&b'\n') => found.fault(at, "a carriage return without a line feed"),
+            _ => {}
+        }
+        // Text of another kind is all of them.
+        if found.faults.len() >= 20 {
+            return;
+        }
+    }
+}
+
+fn line_end(bytes: &[u8], from: usize) -> usize {
+    bytes[from..].iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |length| from + length)
+}
+
+fn number_end(bytes: &[u8], start: usize) -> usize {
+    let mut at = start;
+    while let Some(byte) = bytes.get(at) {
+        let plain = bytes[start..at].iter().all(|byte| byte.is_ascii_digit() || *byte == b'.');
+        if plain && matches!(byte, b'e' | b'E') && matches!(bytes.get(at + 1), Some(b'+' | b'-')) {
+            at += 2;
+        } else if in_word(*byte) || *byte == b'.' {
+            at += 1;
+        } else {
+            break;
+        }
+    }
+    at
+}

@@ -1,0 +1,102 @@
+//! Files that others made: opened only where they are regular, and decoded so that a decoder that gives up is a fault of the file.
+//!
+//! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
+
+use arrow::array::RecordBatch;
+use arrow::datatypes::SchemaRef;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::file::reader::ChunkReader;
+use std::fs::{self, File, FileType};
+use std::io::{self, ErrorKind, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Opens a regular file; a folder, a pipe or a device is refused.
+pub fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    if kind.is_file() {
+        return File::open(path);
+    }
+    Err(io::Error::new(ErrorKind::InvalidInput, format!("{}, not a regular file", what(kind))))
+}
+
+/// The text of a regular file in UTF-8.
+pub fn text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    open(path)?.read_to_string(&mut text)?;
+    Ok(text)
+}
+
+/// The bytes of a regular file.
+pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+#[cfg(unix)]
+fn what(kind: FileType) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    match kind {
+        kind if kind.is_dir() => "is a folder",
+        kind if kind.is_fifo() => "is a named pipe",
+        kind if kind.is_socket() => "is a socket",
+        _ => "is a device",
+    }
+}
+
+#[cfg(not(unix))]
+fn what(kind: FileType) -> &'static str {
+    if kind.is_dir() { "is a folder" } else { "is a device" }
+}
+
+/// What a decoder gives; its panic is told in words.
+pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(decode)).map_err(|panic| {
+        let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        format!("it is damaged, its decoder gives up ({})", text.unwrap_or("without a word"))
+    })
+}
+
+/// A Parquet file, batch by batch; what is wrong with it comes in words, once.
+pub struct ParquetFile {
+    pub schema: SchemaRef,
+    /// Rows by its footer.
+    pub rows: u64,
+    reader: Option<ParquetRecordBatchReader>,
+}
+
+/// Opens Parquet from a file or from bytes, for batches of so many rows.
+pub fn parquet(input: impl ChunkReader + 'static, batch: usize) -> Result<ParquetFile, String> {
+    let opened = decoded(|| {
+        let builder = ParquetRecordBatchReaderBuilder::try_new(input)?;
+        let schema = builder.schema().clone();
+        let rows = u64::try_from(builder.metadata().file_metadata().num_rows()).unwrap_or_default();
+        let reader = builder.with_batch_size(batch).build()?;
+        Ok(ParquetFile { schema, rows, reader: Some(reader) })
+    });
+    opened?.map_err(|error: parquet::errors::ParquetError| error.to_string())
+}
+
+impl Iterator for ParquetFile {
+    type Item = Result<RecordBatch, String>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let reader = self.reader.as_mut()?;
+        let batch = decoded(|| reader.next());
+        let batch = batch.map(|batch| batch.map(|batch| batch.map_err(|error| error.to_string())));
+        let batch = batch.unwrap_or_else(|message| Some(Err(message)));
+        if !matches!(batch, Some(Ok(_))) {
+            self.reader = None;
+        }
+        batch
+    }
+}
+
+impl ParquetFile {
+    /// All rows as one batch.
+    pub fn whole(mut self) -> Result<RecordBatch, String> {
+        let batches = self.by_ref().collect::<Result<Vec<_>, String>>()?;
+        arrow::compute::concat_batches(&self.schema, &batches).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,52 @@
+//! How large a number of a robot, or of a target, may be: what is beyond is in another unit, damaged, or no robot's.
+
+/// What a number is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// A coordinate or a length, m.
+    Length,
+    /// rad.
+    Angle,
+    /// kg.
+    Mass,
+    /// Motor turns per turn of the joint, torque per current, turns of one joint by another.
+    Factor,
+}
+
+impl Bound {
+    /// The largest size, its unit, and what may be meant instead.
+    fn most(self) -> (f64, &'static str, &'static str) {
+        match self {
+            // The longest tracks are 100 m.
+            Self::Length => (1e3, "m", "; is it in another unit?"),
+            // Ten turns: more is an angle in degrees.
+            Self::Angle => (63.0, "rad", ", ten turns; is it in another unit?"),
+            // The heaviest robots are 10 t.
+            Self::Mass => (1e6, "kg", "; is it in another unit?"),
+            Self::Factor => (1e6, "", ""),
+        }
+    }
+
+    /// What is wrong with a value in SI; nothing of NaN, which stands for what could not be read.
+    pub fn fault(self, value: f64) -> Option<String> {
+        let (most, unit, instead) = self.most();
+        let number = |value: f64| if value.abs() < 1e6 { format!("{value}") } else { format!("{value:e}") };
+        (value.abs() > most).then(|| format!("{} {unit}", number(value)).trim_end().to_string()).map(|shown| {
+            let most = format!("{} {unit}", number(most));
+            format!("{shown} is more than {}{instead}", most.trim_end())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Bound;
+
+    #[test]
+    fn what_no_robot_has_is_told_with_its_size() {
+        assert_eq!(Bound::Length.fault(-1e305).as_deref(), Some("-1e305 m is more than 1000 m; is it in another unit?"));
+        assert_eq!(Bound::Angle.fault(180.0).as_deref(), Some("180 rad is more than 63 rad, ten turns; is it in another unit?"));
+        assert_eq!(Bound::Factor.fault(f64::INFINITY).as_deref(), Some("inf is more than 1e6"));
+        assert_eq!([Bound::Length.fault(999.0), Bound::Angle.fault(-62.8), Bound::Mass.fault(f64::NAN)], [None, None, None]);
+    }
+}

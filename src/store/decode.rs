@@ -1,0 +1,100 @@
+//! A table's Parquet file decoded: what it says of itself, its columns, and the hash of what they hold.
+
+use arrow::array::{ArrayRef, RecordBatch};
+use arrow::compute::concat_batches;
+use arrow::datatypes::{Field, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::file::reader::ChunkReader;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::content::{TableHash, hash_of_columns};
+use super::frame::{Frame, FrameBuilder};
+use super::schema::{self, Version};
+use super::writer::UNITS;
+use crate::error::{Error, Result};
+use crate::raw;
+
+/// The columns of a table, by name.
+type Columns = BTreeMap<String, ArrayRef>;
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 1 << 16;
+
+pub(super) struct Decoded {
+    said: BTreeMap<String, String>,
+    batch: RecordBatch,
+}
+
+impl Decoded {
+    /// Decodes a whole file, or says why that cannot be.
+    pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        raw::decoded(|| Self::decoded(source)).and_then(|decoded| decoded)
+    }
+
+    fn decoded<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+        let text = |error: &dyn std::fmt::Display| error.to_string();
+        // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(source, options).map_err(|error| text(&error))?;
+        let pairs = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+        let said: BTreeMap<String, String> = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+        let units: BTreeMap<String, String> =
+            said.get(UNITS).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
+        let schema = builder.schema().clone();
+        let reader = builder.with_batch_size(BATCH_ROWS).build().map_err(|error| text(&error))?;
+        let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| text(&error))?;
+        let batch = concat_batches(&schema, &batches).map_err(|error| text(&error))?;
+        let with_unit = |field: &Arc<Field>| {
+            let unit = units.get(field.name()).map(|unit| ("unit".to_string(), unit.clone()));
+            field.as_ref().clone().with_metadata(unit.into_iter().collect())
+        };
+        let schema = Arc::new(Schema::new(schema.fields().iter().map(with_unit).collect::<Vec<_>>()));
+        let batch = RecordBatch::try_new(schema, batch.columns().to_vec()).map_err(|error| text(&error))?;
+        Ok(Self { said, batch })
+    }
+
+    /// The file's own key-value metadata.
+    pub fn said(&self, key: &str) -> Option<&str> {
+        self.said.get(key).map(String::as_str)
+    }
+
+    pub fn rows(&self) -> u64 {
+        self.batch.num_rows() as u64
+    }
+
+    /// The hash of the columns as the file has them, whichever minor version wrote them.
+    pub fn table_hash(&self, kind: &str, version: Version) -> Option<TableHash> {
+        hash_of_columns(kind, version.major, &self.batch)
+    }
+
+    /// The columns of an older or the newest version, checked against the newest.
+    pub fn frame(self, kind: &str, version: Version) -> Result<Frame> {
+        let names = self.batch.schema_ref().fields().iter().map(|field| field.name().clone());
+        let pairs: Vec<_> = names.zip(self.batch.columns().iter().cloned()).collect();
+        if let Some(twice) = pairs.iter().enumerate().find(|(at, (name, _))| pairs[..*at].iter().any(|(other, _)| other == name))
+        {
+            return Err(Error::Bug(format!("table {kind}: column {} twice", twice.1.0)));
+        }
+        let columns: Columns = pairs.into_iter().collect();
+        let mut frame = FrameBuilder::new(kind);
+        let added = added_since(kind, version, &columns, self.batch.num_rows())?;
+        for (name, column) in columns.into_iter().chain(added) {
+            frame.push(name, column);
+        }
+        frame.finish()
+    }
+}
+
+/// Nullable columns that a later minor version has, as nulls.
+fn added_since(kind: &str, version: Version, columns: &Columns, rows: usize) -> Result<Columns> {
+    let schema = schema::of(kind)?;
+    if version.minor == schema.version.minor {
+        return Ok(Columns::new());
+    }
+    let added = schema
+        .fields
+        .iter()
+        .filter(|field| field.nullable && !field.optional && !field.per_joint && !columns.contains_key(&field.name));
+    Ok(added.map(|field| (field.name.clone(), arrow::array::new_null_array(&field.column_type.arrow(), rows))).collect())
+}

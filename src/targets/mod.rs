@@ -1,0 +1,44 @@
+//! Tables of targets, as delimited text or Parquet: joints are replaced, or written where there are none, and what is known of each
+//! target is appended; everything else stays as it is. A target that is not reached gets no joints.
+
+mod columns;
+mod decimal;
+pub mod parquet;
+pub mod text;
+
+pub use columns::Units;
+
+use crate::error::Fault;
+use crate::robot::description::RobotDescription;
+
+/// Rows that are told of one file.
+const MOST: usize = 20;
+
+/// What holds for a whole table.
+pub struct Layout<'a> {
+    /// For messages: the file's name, or `stdin`.
+    pub place: &'a str,
+    pub robot: &'a RobotDescription,
+    pub units: Units,
+    /// Appends nothing: joints are replaced, all else stays.
+    pub plain: bool,
+    /// Poses are the targets though there are joints.
+    pub cartesian: bool,
+}
+
+/// The targets of a table that are not reached; their joints are empty.
+#[derive(Debug, Default)]
+pub struct Unreached {
+    pub count: u64,
+    /// The first of them.
+    pub faults: Vec<Fault>,
+}
+
+impl Unreached {
+    fn push(&mut self, place: impl FnOnce() -> String, remark: &str) {
+        self.count += 1;
+        if self.faults.len() < MOST {
+            self.faults.push(Fault::new(place(), format!("{remark}: no joints are written")));
+        }
+    }
+}

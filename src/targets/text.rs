@@ -1,0 +1,392 @@
+//! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
+
+use super::columns::{Columns, Role};
+use super::{Layout, Unreached, decimal};
+use crate::compensate::{Answer, Corrector, Target, turns};
+use crate::error::{Error, Fault, Result};
+use crate::robot::Bound;
+use crate::robot::description::JointKind;
+use crate::units::{Quantity, Unit};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::io::{BufRead, Read, Write};
+use std::ops::Range;
+
+/// Rows held in memory at a time.
+const BATCH: usize = 1 << 13;
+
+/// Rows that one thread writes at a time.
+const CHUNK: usize = 256;
+
+/// Faults told of one file.
+const FAULTS: usize = 20;
+
+/// Bytes of a line; a device that never ends a line must not fill the memory.
+const LONGEST: u64 = 16 << 20;
+
+/// Decimals of an angle in deg and of a length in mm: 1e-7 deg is 0.004 um at 2.5 m.
+const DECIMALS: usize = 7;
+
+/// Reads targets from `input` to its end and writes them corrected.
+pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
+    let mut unreached = Unreached::default();
+    let mut number = 0;
+    let header = loop {
+        let Some(line) = next(input, layout.place)? else {
+            return Err(Error::data(layout.place, "is empty; expected a header line and targets"));
+        };
+        number += 1;
+        if !line.trim().is_empty() {
+            break line;
+        }
+        put(output, &line)?;
+    };
+    let delimiter = delimiter(&header);
+    let (body, ending) = split_ending(&header);
+    let names: Vec<String> =
+        fields(body.trim_start_matches('\u{feff}'), delimiter).into_iter().map(|field| field.1.into_owned()).collect();
+    let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
+    let mut joints: Vec<(usize, usize, Unit)> =
+        columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
+    joints.sort_unstable_by_key(|(index, ..)| *index);
+    let table = Sheet { layout, columns: &columns, joints, delimiter };
+    put(output, &format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())))?;
+    let mut block = Block::default();
+    loop {
+        let first = number + 1;
+        block.fill(input, layout.place)?;
+        let lines: Vec<&str> = block.lines()?;
+        number += lines.len();
+        if lines.is_empty() {
+            return match output.flush() {
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(refused(&error)),
+                _ => Ok(unreached),
+            };
+        }
+        let parsed: Vec<Result<Option<(Target, Spans)>, String>> =
+            lines.par_iter().map(|line| if line.trim().is_empty() { Ok(None) } else { table.target(line).map(Some) }).collect();
+        let faults: Vec<Fault> = (parsed.iter().enumerate())
+            .filter_map(|(k, row)| Some(Fault::new(format!("{}:{}", layout.place, first + k), row.as_ref().err()?)))
+            .take(FAULTS)
+            .collect();
+        if !faults.is_empty() {
+            return Err(Error::Data(faults));
+        }
+        let (mut targets, mut spans) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
+        for row in parsed.into_iter().filter_map(Result::ok) {
+            let (target, span) = row.unzip();
+            targets.extend(target);
+            spans.push(span);
+        }
+        let mut answers = corrector.batch(targets).into_iter();
+        let rows: Vec<(&str, Option<(Spans, Answer)>)> = lines
+            .into_iter()
+            .zip(spans)
+            .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
+            .collect();
+        for (k, answer) in rows.iter().enumerate().filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1))) {
+            if answer.q.is_none() {
+                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark);
+            }
+        }
+        let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
+        for text in &written {
+            if !put(output, text)? {
+                return Ok(unreached);
+            }
+        }
+    }
+}
+
+/// Lines of the input as they stand there, a batch at a time.
+#[derive(Default)]
+struct Block {
+    bytes: Vec<u8>,
+    ends: Vec<usize>,
+    place: String,
+}
+
+impl Block {
+    /// Reads the next batch; none at the end of the input.
+    fn fill(&mut self, input: &mut dyn BufRead, place: &str) -> Result<()> {
+        self.bytes.clear();
+        self.ends.clear();
+        place.clone_into(&mut self.place);
+        while self.ends.len() < BATCH {
+            if read_line(input, &mut self.bytes, place)? == 0 {
+                break;
+            }
+            self.ends.push(self.bytes.len());
+        }
+        Ok(())
+    }
+
+    fn lines(&self) -> Result<Vec<&str>> {
+        let text = std::str::from_utf8(&self.bytes).map_err(|_| Error::data(&*self.place, "is no text in UTF-8"))?;
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        Ok(starts.zip(&self.ends).map(|(start, end)| &text[start..*end]).collect())
+    }
+}
+
+fn refused(error: &std::io::Error) -> Error {
+    Error::store("output", format!("cannot be written: {error}"))
+}
+
+/// Writes; false where the reader has gone away, which is no fault.
+fn put(output: &mut dyn Write, text: &str) -> Result<bool> {
+    match output.write_all(text.as_bytes()) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(false),
+        Err(error) => Err(refused(&error)),
+    }
+}
+
+/// Appends the next line; gives its bytes, 0 at the end of the input.
+fn read_line(input: &mut dyn BufRead, bytes: &mut Vec<u8>, place: &str) -> Result<usize> {
+    let read = input.take(LONGEST).read_until(b'\n', bytes);
+    let read = read.map_err(|error| Error::store(place, format!("cannot be read: {error}")))?;
+    if read as u64 == LONGEST {
+        return Err(Error::data(place, format!("has a line of more than {} MB; expected a table of targets", LONGEST >> 20)));
+    }
+    Ok(read)
+}
+
+fn next(input: &mut dyn BufRead, place: &str) -> Result<Option<String>> {
+    let mut bytes = Vec::new();
+    if read_line(input, &mut bytes, place)? == 0 {
+        return Ok(None);
+    }
+    String::from_utf8(bytes).map(Some).map_err(|_| Error::data(place, "is no text in UTF-8"))
+}
+
+/// A line and its line ending.
+fn split_ending(line: &str) -> (&str, &str) {
+    let body = line.trim_end_matches(['\n', '\r']);
+    (body, &line[body.len()..])
+}
+
+/// What separates most in the header.
+fn delimiter(header: &str) -> char {
+    let count = |c: char| header.matches(c).count();
+    [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
+}
+
+/// Where each field stands, and its text without quotes.
+fn fields(line: &str, delimiter: char) -> Vec<(Range<usize>, Cow<'_, str>)> {
+    let mut out = Vec::with_capacity(16);
+    let (mut start, mut quoted) = (0, false);
+    for (at, c) in line.char_indices() {
+        if c == '"' {
+            quoted = !quoted;
+        } else if c == delimiter && !quoted {
+            out.push((start..at, unquoted(&line[start..at])));
+            start = at + c.len_utf8();
+        }
+    }
+    out.push((start..line.len(), unquoted(&line[start..])));
+    out
+}
+
+fn unquoted(text: &str) -> Cow<'_, str> {
+    let text = text.trim();
+    let inner = text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text);
+    if inner.contains('"') { Cow::Owned(inner.replace("\"\"", "\"")) } else { Cow::Borrowed(inner) }
+}
+
+/// Where a line's joints stand, in the order of the line, and whether its numbers have a comma.
+struct Spans {
+    joints: Vec<Range<usize>>,
+    comma: bool,
+}
+
+struct Sheet<'a> {
+    layout: &'a Layout<'a>,
+    columns: &'a Columns,
+    /// Column, joint, unit; in the order of the columns.
+    joints: Vec<(usize, usize, Unit)>,
+    delimiter: char,
+}
+
+impl Sheet<'_> {
+    /// Header of what is appended, with its delimiters.
+    fn appended_names(&self, sigma: bool) -> String {
+        let mut names = Vec::new();
+        if self.columns.joints.is_empty() {
+            names.extend(
+                self.layout
+                    .robot
+                    .joints
+                    .iter()
+                    .enumerate()
+                    .map(|(j, joint)| format!("q{}_{}", j + 1, own_unit(joint.kind).symbol())),
+            );
+        }
+        if !self.layout.plain {
+            names.extend(["uncorrected_mm", "residual_mm", "iterations"].map(String::from));
+            names.extend(sigma.then(|| "sigma_mm".to_string()));
+            names.push("remark".into());
+        }
+        names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
+    }
+
+    fn target(&self, line: &str) -> Result<(Target, Spans), String> {
+        let (body, _) = split_ending(line);
+        let cells = fields(body, self.delimiter);
+        if cells.len() != self.columns.count {
+            return Err(format!("has {} fields, the header {}", cells.len(), self.columns.count));
+        }
+        let number = |index: usize| -> Result<Option<f64>, String> {
+            let (range, text) = &cells[index];
+            parse(text, self.delimiter)
+                .map_err(|()| format!("column {}: field {} is `{text}`, no number", range.start + 1, index + 1))
+        };
+        let mut row = Row::default();
+        for (index, role) in &self.columns.roles {
+            if let Some(value) = number(*index)? {
+                row.take(*role, value, self.layout.robot.joints.len());
+            } else if matches!(role, Role::Joint(..) | Role::Axis(..) | Role::Quaternion(_) | Role::Turn(..)) {
+                return Err(format!("column {} is empty", cells[*index].0.start + 1));
+            }
+        }
+        let comma = self.delimiter != ',' && body.contains(',') && cells.iter().any(|(_, text)| is_comma_number(text));
+        let joints = self.joints.iter().map(|(index, ..)| cells[*index].0.clone()).collect();
+        Ok((row.target(self.columns, self.layout.cartesian)?, Spans { joints, comma }))
+    }
+
+    /// Lines with what became of their targets; lines without one as they are.
+    fn lines(&self, rows: &[(&str, Option<(Spans, Answer)>)]) -> String {
+        let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
+        for (line, answered) in rows {
+            match answered {
+                Some((spans, answer)) => self.line(&mut out, line, spans, answer),
+                None => out.push_str(line),
+            }
+        }
+        out
+    }
+
+    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &Answer) {
+        let (body, ending) = split_ending(line);
+        let point = if spans.comma { ',' } else { '.' };
+        let mut at = 0;
+        for (range, (_, joint, unit)) in spans.joints.iter().zip(&self.joints) {
+            out.push_str(&body[at..range.start]);
+            if let Some(q) = &answer.q {
+                decimal::push(out, unit.from_si(q[*joint]), decimals(*unit), point);
+            }
+            at = range.end;
+        }
+        out.push_str(&body[at..]);
+        let mut append = |value: Option<f64>, decimals: usize| {
+            out.push(self.delimiter);
+            if let Some(value) = value {
+                decimal::push(out, value, decimals, point);
+            }
+        };
+        if self.columns.joints.is_empty() {
+            for (j, joint) in self.layout.robot.joints.iter().enumerate() {
+                let unit = own_unit(joint.kind);
+                append(answer.q.as_ref().map(|q| unit.from_si(q[j])), decimals(unit));
+            }
+        }
+        if !self.layout.plain {
+            append(Some(answer.uncorrected * 1e3), 4);
+            append(Some(answer.residual * 1e3), 6);
+            append(Some(answer.iterations as f64), 0);
+            if let Some(sigma) = answer.sigma {
+                append(Some(sigma * 1e3), 4);
+            }
+            let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
+            out.push(self.delimiter);
+            out.extend([quote, &answer.remark, quote]);
+        }
+        out.push_str(ending);
+    }
+}
+
+fn own_unit(kind: JointKind) -> Unit {
+    if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre }
+}
+
+fn decimals(unit: Unit) -> usize {
+    match unit {
+        Unit::Radian | Unit::Metre => DECIMALS + 2,
+        _ => DECIMALS,
+    }
+}
+
+fn is_comma_number(text: &str) -> bool {
+    text.contains(',') && !text.contains('.') && text.replacen(',', ".", 1).parse::<f64>().is_ok()
+}
+
+/// A number, or none where the field is empty.
+fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let value = match text.parse::<f64>() {
+        Ok(value) => value,
+        Err(_) if delimiter != ',' && is_comma_number(text) => text.replacen(',', ".", 1).parse().map_err(|_| ())?,
+        Err(_) => return Err(()),
+    };
+    if value.is_finite() { Ok(Some(value)) } else { Err(()) }
+}
+
+/// The numbers of one row, by what they mean.
+#[derive(Default)]
+pub(super) struct Row {
+    target: Target,
+    point: [f64; 3],
+    quaternion: [f64; 4],
+    turns: [f64; 3],
+}
+
+impl Row {
+    pub fn take(&mut self, role: Role, value: f64, joints: usize) {
+        let put =
+            |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value;
+        match role {
+            Role::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
+            Role::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
+            Role::Quaternion(part) => self.quaternion[part] = value,
+            Role::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
+            Role::Payload => self.target.payload = Some(value),
+            Role::Temperature => self.target.temperature = Some(value),
+            Role::Time => self.target.time = Some(value),
+            Role::Direction(joint) => put(&mut self.target.direction, joint, value),
+            Role::Current(joint) => put(&mut self.target.current, joint, value),
+        }
+    }
+
+    pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<Target, String> {
+        let joints = self.target.q.iter().flatten().zip(&columns.joints);
+        let joints =
+            joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
+        let others = self.point.iter().map(|x| (Bound::Length, *x)).chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
+        if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
+            return Err(message);
+        }
+        // Where joints are the targets, what else stands there is not the tool's place in the base frame, e.g. measured points.
+        if columns.point && (cartesian || columns.joints.is_empty()) {
+            self.target.point = Some(Vector3::from(self.point));
+            if columns.orientation {
+                self.target.rotation = Some(self.rotation()?);
+            }
+        }
+        Ok(self.target)
+    }
+
+    fn rotation(&self) -> Result<Matrix3<f64>, String> {
+        let [w, x, y, z] = self.quaternion;
+        let length = Vector3::new(x, y, z).norm().hypot(w);
+        if length == 0.0 {
+            let [a, b, c] = self.turns;
+            return Ok(turns(a, b, c));
+        }
+        if (length - 1.0).abs() > 1e-3 {
+            return Err(format!("the quaternion has length {length:.4}, expected 1"));
+        }
+        Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner())
+    }
+}

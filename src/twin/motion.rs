@@ -1,0 +1,48 @@
+//! What effects add to the arm in one row.
+
+use super::matrix::{self, IDENTITY, Matrix, Vector};
+
+/// What effects do to the arm.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Of the tracker's frame.
+    pub tracker: Matrix,
+    /// Of the base, base frame.
+    pub base: Matrix,
+    /// Added to each joint, rad or m.
+    pub joint: Vec<f64>,
+    /// Of each link's far end, in the frame of the link, about that end.
+    pub link_end: Vec<Matrix>,
+    /// Of the measured point, last link's frame, m.
+    pub tool: Vector,
+    /// What turns each joint besides gravity, Nm: springs and hoses. The gear carries it too.
+    pub load: Vec<f64>,
+    /// What each motor carries besides gravity, Nm at the joint.
+    pub motor_torque: Vec<f64>,
+}
+
+impl Motion {
+    pub fn none(joints: usize) -> Motion {
+        Motion {
+            tracker: IDENTITY,
+            base: IDENTITY,
+            joint: vec![0.0; joints],
+            link_end: vec![IDENTITY; joints],
+            tool: [0.0; 3],
+            load: vec![0.0; joints],
+            motor_torque: vec![0.0; joints],
+        }
+    }
+
+    /// The largest difference of any number, rad, m or Nm; the motors' torque does not move the arm.
+    pub fn distance(&self, other: &Motion) -> f64 {
+        let apart = |a: &Matrix, b: &Matrix| {
+            a.as_flattened().iter().zip(b.as_flattened()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+        };
+        let joints = self.joint.iter().zip(&other.joint).map(|(a, b)| (a - b).abs());
+        let links = self.link_end.iter().zip(&other.link_end).map(|(a, b)| apart(a, b));
+        let loads = self.load.iter().zip(&other.load).map(|(a, b)| (a - b).abs());
+        let frames = [apart(&self.base, &other.base), apart(&self.tracker, &other.tracker)];
+        joints.chain(links).chain(loads).chain(frames).fold(matrix::norm(matrix::minus(self.tool, other.tool)), f64::max)
+    }
+}

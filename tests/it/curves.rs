@@ -1,0 +1,120 @@
+//! Curves of findings hold what the forms of each finding do, whatever the finding is called.
+
+use crate::desk::{Desk, table};
+use crate::fixture;
+use calib::effect::{Effect, Form, Load};
+use calib::robot::{Instrument, RobotModel};
+use calib::stage::{Labelled, Report, ReportReads};
+use calib::table::*;
+use serde_json::json;
+
+const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+const ROWS: usize = 40;
+
+fn labelled<T>(table: T) -> Vec<Labelled<T>> {
+    vec![Labelled { stage: "diagnose".into(), table }]
+}
+
+fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
+    FindingRow {
+        rank,
+        effect: effect.into(),
+        place: "joint 3".into(),
+        statement: String::new(),
+        f_statistic: None,
+        p_value: None,
+        delta_bic: None,
+        heldout_gain_mm: None,
+        effect_rms_mm: None,
+        valid_joint: None,
+        valid_from_rad: None,
+        valid_to_rad: None,
+        forms: forms.to_string(),
+    }
+}
+
+#[test]
+fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own_curve() {
+    let description = fixture::spherical();
+    let robot = RobotModel::new(description.clone());
+    // Joint 3: products of q2 and q3, what goes once a turn, what goes twice.
+    let pull = json!({"unknown": {"place": {"Joint": 2}, "signature": {"product": {"a": 1, "b": 2}}}});
+    let once = json!({"gear_cyclic": {"joint": 2, "order": 1, "overtone": false}});
+    let twice = json!({"gear_cyclic": {"joint": 2, "order": 2, "overtone": false}});
+    let sizes: [&[f64]; 3] = [&[9.0, -4.0, 6.0, 3.0], &[5.0, -7.0], &[-8.0, 2.0]];
+    let mut parameters = Parameters::default();
+    for (form, sizes) in [&pull, &once, &twice].into_iter().zip(sizes) {
+        let parsed: Form = serde_json::from_value(form.clone()).expect("a form");
+        let text = serde_json::to_string(&parsed).expect("text");
+        for (spec, size) in parsed.parameters(&robot).into_iter().zip(sizes) {
+            parameters.0.push(ParameterRow {
+                name: spec.name,
+                effect: parsed.name().into(),
+                place: spec.place.to_string(),
+                unit: "rad".into(),
+                nominal: 0.0,
+                value: size * ARCSEC,
+                change: size * ARCSEC,
+                sigma: None,
+                status: "free".into(),
+                step: "diagnose".into(),
+                remark: None,
+                form: Some(text.clone()),
+            });
+        }
+    }
+    parameters.0.sort_by(|a, b| a.name.cmp(&b.name));
+    let model = parameters.model(robot.clone(), &[], Load::GravityTorque).expect("a model");
+    let mut recording = Recording {
+        joints: 6,
+        prismatic: vec![false; 6],
+        sequence: (0..ROWS as i64).collect(),
+        point_id: (0..ROWS).map(|row| format!("P{row}")).collect(),
+        usage: vec![None; ROWS],
+        q: fixture::poses(&description, ROWS),
+        position: vec![[0.0; 3]; ROWS],
+        ..Recording::default()
+    };
+    recording.position = model.predict(&recording.measurements(&Instrument::default())).into_iter().map(Into::into).collect();
+    let data = recording.measurements(&Instrument::default());
+    let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "validate".into() };
+    let split = Split((0..ROWS).map(split).collect());
+    let prediction = Prediction::of("diagnose", &model, &data, &recording, &split, &[true; ROWS], None);
+    let findings = vec![finding(1, "cable_drag", &json!([pull, once])), finding(2, "gear_cyclic", &json!([twice]))];
+    let reads = ReportReads {
+        statistics: Statistics::default(),
+        prediction: labelled(prediction),
+        parameters: parameters.clone(),
+        robot: Robot::from_description(&description),
+        recording: recording.clone(),
+        split,
+        intake: Vec::new(),
+        rejected: Vec::new(),
+        fit: Vec::new(),
+        observability: Vec::new(),
+        training: Vec::new(),
+        corrections: Vec::new(),
+        models: labelled(parameters),
+        verdict: Vec::new(),
+        findings: labelled(Findings(findings)),
+        finding_numbers: Vec::new(),
+        rivals: Vec::new(),
+        suspects: Vec::new(),
+    };
+    let tables = Desk::default().run(&Report::default(), reads).expect("a report");
+    let curves: Curves = table(&tables).remove(0);
+    assert_eq!(curves.0.len(), 2 * ROWS);
+    for point in &curves.0 {
+        let q = recording.q(point.sequence as usize);
+        let ((s2, c2), (s3, c3)) = (q[1].sin_cos(), q[2].sin_cos());
+        let arcsec = match point.rank {
+            1 => 9.0 * s2 * s3 - 4.0 * s2 * c3 + 6.0 * c2 * s3 + 3.0 * c2 * c3 + 5.0 * s3 - 7.0 * c3,
+            _ => -8.0 * (2.0 * q[2]).sin() + 2.0 * (2.0 * q[2]).cos(),
+        };
+        assert_eq!((point.over.as_str(), point.unit.as_str()), ("joint 3", "rad"));
+        assert!((point.x - q[2]).abs() < 1e-12);
+        // A chord is the arc to second order.
+        assert!((point.fitted / ARCSEC - arcsec).abs() < 0.01, "{point:?}: {arcsec} arcsec");
+        assert!(point.with.abs() < 1e-9 && (point.without - point.fitted).abs() < 1e-9, "{point:?}");
+    }
+}

@@ -1,0 +1,94 @@
+//! What a diagnosis says where the recording is poor: without a clock no seconds, of few rows nothing.
+
+use super::{CASE, calib, case_with, concealed, refused, table_of};
+use calib::table::{Curves, Findings};
+use serde_json::Value;
+use std::path::Path;
+
+/// Rewrites the cells of the controller's log, row by row, the head first.
+fn rewritten(folder: &Path, mut change: impl FnMut(usize, &mut Vec<String>)) {
+    let file = folder.join("sealed/recordings/c0001/controller.csv");
+    let text = std::fs::read_to_string(&file).expect("the log");
+    let mut line = |(row, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(String::from).collect();
+        change(row, &mut cells);
+        cells.join(",") + "\n"
+    };
+    let text: String = text.lines().enumerate().map(&mut line).collect();
+    std::fs::write(&file, text).expect("written");
+}
+
+fn diagnosed(folder: &Path) -> Value {
+    let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), folder);
+    serde_json::from_str(&said).expect("JSON")
+}
+
+#[test]
+fn without_a_clock_nothing_is_said_in_seconds() {
+    let folder = concealed("zero_shift", "923", "120");
+    let here = folder.path();
+    case_with(here, &[]);
+    let timed = diagnosed(here);
+    assert_eq!(timed["clock"], "s");
+    assert!(timed["findings"][0]["statement"].as_str().expect("a sentence").contains(" s ("), "{timed:#}");
+    let findings: Findings = table_of(here, "diagnose.findings.parquet");
+    let forms: Value = serde_json::from_str(&findings.0[0].forms).expect("JSON");
+    let step = forms[0]["zero_shift"]["time_s"].as_f64().expect("s");
+    let mut times: Vec<f64> = Vec::new();
+    let mut column = None;
+    rewritten(here, |row, cells| {
+        let at = *column.get_or_insert_with(|| cells.iter().position(|name| name == "time_s").expect("time_s"));
+        let cell = cells.remove(at);
+        if row > 0 {
+            times.push(cell.parse().expect("s"));
+        }
+    });
+    let rows = diagnosed(here);
+    assert_eq!(rows["clock"], "row");
+    let first = times.iter().position(|time| *time > step).expect("a row after the step") + 1;
+    let statement = rows["findings"][0]["statement"].as_str().expect("a sentence");
+    assert!(statement.contains(&format!(" from row {first} (")), "{statement}");
+    let unseen = rows["not_observable"].as_array().expect("a list");
+    assert!(unseen.iter().any(|line| line == "time: none was recorded; the order of the rows stands for it"), "{unseen:?}");
+    let goes_with = rows["located"]["variables"].as_array().expect("a list");
+    assert!(goes_with.iter().any(|by| by["name"] == "row") && goes_with.iter().all(|by| by["name"] != "time"), "{goes_with:?}");
+    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    let curves: Curves = table_of(here, "report.curves.parquet");
+    let own: Vec<_> = curves.0.iter().filter(|point| point.rank == 1).collect();
+    assert!(!own.is_empty());
+    for point in own {
+        let named = (point.over.as_str(), point.x_unit.as_str());
+        assert_eq!(named, ("place in the recording", "row"));
+        assert!(point.x >= 1.0 && point.x.fract() == 0.0, "{}", point.x);
+    }
+    std::fs::write(here.join("t.csv"), "x_mm,y_mm,z_mm\n600,0,700\n").expect("written");
+    let (code, said) = refused(&["compensate", "HEAD", "t.csv", "--time", "100"], here);
+    assert!(code == Some(2) && said.contains("--time: the recording of the model has no clock"), "{said}");
+}
+
+#[test]
+fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
+    let folder = concealed("zero_shift", "923", "60");
+    let here = folder.path();
+    let (mut column, mut kept) = (None, 0);
+    rewritten(here, |_, cells| {
+        let at = *column.get_or_insert_with(|| cells.iter().position(|name| name == "use").expect("use"));
+        if cells[at] == "fit" {
+            kept += 1;
+            if kept > 12 {
+                cells[at] = "validate".into();
+            }
+        }
+    });
+    case_with(here, &[]);
+    calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
+    let said = diagnosed(here);
+    assert_eq!((&said["verdict"], &said["findings"]), (&"not_asked".into(), &serde_json::json!([])));
+    assert_eq!(said["leftover"]["p_value"], Value::Null);
+    assert_eq!(
+        said["not_observable"][0],
+        "anything: 12 rows were fitted, at least 15 are needed to tell what is missing from geometry"
+    );
+    let text = calib(&["diagnose", "HEAD"], here);
+    assert!(text.starts_with("not asked\n"), "{text}");
+}

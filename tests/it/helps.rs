@@ -1,0 +1,68 @@
+//! The help of every verb: its examples are commands that calib takes.
+
+use calib::pipeline::{Override, Plan};
+use calib::stage::STAGES;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn help(verb: &[String]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(verb).arg("--help").output().unwrap();
+    assert!(output.status.success(), "{verb:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Every verb and verb of a verb, by its words.
+fn verbs(above: &[String]) -> Vec<Vec<String>> {
+    let text = help(above);
+    let list = text.split("\nCommands:\n").nth(1).map(|rest| rest.split("\n\n").next().unwrap_or_default()).unwrap_or_default();
+    let names = list
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next());
+    let mut found = Vec::new();
+    for name in names.filter(|name| *name != "help") {
+        let verb = [above, &[name.to_string()]].concat();
+        found.extend(verbs(&verb));
+        found.push(verb);
+    }
+    found
+}
+
+fn shipped() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
+    let mut pipelines: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path().join("pipeline.yaml")).collect();
+    pipelines.retain(|path| path.is_file());
+    pipelines.sort();
+    pipelines
+}
+
+/// Whether a shipped pipeline takes a setting; its files need not be there.
+fn taken(pipelines: &[PathBuf], set: &str) -> bool {
+    let set = Override::parse(set).unwrap();
+    pipelines.iter().any(|path| match Plan::load(path, std::slice::from_ref(&set), STAGES) {
+        Ok(_) => true,
+        Err(error) => !error.to_string().lines().any(|fault| fault.contains("--set") && !fault.contains("no such file")),
+    })
+}
+
+#[test]
+fn every_setting_that_a_help_shows_is_one_of_a_shipped_pipeline() {
+    let (pipelines, verbs) = (shipped(), verbs(&[]));
+    assert!(pipelines.len() > 3 && verbs.len() > 25, "{pipelines:?} {verbs:?}");
+    let mut shown = Vec::new();
+    for verb in &verbs {
+        let text = help(verb);
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let sets = words.windows(2).filter(|pair| pair[0] == "--set" && pair[1].contains('=') && !pair[1].contains("VALUE"));
+        shown.extend(sets.map(|pair| pair[1].to_string()));
+    }
+    // What is said of a `--set` without `=` names others.
+    let refusal = Override::parse("split").unwrap_err();
+    let named = refusal.split([' ', ',']).filter(|word| word.contains('=') && !word.contains("VALUE"));
+    shown.extend(named.map(String::from));
+    assert!(shown.len() >= 8, "{shown:?}");
+    let refused: Vec<&String> = shown.iter().filter(|set| !taken(&pipelines, set)).collect();
+    assert!(refused.is_empty(), "no shipped pipeline takes {refused:?}");
+    assert!(!taken(&pipelines, "split.every=5"), "what is no setting is seen as none");
+}
