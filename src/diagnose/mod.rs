@@ -139,21 +139,15 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         located.get_or_insert_with(|| locate::locate(&pool, &pool.state(&[]), &survey));
         let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
         let mut search = Search::new(&mut pool, &survey, &pose, options);
-        let start: Vec<usize> = now.chosen.iter().map(|cause| search.position(Hypothesis::new(cause.form.clone(), 1))).collect();
-        let mut start: Vec<usize> = start;
+        let mut start: Vec<usize> =
+            now.chosen.iter().map(|cause| search.position(Hypothesis::new(cause.form.clone(), 1))).collect();
         start.sort_unstable();
         start.dedup();
         let found = search.run(start);
         first.get_or_insert(found.first);
         let forms: Vec<Form> = found.set.iter().map(|k| search.pool.hypotheses[*k].form.clone()).collect();
         let coefficients: Vec<Vec<f64>> = search.coefficients(&found.set);
-        tell(format!(
-            "round {round}: {} hypotheses, {}{} (p = {:.3} that the rest is noise)",
-            search.pool.hypotheses.len(),
-            counted(forms.len(), "cause"),
-            forms.iter().map(|form| format!("; {}", form.key())).collect::<String>(),
-            found.last
-        ));
+        tell(format!("round {round}: {}", told(search.pool.hypotheses.len(), &forms, found.last)));
         let same = same_forms(&forms, &now.chosen);
         // A set that comes back after another goes in circles: both fit alike.
         let circles = !same && seen.contains(&forms);
@@ -164,11 +158,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let last_round = round >= ROUNDS || circles || now.screening.apart.is_some();
         if same && kept_same && !last_round && repeatability.repeats < REPEATS && !asked_residual && found.last > SIGNIFICANT {
             asked_residual = true;
-            let rows = &next.screening.kept;
-            let predicted = next.model.predict(&data);
-            let residuals: Vec<_> = rows.iter().map(|row| data.position[*row] - predicted[*row]).collect();
-            let parameters = next.fitted.singular.len();
-            let other = noise::from_residuals(&data, rows, &residuals, &spread, parameters);
+            let other = noise_of(&next, &data, &spread);
             if (other.sigma - repeatability.sigma).abs() > SETTLED * other.sigma.max(repeatability.sigma) {
                 repeatability = Repeatability { sigma: other.sigma, repeats: repeatability.repeats };
                 data.spread = (other.sigma > 0.0).then(|| scaled(&spread, other.sigma));
@@ -193,6 +183,21 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         drop(pool);
         now = next;
     }
+}
+
+/// A round in a line.
+fn told(tried: usize, forms: &[Form], rest: f64) -> String {
+    let keys: String = forms.iter().map(|form| format!("; {}", form.key())).collect();
+    let causes = counted(forms.len(), "cause");
+    format!("{tried} hypotheses, {causes}{keys} (p = {rest:.3} that the rest is noise)")
+}
+
+/// The joints' repeatability by what a fit leaves.
+fn noise_of(now: &Course, data: &Measurements, spread: &[Matrix3<f64>]) -> Repeatability {
+    let rows = &now.screening.kept;
+    let predicted = now.model.predict(data);
+    let residuals: Vec<_> = rows.iter().map(|row| data.position[*row] - predicted[*row]).collect();
+    noise::from_residuals(data, rows, &residuals, spread, now.fitted.singular.len())
 }
 
 fn same_forms(a: &[Form], b: &[Chosen]) -> bool {

@@ -38,7 +38,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
         withdrawn: Vec::new(),
         clock: data.has_clock(),
         not_observable: vec![format!(
-            "anything: {} rows were fitted, at least {FEWEST} are needed to tell what is missing from geometry",
+            "what is missing: {} rows were fitted, at least {FEWEST} are needed to tell it from geometry",
             fit.len()
         )],
         signature: None,

@@ -67,6 +67,30 @@ fn without_a_clock_nothing_is_said_in_seconds() {
 }
 
 #[test]
+fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run() {
+    let folder = concealed("joint_compliance", "12", "120");
+    let here = folder.path();
+    let file = here.join("sealed/recordings/c0001/robot.json");
+    let mut robot: Value = serde_json::from_str(&std::fs::read_to_string(&file).expect("the robot")).expect("JSON");
+    let fields = robot.as_object_mut().expect("a robot");
+    assert!(fields.remove("mass").is_some() && fields.remove("com").is_some());
+    std::fs::write(&file, robot.to_string()).expect("written");
+    case_with(here, &[]);
+    let run: Value =
+        serde_json::from_str(&calib(&[&["run", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), here)).expect("JSON");
+    let rms = |step: &Value| {
+        let rows = run["statistics"].as_array().expect("rows");
+        let row = rows.iter().find(|row| row["step"] == *step && row["held_out"] == true).expect("a row");
+        row["rms_mm"].as_f64().expect("mm")
+    };
+    // The payload alone winds up the joints of `joint`, which is all that the file lets one know.
+    let standing = &run["standing"]["step"];
+    assert!(rms(standing) <= 1.03 * rms(&"joint".into()), "{standing}: {} mm, joint {} mm", rms(standing), rms(&"joint".into()));
+    let (_, said) = refused(&["compensate", "HEAD", "--quiet", "nothing.csv"], here);
+    assert_eq!(said.contains("warning: `diagnose` is withdrawn"), *standing != "diagnose", "{said}");
+}
+
+#[test]
 fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     let folder = concealed("zero_shift", "923", "60");
     let here = folder.path();
@@ -87,7 +111,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     assert_eq!(said["leftover"]["p_value"], Value::Null);
     assert_eq!(
         said["not_observable"][0],
-        "anything: 12 rows were fitted, at least 15 are needed to tell what is missing from geometry"
+        "what is missing: 12 rows were fitted, at least 15 are needed to tell it from geometry"
     );
     let text = calib(&["diagnose", "HEAD"], here);
     assert!(text.starts_with("not asked\n"), "{text}");
