@@ -153,12 +153,12 @@ impl Writer {
         self.list(&mut values, if pose { 3 } else { 6 });
         self.text.push(',');
         if pose {
-            let turn = self.pick(&["[1,0,0,0]", "[0.7071068, 0,-0.7071068,0]", "[ .5,0.5,-.5,5e-1]"]);
+            let turn = self.pick(&["[1,0,0,0]", "[0.6000000, 0,-0.80,0]", "[ .5,0.5,-.5,5e-1]"]);
             self.text.push_str(turn);
             self.text.push_str(",[0,-1,0,1],");
             values.extend(match turn.as_bytes()[1] {
                 b'1' => [1.0, 0.0, 0.0, 0.0],
-                b'0' => [0.7071068, 0.0, -0.7071068, 0.0],
+                b'0' => [0.6, 0.0, -0.8, 0.0],
                 _ => [0.5, 0.5, -0.5, 0.5],
             });
         }
