@@ -148,7 +148,9 @@ impl Reader<'_> {
             return self.set(value.unwrap_or_default(), Some(&kind));
         }
         match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {
-            Some(k) if !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => self.assignment(statement, k),
+            Some(k) if k > 0 && !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => {
+                self.assignment(statement, k)
+            }
             _ => self.instruction(statement),
         }
     }
