@@ -71,7 +71,7 @@ fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     assert_eq!(code, 10, "{err}");
     for part in [
         "arm.csv:1: no column `q2`",
-        "did you mean `q_2`",
+        "did you mean `q1`",
         "points.csv:1: no column `id`, mapped to `point_id`; did you mean `ids`?",
         "points.csv:1: no column `z`",
     ] {

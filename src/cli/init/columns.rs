@@ -85,7 +85,7 @@ impl Found {
         let mut parts: Vec<String> = self.sheet.trouble.iter().cloned().collect();
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
         let unused = (0..self.said.len()).filter(|column| !self.is_taken(*column)).collect::<Vec<usize>>();
-        if !unused.is_empty() {
+        if !unused.is_empty() && self.sheet.trouble.is_none() {
             parts.push(format!("not used: {}", self.shown(&unused)));
         }
         parts.join("; ")
@@ -177,28 +177,32 @@ impl Found {
             way.columns.iter().chain(more).all(|column| self.sheet.is_numeric(*column))
         };
         let ways: Vec<&Way> = found.ways.iter().filter(|way| numeric(way)).collect();
-        if let Some(sigma) = found.sigma {
-            let unit = self.length_unit(&sigma).0;
-            let lines =
-                ["sigma_x", "sigma_y", "sigma_z"].iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
-            let lines: Vec<String> = lines.collect();
-            self.remarks.push(format!("{}   # CHECK: one standard deviation, if rows are to be weighted by it", lines[0]));
-            self.remarks.extend(lines.into_iter().skip(1));
-        }
         let Some(best) = ways.first() else {
             if let Some(wanted) = found.wanted {
                 self.remarks.push(format!("only the wanted point is there: {}", quoted(&self.shown(&wanted))));
             }
             return;
         };
+        if let Some(sigma) = found.sigma {
+            // In the unit of the point, unless the name says another.
+            let unit = self.said[sigma[0]].unit_of(&LENGTHS).unwrap_or(self.length_unit(&best.columns).0);
+            let lines =
+                ["sigma_x", "sigma_y", "sigma_z"].iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
+            let lines: Vec<String> = lines.collect();
+            self.remarks.push(format!("{}   # CHECK: one standard deviation, if rows are to be weighted by it", lines[0]));
+            self.remarks.extend(lines.into_iter().skip(1));
+        }
         let by_size = self.length_unit(&best.columns).1.then(|| "the unit, by the size of the numbers".to_string());
         let check: Vec<String> = found.question.into_iter().chain(by_size).collect();
         let said = if found.said { "the measured point" } else { "the point" };
+        let less =
+            best.difference.map(|(columns, minus)| format!("; {} {}", if minus { "less" } else { "plus" }, self.shown(&columns)));
+        let less = less.unwrap_or_default();
         let mapping = Mapping {
             quantity: "x",
             choices: ways.iter().map(|way| self.way(way)).collect(),
             check: (!check.is_empty()).then(|| check.join("; ")),
-            account: format!("{said} ({})", self.shown(&best.columns)),
+            account: format!("{said} ({}{less})", self.shown(&best.columns)),
         };
         self.mappings.push(mapping);
     }

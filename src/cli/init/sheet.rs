@@ -114,7 +114,7 @@ impl Sheet {
             sheet.skip = content[k].at;
             sheet.names = filled(table[k].clone());
             k + 1
-        } else if let Some((at, names, mark)) = commented_header(lines, comment, &content, &table, delimiter) {
+        } else if let Some((at, names, mark)) = commented_header(lines, &sheet, &content, &table) {
             (sheet.skip, sheet.names, sheet.header_in_comment) = (at, names, mark);
             sheet.comment = sheet.comment.filter(|_| mark);
             content.iter().position(|line| line.at > at).unwrap_or(content.len())
@@ -248,26 +248,25 @@ fn plain_header(table: &[Vec<String>]) -> Option<usize> {
     })
 }
 
-/// A header that is written as a comment: line, names, and whether the mark is no part of the first name.
+/// A header that is written as a comment: line, names, and whether the mark is no part of the first name. The one next to the data goes
+/// before others.
 fn commented_header(
     lines: &[String],
-    comment: Option<&'static str>,
+    sheet: &Sheet,
     content: &[Content],
     table: &[Vec<String>],
-    delimiter: char,
 ) -> Option<(usize, Vec<String>, bool)> {
-    let mark = comment?;
+    let mark = sheet.comment?;
     let fits = |names: &[String], at: usize| {
         let Some(next) = content.iter().position(|line| line.at > at) else { return false };
         is_names(names) && !names[0].is_empty() && is_data(table, next, names.len()) && table[next].len() == names.len()
     };
-    let commented = (0..lines.len()).rev().filter(|at| lines[*at].starts_with(mark));
-    let fitting = commented.filter_map(|at| {
-        let [bare, whole] = [&lines[at][mark.len()..], &lines[at]].map(|text| filled(cells(text, delimiter)));
+    let first = content.first()?.at;
+    (0..first).rev().chain(first..lines.len()).filter(|at| lines[*at].starts_with(mark)).find_map(|at| {
+        let [bare, whole] = [&lines[at][mark.len()..], &lines[at]].map(|text| filled(cells(text, sheet.delimiter)));
         let is_mark = fits(&bare, at);
         (is_mark || fits(&whole, at)).then_some((at, if is_mark { bare } else { whole }, is_mark))
-    });
-    fitting.last()
+    })
 }
 
 /// The first row of a file without a header.

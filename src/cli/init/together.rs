@@ -41,10 +41,10 @@ pub(super) fn join(found: &mut [Found]) -> Joined {
     let pairs = pairs(one, two);
     let timing = timing(one, two);
     let sizes = [one.sheet.rows.len(), two.sheet.rows.len()];
-    let running = pairs
-        .first()
-        .is_some_and(|pair| !pair.text && sizes[0] != sizes[1] && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
-    if let Some(best) = pairs.first().filter(|_| !running || timing.is_none()).cloned() {
+    // Rows that are only counted: where files are of unequal length, numbers say no more than the order of rows.
+    let running = pairs.first().is_some_and(|pair| !pair.text && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
+    let doubtful = running && sizes[0] != sizes[1];
+    if let Some(best) = pairs.first().filter(|_| !doubtful || timing.is_none()).cloned() {
         if one.get("time").is_some() {
             two.drop("time", "rows are joined by name; time is that of the first file");
         }
@@ -152,7 +152,9 @@ fn by_id(one: &mut Found, two: &mut Found, best: &Pair, pairs: &[Pair], running:
     two.map("point_id", &columns(1), None, None);
     let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
     let repeated = [&*one, &*two].iter().zip(best.columns).any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
-    let question = if running {
+    let question = if running && a == b {
+        "CHECK: running numbers, which join row by row".into()
+    } else if running {
         format!("CHECK: running numbers, but {a} and {b} rows: is the row that lacks one the last?")
     } else if f64::from(best.shared) < 100.0 * PLENTY {
         format!("CHECK: {} % of the names stand in both files", best.shared)
