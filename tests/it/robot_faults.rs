@@ -288,7 +288,7 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
         told.lines().collect::<Vec<_>>(),
         [
             "robot.json:1:41: points[0][2]: 1e305 m is more than 1000 m; is it in another unit?",
-            "robot.json:1:79: mass[0]: 1e9 kg is more than 1e6 kg; is it in another unit?"
+            "robot.json:1:78: mass[0]: 1e9 kg is more than 1e6 kg; is it in another unit?"
         ]
     );
 }
