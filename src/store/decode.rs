@@ -28,10 +28,10 @@ impl Decoded {
     /// Decodes a whole file, or says why that cannot be.
     pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         // The decoder trusts what it reads: of some damaged files it comes to no end but a panic.
-        catch_unwind(AssertUnwindSafe(|| Self::decoded(source))).unwrap_or_else(|_| Err("the decoder gave it up".into()))
+        catch_unwind(AssertUnwindSafe(|| Self::parse(source))).unwrap_or_else(|_| Err("the decoder gave it up".into()))
     }
 
-    fn decoded<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         let text = |error: &dyn std::fmt::Display| error.to_string();
         // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
