@@ -29,10 +29,10 @@ pub(super) struct Decoded {
 impl Decoded {
     /// Decodes a whole file, or says why that cannot be.
     pub fn of<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
-        raw::decoded(|| Self::decoded(source)).and_then(|decoded| decoded)
+        raw::decoded(|| Self::parse(source)).and_then(|parsed| parsed)
     }
 
-    fn decoded<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
+    fn parse<R: ChunkReader + 'static>(source: R) -> Result<Self, String> {
         let text = |error: &dyn std::fmt::Display| error.to_string();
         // Arrow's own description of the columns is left aside: Parquet's says as much of the types that tables have.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
