@@ -241,8 +241,7 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
         let message = format!("programs have targets of {JOINTS_OF_PROGRAMS} joints, the robot has {}", robot.joints());
         return Err(Error::spec(layout.place, message));
     }
-    let text =
-        raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
+    let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
     let program = Program::parse(&text, language, partial).map_err(refused)?;
     if program.literals().is_empty() {

@@ -4,7 +4,8 @@ use super::Course;
 use super::pool::Pool;
 use super::state::solve;
 use crate::effect::{
-    AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, Unknown, Variable, cause,
+    AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, Unknown,
+    Variable, cause,
 };
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -37,6 +37,7 @@ use crate::effect::{
     BaseFrame, Effect, EffectStack, Form, Hypothesis, Load, ParameterSpec, ReductionRatio, Setting, Survey, Term, identified,
     whole,
 };
+use crate::error::counted;
 use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, align, fit_screened, rows_alike};
 use crate::robot::{Measurements, RobotModel};
 use lens::Lens;
@@ -44,7 +45,6 @@ use nalgebra::Matrix3;
 use pool::Pool;
 use search::{Search, SearchOptions};
 use withdraw::Court;
-use crate::error::counted;
 
 /// Effects that the user's simulation has.
 pub const BASE: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];

@@ -2,7 +2,9 @@
 //! joints were logged; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::form::parameters;
-use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable, figure};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable, figure,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};

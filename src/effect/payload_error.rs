@@ -3,7 +3,8 @@
 use super::counterbalance::MEASURE;
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable, figure,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    figure,
 };
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;

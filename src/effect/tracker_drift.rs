@@ -1,7 +1,9 @@
 //! `tracker_drift`: the tracker's frame moves slowly: steadily, with the warm-up, or as a slow curve in time.
 
 use super::basis::around;
-use super::{About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth};
+use super::{
+    About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth,
+};
 use crate::robot::RobotModel;
 
 pub struct TrackerDrift;

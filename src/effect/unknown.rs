@@ -2,7 +2,9 @@
 
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
-use super::{About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth};
+use super::{
+    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth,
+};
 use crate::robot::RobotModel;
 
 pub struct Unknown;

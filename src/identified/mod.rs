@@ -45,7 +45,8 @@ pub struct Files {
 /// The stages of a plan that identify or learn: which of them stands is known once all have predicted.
 pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
     let writes = |at: usize, kind: &str| plan.stages[at].outputs.iter().any(|port| port.kind == kind);
-    let steps: Vec<usize> = (0..plan.stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
+    let steps: Vec<usize> =
+        (0..plan.stages.len()).filter(|at| writes(*at, Parameters::KIND) || writes(*at, Network::KIND)).collect();
     if steps.is_empty() {
         return Err(Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"));
     }
@@ -133,11 +134,7 @@ impl Identified {
 }
 
 /// The stage whose parameters are taken, and the parameters.
-fn chosen<'m>(
-    manifest: &'m Manifest,
-    step: Option<&str>,
-    stands: Option<&Standing>,
-) -> Result<(&'m StageReport, &'m TableRef)> {
+fn chosen<'m>(manifest: &'m Manifest, step: Option<&str>, stands: Option<&Standing>) -> Result<(&'m StageReport, &'m TableRef)> {
     let with = |stage: &'m StageReport| {
         stage.outputs.iter().find(|output| output.kind == Parameters::KIND).map(|output| (stage, &output.table))
     };

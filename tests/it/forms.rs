@@ -2,7 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people, whole,
+    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people,
+    whole,
 };
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};

@@ -1,8 +1,8 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
 use super::words;
-use crate::raw;
 use crate::error::{Error, Result};
+use crate::raw;
 use crate::stage::ingest::encoding;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
