@@ -43,7 +43,7 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | `src/effect/<name>.rs` | one line in [`effect::EFFECTS`] (of the whole arm) or [`effect::CAUSES`] and `effect::Form` (at a place), and its words in [`effect::CATALOGUE`] |
+//! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |

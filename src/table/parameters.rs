@@ -47,8 +47,12 @@ const BESIDE: &str = "corrects the outside simulation, not the robot file's mode
 const SILENT: f64 = 10.0;
 
 fn read_form(text: &str) -> Result<Form> {
-    serde_json::from_str(text)
-        .map_err(|error| Error::data("table parameters", format!("`{text}` is no form of an effect: {error}")))
+    serde_json::from_str(text).map_err(|error| {
+        Error::data(
+            "table parameters",
+            format!("`{text}` is no form of an effect: {error}; where an earlier calib wrote it, run its pipeline again"),
+        )
+    })
 }
 
 impl Parameters {
