@@ -1,10 +1,9 @@
 //! `cable_drag`: a hose package pulls on a joint by its angle, seen through the joint's compliance as a balancer's spring is; or by its
 //! own angle and its neighbour's, as a law without a name that is called so.
 
-use super::counterbalance::{MEASURE, Spring};
+use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
 use super::{About, Cause, Form, Hypothesis, Measure, Place, Survey, Told, Unknown};
-use serde::Deserialize;
 
 pub struct CableDrag;
 
@@ -21,7 +20,7 @@ impl Cause for CableDrag {
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        Spring::propose(survey, |joint| !Spring::balances(joint))
+        Spring::propose(&Self, survey, |joint| !Spring::balances(joint))
     }
 
     fn sentence(&self, told: &Told) -> String {
@@ -33,15 +32,11 @@ impl Cause for CableDrag {
     }
 
     fn finer(&self) -> &'static [&'static str] {
-        &["gear_cyclic", "unknown", "joint_table", "backlash"]
+        FINER
     }
 
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
-        let mut out = vec![("gear_cyclic", form.place())];
-        if let Place::Joint(joint) = form.place() {
-            out.push(("link_mass", Place::Links(joint, joint)));
-        }
-        out
+        Spring::identities(form)
     }
 
     fn measure(&self) -> Option<Measure> {
@@ -49,6 +44,6 @@ impl Cause for CableDrag {
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Spring::deserialize(body).map(Form::from))
+        Some(Spring::read(&Self, body))
     }
 }

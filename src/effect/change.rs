@@ -19,5 +19,5 @@ pub(super) fn propose(cause: &'static dyn Cause, motions: &[Motion], survey: &Su
 /// The same at neighbouring change points.
 pub(super) fn near(term: &Term, survey: &Survey) -> Vec<Term> {
     let Basis::After { at } = term.basis() else { return Vec::new() };
-    term.with_bases(survey.changes_near(at).into_iter().map(|at| Basis::After { at }))
+    term.with_bases(survey.changes_near(at).into_iter().filter(|other| *other != at).map(|at| Basis::After { at }))
 }

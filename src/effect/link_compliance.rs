@@ -1,6 +1,7 @@
 //! `link_compliance`: link N bends at its middle under the moment of all that it carries; rad/Nm.
 
 use super::form::parameters;
+use super::motion::{SHORT, extent};
 use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -32,15 +33,6 @@ pub struct BentLink {
     link: usize,
     bending: Bending,
 }
-
-/// From the point of a link's joint to that of the next one, m, zero pose; the last link ends at the tool.
-pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
-    let end = if link + 1 < robot.joints() { *robot.point(link + 1) } else { robot.home().translation };
-    end - robot.point(link)
-}
-
-/// Shorter links (m) neither bend nor grow visibly.
-pub(super) const SHORT: f64 = 1e-6;
 
 /// The last links are a stubby wrist, and hardly bend: -2 ln of the odds.
 const WRIST: usize = 2;

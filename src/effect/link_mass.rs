@@ -1,7 +1,7 @@
 //! `link_mass`: mass (kg) and perhaps centre (first moments, kg m) of a link in the torque model are wrong; seen through compliance.
 
-use super::counterbalance::{MEASURE, Spring};
 use super::form::parameters;
+use super::spring::{MEASURE, Spring};
 use super::{
     About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
 };

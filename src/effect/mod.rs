@@ -32,6 +32,7 @@ mod motion;
 mod payload_error;
 mod place;
 mod reduction_ratio;
+mod spring;
 mod stack;
 mod survey;
 mod term;

@@ -1,10 +1,10 @@
 //! Where a small motion enters the chain, and along which directions: the generators of laws.
 
-use super::link_compliance::extent;
 use super::{Deflection, NumberSpec, Place};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Joints and links count from 0.
@@ -126,3 +126,12 @@ fn shift(station: usize, axes: Axes, k: usize, value: f64, p: &[f64], out: &mut 
         out.shift(range.len() * k + i, p, station, Twist::ith(axis, value));
     }
 }
+
+/// From the point of a link's joint to that of the next one, m, zero pose; the last link ends at the tool.
+pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
+    let end = if link + 1 < robot.joints() { *robot.point(link + 1) } else { robot.home().translation };
+    end - robot.point(link)
+}
+
+/// Shorter links (m) neither bend nor grow visibly.
+pub(super) const SHORT: f64 = 1e-6;

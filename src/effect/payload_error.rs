@@ -1,7 +1,7 @@
 //! `payload_error`: the payload's mass (and first moment) differs from what was declared, where one is carried.
 
-use super::counterbalance::MEASURE;
 use super::form::parameters;
+use super::spring::MEASURE;
 use super::{
     About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
     figure,

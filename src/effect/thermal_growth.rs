@@ -1,6 +1,6 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
-use super::link_compliance::{SHORT, extent};
+use super::motion::{SHORT, extent};
 use super::{About, Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, figure, warmth};
 use crate::robot::RobotModel;
 use crate::units::Unit;

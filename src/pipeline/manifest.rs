@@ -1,7 +1,7 @@
 //! The audit record of one run, written when it starts, between stages where a second of work went into them, and at the end.
 
+use super::options::{Purpose, RunOptions};
 use super::overrides::Override;
-use super::run::RunOptions;
 use crate::error::{Error, Result};
 use crate::store::{ActionId, FileHash, Link, StageKey, Store, TableRef};
 use serde::{Deserialize, Serialize};
@@ -76,22 +76,6 @@ pub struct Manifest {
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
     pub stages: Vec<StageReport>,
-}
-
-/// What a run was made for. The manifests of older versions do not say; theirs count as runs of their own.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Purpose {
-    /// `calib run`: for the sake of all its tables.
-    #[default]
-    Run,
-    /// For what the verb needs of the pipeline, which may be a part.
-    Compensate,
-    Diagnose,
-    Export,
-    Simulate,
-    /// One robot of a fleet.
-    Fleet,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

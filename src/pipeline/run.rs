@@ -3,10 +3,11 @@
 use super::desk::{self, Desk, Key};
 use super::execute::{self, Place};
 use super::lock::ActionLock;
-use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, Purpose, RunStatus, StageStatus, Surroundings};
+use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
+use super::options::RunOptions;
 use super::plan::Plan;
 use super::reason;
-use super::select::{Selected, Selection};
+use super::select::Selected;
 use super::services::Observer;
 use crate::error::{Error, Result};
 use crate::store::{ActionRecord, Lookup, Run, StageKey, Store};
@@ -15,15 +16,6 @@ use std::time::SystemTime;
 
 /// Seconds of work that are made durable together: more than a group of syncs costs, less than one would mind doing again.
 const GROUP: f64 = 1.0;
-
-/// How to run a plan.
-#[derive(Debug, Clone)]
-pub struct RunOptions {
-    pub selection: Selection,
-    /// Worker threads; no result depends on it.
-    pub jobs: usize,
-    pub purpose: Purpose,
-}
 
 /// A run that went through.
 pub struct Outcome {

@@ -5,6 +5,8 @@
 pub enum Bound {
     /// A coordinate or a length, m.
     Length,
+    /// Along the axis of a Denavit-Hartenberg joint, m: nearly parallel axes come closest to each other far away.
+    Offset,
     /// rad.
     Angle,
     /// kg.
@@ -19,6 +21,8 @@ impl Bound {
         match self {
             // The longest tracks are 100 m.
             Self::Length => (1e3, "m", "; is it in another unit?"),
+            // Axes that are parallel to 1e-9 rad at 1 m.
+            Self::Offset => (1e9, "m", "; is it in another unit?"),
             // Ten turns: more is an angle in degrees.
             Self::Angle => (63.0, "rad", ", ten turns; is it in another unit?"),
             // The heaviest robots are 10 t.

@@ -38,9 +38,13 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
     let description = fixture::spherical();
     let robot = RobotModel::new(description.clone());
     // Joint 3: products of q2 and q3, what goes once a turn, what goes twice.
-    let pull = json!({"unknown": {"place": {"Joint": 2}, "signature": {"product": {"a": 1, "b": 2}}}});
-    let once = json!({"gear_cyclic": {"joint": 2, "order": 1, "overtone": false}});
-    let twice = json!({"gear_cyclic": {"joint": 2, "order": 2, "overtone": false}});
+    let wave = |order: u32| json!({"wave": {"order": order, "overtone": false}});
+    let angle = |joint: usize| json!({"angle": {"joint": joint}});
+    let motion = json!({"joint": {"joint": 2}});
+    let times = json!({"of": angle(2), "basis": wave(1)});
+    let pull = json!({"unknown": {"motion": motion, "law": {"of": angle(1), "basis": wave(1), "times": times}}});
+    let gear = |order: u32| json!({"gear_cyclic": {"motion": motion, "law": {"of": angle(2), "basis": wave(order)}}});
+    let (once, twice) = (gear(1), gear(2));
     let sizes: [&[f64]; 3] = [&[9.0, -4.0, 6.0, 3.0], &[5.0, -7.0], &[-8.0, 2.0]];
     let mut parameters = Parameters::default();
     for (form, sizes) in [&pull, &once, &twice].into_iter().zip(sizes) {

@@ -7,6 +7,7 @@ use calib::effect::{
 };
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
+use calib::units::Unit;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
@@ -14,7 +15,7 @@ const ROWS: usize = 120;
 /// Rows at which a form is evaluated; the first has no way to it.
 const LOOKED_AT: [usize; 4] = [0, 41, 78, 119];
 /// rad/Nm of every joint: what the torque model is seen through.
-const COMPLIANCE: f64 = 1e-6;
+const COMPLIANCE: f64 = 2e-7;
 
 fn data(robot: &RobotModel, moving: bool) -> Measurements {
     let n = robot.joints();
@@ -104,7 +105,11 @@ fn at(stack: &EffectStack, own: &std::ops::Range<usize>, values: &[f64]) -> Vec<
 fn plausible(form: &Form, robot: &RobotModel) -> Vec<f64> {
     let specs = form.parameters(robot);
     let sized = specs.iter().enumerate().map(|(k, spec)| {
-        let size = if spec.prior_sigma > 1e3 { 1.0 } else { 1e-3 * spec.prior_sigma };
+        let size = match spec.unit {
+            Unit::RadianPerNewtonMetre => COMPLIANCE,
+            _ if spec.prior_sigma > 1e3 => 1.0,
+            _ => 1e-3 * spec.prior_sigma,
+        };
         (0.5 + fixture::spread(k, 11)) * size
     });
     sized.collect()

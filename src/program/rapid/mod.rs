@@ -119,6 +119,8 @@ struct Declaration<'t> {
     name: String,
     /// Behind `:=`.
     value: Option<&'t [Token]>,
+    /// Behind the name and its dimensions, where there is no `:=`.
+    stray: Option<&'t Token>,
 }
 
 fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration<'t>> {
@@ -127,8 +129,12 @@ fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration
     if !source.is_word(storage, &["VAR", "PERS", "CONST"]) || kind.sort != Sort::Word || name.sort != Sort::Word {
         return None;
     }
-    let value = rest.iter().position(|token| token.sort == Sort::Pair(b':')).map(|k| &rest[k + 1..]);
-    Some(Declaration { kind: source.upper(kind), name: source.upper(name), value })
+    let assign = rest.iter().position(|token| token.sort == Sort::Pair(b':'));
+    let dimensions = rest.iter().take_while(|token| !token.is(b'}')).count();
+    let named =
+        if rest.first().is_some_and(|token| token.is(b'{')) { rest.get(dimensions + 1..).unwrap_or_default() } else { rest };
+    let stray = if assign.is_none() { named.first() } else { None };
+    Some(Declaration { kind: source.upper(kind), name: source.upper(name), value: assign.map(|k| &rest[k + 1..]), stray })
 }
 
 struct Reader<'p> {
@@ -144,7 +150,11 @@ impl Reader<'_> {
             return;
         }
         self.frames(statement);
-        if let Some(Declaration { kind, value, .. }) = declaration(self.source, statement) {
+        if let Some(Declaration { kind, value, stray, .. }) = declaration(self.source, statement) {
+            if let Some(stray) = stray {
+                let text = quoted(self.source.bytes, stray.span.clone());
+                self.found.fault(stray.span.start, format!("{text} in a declaration is not understood; expected `:=` or `;`"));
+            }
             return self.set(value.unwrap_or_default(), Some(&kind));
         }
         match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {

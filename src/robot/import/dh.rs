@@ -37,7 +37,7 @@ pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Un
             if key == moved && value.given().is_none() { 0.0 } else { value.sized(bound, unit) }
         };
         let (turn, along) = (|key: &str| number(key, Bound::Angle, angle), |key: &str| number(key, Bound::Length, length));
-        let about_z = rotation(Vector3::z(), turn("theta")) * shift(0.0, along("d"));
+        let about_z = rotation(Vector3::z(), turn("theta")) * shift(0.0, number("d", Bound::Offset, length));
         let about_x = rotation(Vector3::x(), turn("alpha")) * shift(along("a"), 0.0);
         let at_joint = if convention == Convention::Standard { frame } else { frame * about_x };
         frame = match convention {

@@ -33,7 +33,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     assert!(timed["findings"][0]["statement"].as_str().expect("a sentence").contains(" s ("), "{timed:#}");
     let findings: Findings = table_of(here, "diagnose.findings.parquet");
     let forms: Value = serde_json::from_str(&findings.0[0].forms).expect("JSON");
-    let step = forms[0]["zero_shift"]["time_s"].as_f64().expect("s");
+    let step = forms[0]["zero_shift"]["law"]["basis"]["after"]["at"].as_f64().expect("s");
     let mut times: Vec<f64> = Vec::new();
     let mut column = None;
     rewritten(here, |row, cells| {

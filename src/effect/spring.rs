@@ -1,0 +1,130 @@
+//! A torque by the angle of a joint on top of gravity, as of a balancer's spring or a hose: periodic in the angle, seen through the joint's
+//! compliance (without one it moves nothing).
+//!
+//! Of first order where the spring's force is in proportion to its length; of second order too where it has a length at rest, or is slack.
+
+use super::form::parameters;
+use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable};
+use crate::robot::{Burden, RobotModel};
+use crate::units::Unit;
+use serde::{Deserialize, Serialize};
+
+/// What separates the numbers of the torque model.
+pub(super) const MEASURE: Measure = Measure {
+    rank: 2,
+    advice: "log motor currents at rest, or measure with two payloads over the joint's full range (for a balancer also disconnected)",
+};
+
+/// What its own shape may leave at the same joint.
+pub(super) const FINER: &[&str] = &["gear_cyclic", "unknown", "joint_table", "backlash"];
+
+/// Under the name of a cause.
+#[derive(Clone)]
+pub(super) struct Spring {
+    cause: &'static dyn Cause,
+    shape: Shape,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Shape {
+    joint: usize,
+    #[serde(default = "first")]
+    orders: u32,
+}
+
+fn first() -> u32 {
+    1
+}
+
+/// Orders of a spring that has a length at rest.
+const ORDERS: u32 = 2;
+
+impl PartialEq for Spring {
+    fn eq(&self, other: &Self) -> bool {
+        self.cause.name() == other.cause.name() && self.shape == other.shape
+    }
+}
+
+impl Spring {
+    /// At every joint that yields in the present model, of those for which `here` holds.
+    pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
+        let joints = survey.revolute().filter(|joint| here(*joint) && survey.yielding[*joint] > 0.0);
+        let springs = joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: Shape { joint, orders } }));
+        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).charged(2.0)).collect()
+    }
+
+    /// Whether a joint (from 0) is one that balancers sit on.
+    pub fn balances(joint: usize) -> bool {
+        (1..=2).contains(&joint)
+    }
+
+    /// Reads the body of a form.
+    pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> serde_json::Result<Form> {
+        Ok(Self { cause, shape: Shape::deserialize(body)? }.into())
+    }
+
+    /// The torque of a link about its own joint is of first order in that joint's angle.
+    pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
+        let mut out = vec![("gear_cyclic", form.place())];
+        if let Place::Joint(joint) = form.place() {
+            out.push(("link_mass", Place::Links(joint, joint)));
+        }
+        out
+    }
+
+    /// Sine and cosine of every order.
+    fn waves(&self, q: &[f64]) -> impl Iterator<Item = f64> {
+        let angle = q[self.shape.joint];
+        (1..=self.shape.orders).flat_map(move |order| <[f64; 2]>::from(libm::sincos(f64::from(order) * angle)))
+    }
+}
+
+impl Effect for Spring {
+    fn name(&self) -> &'static str {
+        self.cause.name()
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let named = [
+            ("sin", Unit::NewtonMetre, 1e5),
+            ("cos", Unit::NewtonMetre, 1e5),
+            ("sin2", Unit::NewtonMetre, 1e5),
+            ("cos2", Unit::NewtonMetre, 1e5),
+        ];
+        parameters(self, named.into_iter().take(2 * self.shape.orders as usize))
+    }
+
+    fn deflect(&self, _robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
+        self.waves(state.q).enumerate().for_each(|(k, wave)| out.load(k, self.shape.joint, wave));
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+
+    fn burden(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
+        out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
+    }
+}
+
+impl Placed for Spring {
+    fn place(&self) -> Place {
+        Place::Joint(self.shape.joint)
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Angle { joint: self.shape.joint }]
+    }
+
+    fn is_of_torque_model(&self) -> bool {
+        true
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self.shape)
+    }
+}
