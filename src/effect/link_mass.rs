@@ -35,7 +35,8 @@ impl Cause for LinkMass {
     /// Every link carried by a joint that yields in the present model.
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let carried = |link: &usize| (0..=*link).any(|joint| survey.yielding[joint] > 0.0);
-        let known = |link: &usize| survey.robot.description().joints[*link].centre.is_some();
+        let body = |link: &usize| &survey.robot.description().joints[*link];
+        let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
         let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
         forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()

@@ -151,6 +151,7 @@ impl Cause for Unknown {
                 let widths = [0.75, 1.0, 1.33].map(|factor| width * libm::pow(factor, power));
                 let centres = [-0.4, 0.0, 0.4].map(|share| centre + share * width * step);
                 let pairs = centres.into_iter().flat_map(|centre| widths.map(|width| (centre, width)));
+                let pairs = pairs.filter(|pair| *pair != (centre, width));
                 let pairs = pairs.filter(|(centre, width)| supported(survey, joint, *centre, *width));
                 let bump = matches!(term.basis(), Basis::Bump { .. });
                 let shape = |(centre, width)| if bump { Basis::Bump { centre, width } } else { Basis::Rise { centre, width } };

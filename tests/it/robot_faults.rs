@@ -280,7 +280,7 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
     assert_eq!(
         calib(table),
         "robot.yaml:5:15: kinematics.dh[0].theta: 1000 rad is more than 63 rad, ten turns; is it in another unit?\n\
-         robot.yaml:5:23: kinematics.dh[0].d: 1e308 m is more than 1000 m; is it in another unit?"
+         robot.yaml:5:23: kinematics.dh[0].d: 1e308 m is more than 1e9 m; is it in another unit?"
     );
     let case = r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
     let told = read_case(Text { label: "robot.json", text: case }).unwrap_err().to_string();

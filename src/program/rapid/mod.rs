@@ -55,7 +55,7 @@ pub(super) fn read(bytes: &[u8]) -> Found {
     let mut found = Found::default();
     let source = Source { bytes, language: Language::Rapid };
     let tokens = tokens(source, &mut found);
-    let statements = statements(source, &tokens);
+    let statements = statements(source, &tokens, &mut found);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for statement in &statements {
         if let Some(declaration) = declaration(source, statement) {
@@ -72,8 +72,9 @@ pub(super) fn read(bytes: &[u8]) -> Found {
     reader.found
 }
 
-/// The statements of a program, each without its `;` and without the heads of blocks before it.
-fn statements<'t>(source: Source, tokens: &'t [Token]) -> Vec<&'t [Token]> {
+/// The statements of a program, each without its `;` and without the heads of blocks before it. A value that no `;` ends before the
+/// next block is a fault: what follows would be read as a part of it, or the other way round.
+fn statements<'t>(source: Source, tokens: &'t [Token], found: &mut Found) -> Vec<&'t [Token]> {
     let mut out: Vec<&[Token]> = Vec::new();
     let mut start = 0;
     let mut k = 0;
@@ -86,6 +87,11 @@ fn statements<'t>(source: Source, tokens: &'t [Token]) -> Vec<&'t [Token]> {
         } else {
             heading(source, &tokens[k..]).map(|length| (k + length, k + length))
         };
+        let ends = token.is(b';') || token.is(b':') || source.is_word(token, &["THEN", "DO"]);
+        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == Sort::Pair(b':')) {
+            let text = quoted(source.bytes, token.span.clone());
+            found.fault(token.span.start, format!("`;` is missing before {text}"));
+        }
         k += 1;
         if let Some((end, next)) = end {
             out.push(&tokens[start..end]);
@@ -165,21 +171,26 @@ impl Reader<'_> {
         }
     }
 
+    /// Brackets of all kinds close in their order.
     fn brackets_match(&mut self, statement: &[Token]) -> bool {
-        let mut open: Vec<&Token> = Vec::new();
+        const PAIRS: [(u8, u8); 3] = [(b'[', b']'), (b'(', b')'), (b'{', b'}')];
+        let mut open: Vec<(&Token, u8, u8)> = Vec::new();
         let before = self.found.faults.len();
         for token in statement {
-            if token.is(b'[') {
-                open.push(token);
+            if let Some((opens, closes)) = PAIRS.into_iter().find(|(opens, _)| token.is(*opens)) {
+                open.push((token, opens, closes));
                 if open.len() == DEPTH {
                     self.found.fault(token.span.start, "brackets are nested too deep");
                 }
-            } else if token.is(b']') && open.pop().is_none() {
-                self.found.fault(token.span.start, "`]` without `[`");
+            } else if let Some((opens, closes)) = PAIRS.into_iter().find(|(_, closes)| token.is(*closes))
+                && open.pop().is_none_or(|(_, last, _)| last != opens)
+            {
+                self.found.fault(token.span.start, format!("`{}` without `{}`", char::from(closes), char::from(opens)));
             }
         }
-        for token in open {
-            self.found.fault(token.span.start, "`[` without `]` in its statement");
+        for (token, opens, closes) in open {
+            let message = format!("`{}` without `{}` in its statement", char::from(opens), char::from(closes));
+            self.found.fault(token.span.start, message);
         }
         self.found.faults.len() == before
     }
