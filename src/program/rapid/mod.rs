@@ -48,6 +48,9 @@ const BLOCKS: [&str; 15] = [
     "UNDO",
 ];
 
+/// What a declaration begins with.
+const STORAGE: [&str; 3] = ["VAR", "PERS", "CONST"];
+
 /// Types whose literals may have the form of a target and are none.
 const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
 
@@ -132,7 +135,7 @@ struct Declaration<'t> {
 fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration<'t>> {
     let scoped = statement.iter().take_while(|token| source.is_word(token, &["LOCAL", "TASK"])).count();
     let [storage, kind, name, rest @ ..] = &statement[scoped..] else { return None };
-    if !source.is_word(storage, &["VAR", "PERS", "CONST"]) || kind.sort != Sort::Word || name.sort != Sort::Word {
+    if !source.is_word(storage, &STORAGE) || kind.sort != Sort::Word || name.sort != Sort::Word {
         return None;
     }
     let assign = rest.iter().position(|token| token.sort == Sort::Pair(b':'));
@@ -162,6 +165,11 @@ impl Reader<'_> {
                 self.found.fault(stray.span.start, format!("{text} in a declaration is not understood; expected `:=` or `;`"));
             }
             return self.set(value.unwrap_or_default(), Some(&kind));
+        }
+        let scoped = statement.iter().find(|token| !self.source.is_word(token, &["LOCAL", "TASK"]));
+        if let Some(storage) = scoped.filter(|token| self.source.is_word(token, &STORAGE)) {
+            self.found.fault(storage.span.start, "a declaration that is not understood; expected a type and a name");
+            return;
         }
         match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {
             Some(k) if k > 0 && !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => {
