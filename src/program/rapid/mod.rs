@@ -166,8 +166,9 @@ impl Reader<'_> {
             }
             return self.set(value.unwrap_or_default(), Some(&kind));
         }
-        let scoped = statement.iter().find(|token| !self.source.is_word(token, &["LOCAL", "TASK"]));
-        if let Some(storage) = scoped.filter(|token| self.source.is_word(token, &STORAGE)) {
+        // In the head of a routine these words stand in brackets.
+        let storage = |(token, depth): &(&Token, _)| *depth == 0 && self.source.is_word(token, &STORAGE);
+        if let Some((storage, _)) = depths(statement).find(storage) {
             self.found.fault(storage.span.start, "a declaration that is not understood; expected a type and a name");
             return;
         }

@@ -206,7 +206,11 @@ pub fn rapid(program: &[u8]) -> Option<Targets> {
         };
         let count = if motion.is_some_and(|motion| motion.starts_with("MOVEC")) { 2 } else { 1 };
         let mut rest = statement[open..].chars().peekable();
-        for _ in 0..count {
+        for position in 0..count {
+            // The second position of a circle may be a variable.
+            if position > 0 && rest.peek() != Some(&'[') {
+                break;
+            }
             collect(&piece(&mut rest)?, pose, &mut out)?;
             // To the next position.
             while rest.next_if(|c| blank(*c) || *c == ',').is_some() {}
