@@ -13,7 +13,7 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         stage.outputs.iter().find(|output| output.kind == kind).map(|output| output.table.clone())
     };
     let steps = manifest.stages.iter().filter_map(|stage| Some((stage, of(stage, Prediction::KIND)?)));
-    let diagnosed = steps.clone().filter(|(stage, _)| stage.uses == Diagnose::NAME).last();
+    let diagnosed = steps.clone().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
     if let Some(table) = diagnosed.as_ref().and_then(|(stage, _)| of(stage, Parameters::KIND))
         && Parameters::from_frame(&store.load(&table)?)?.is_beside()
     {

@@ -1,5 +1,6 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 
+use crate::robot::Bound;
 use std::ops::Range;
 
 /// What the numbers of a target mean.
@@ -24,6 +25,20 @@ pub struct Literal {
 }
 
 impl Literal {
+    /// Angles and lengths that no robot has, at their bytes.
+    pub(super) fn beyond_any_robot(&self) -> impl Iterator<Item = (usize, String)> {
+        let placed = self.values.iter().zip(&self.spans).enumerate();
+        placed.filter_map(|(k, (value, span))| {
+            let fault = match self.kind {
+                Kind::Joints => Bound::Angle.fault(value.to_radians()),
+                _ if k < 3 => Bound::Length.fault(value * 1e-3),
+                Kind::Frame => Bound::Angle.fault(value.to_radians()),
+                Kind::Quaternion => None,
+            };
+            Some((span.start, fault?))
+        })
+    }
+
     /// The byte at which its first number stands.
     pub fn at(&self) -> usize {
         self.spans.iter().map(|span| span.start).min().unwrap_or_default()

@@ -126,6 +126,7 @@ impl<'p> Program<'p> {
                 found.warnings.extend(found.partial.into_iter().map(|(at, what)| (at, format!("left as it is: {what}"))))
             }
         }
+        found.faults.extend(found.literals.iter().flat_map(Literal::beyond_any_robot));
         refusal.faults = placed(bytes, found.faults);
         if !refusal.faults.is_empty() {
             return Err(refusal);
