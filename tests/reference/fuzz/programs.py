@@ -61,7 +61,7 @@ def krl_fields(body):
     """Fields of an aggregate: (name, number, text as it stands), or none where one is no `NAME number`."""
     out = []
     for field in body.split(","):
-        m = re.match(r"\s*([A-Za-z][A-Za-z0-9_]*)\s+(.*?)\s*\Z", field, re.S)
+        m = re.match(r"\s*([A-Za-z][A-Za-z0-9_]*)(?:\s+|(?=[+-]))(.*?)\s*\Z", field, re.S)
         if not m:
             return None
         # A sign may stand apart from its number: a unary operator of KRL.
@@ -174,7 +174,7 @@ def pairs_of_krl(before, after):
             raise Wrong(f"changed what is no whole target: {before[p:q]!r} to {after[s:t]!r}")
         if re.match(r"\s*:", tail) or re.search(r":\s*\Z", head):
             raise Wrong(f"changed an operand of the geometric operator: {before[start:end]!r}")
-        kept = [re.sub(r"([+-]\s*)?[0-9.][0-9.eE+-]*", "#", x) for x in (before[p:q], after[s:t])]
+        kept = [re.sub(r"([A-Za-z]\w*)\s*[+-]?\s*[0-9.][0-9.eE+-]*", r"\1 #", x) for x in (before[p:q], after[s:t])]
         if kept[0] != kept[1]:
             raise Wrong(f"changed more than numbers: {before[p:q]!r} to {after[s:t]!r}")
         pairs.append((old[0], old[1], new[1]))
