@@ -181,7 +181,7 @@ fn equal_keys_are_reported_unless_told_how_to_pair_them() {
     let b = file(folder.path(), "b.parquet", vec![whole("pose", &[3, 2, 2, 1]), real("x", &[4.0, 2.0, 3.0, 1.0], &[])]);
     let output = diff(&a, &b, &["--key", "pose"]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-    assert!(said(&output).contains("duplicate keys: 1 keys, 2 rows of A, 2 of B"), "{}", said(&output));
+    assert!(said(&output).contains("duplicate keys: 1 key, 2 rows of A, 2 of B"), "{}", said(&output));
     assert_eq!(diff(&a, &b, &["--key", "pose", "--exit-zero"]).status.code(), Some(2));
     assert_eq!(diff(&a, &b, &["--key", "pose", "--occurrence"]).status.code(), Some(0));
 }
