@@ -130,3 +130,12 @@ fn what_calib_took_for_granted_is_told_by_line() {
         ]
     );
 }
+
+#[test]
+fn an_angle_or_a_length_that_no_robot_has_is_refused_where_it_stands() {
+    let text = "CONST jointtarget a:=[[10,5e21,5,5,5,5],[9E9,9E9,9E9,9E9,9E9,9E9]];";
+    let found = faults(text);
+    assert!(found.len() == 1 && found[0].starts_with("1:27: ") && found[0].contains("rad is more than 63 rad"), "{found:?}");
+    let found = faults(&format!("MoveL [[1,2e9,3],{REST},v100,fine,t;"));
+    assert!(found.len() == 1 && found[0].starts_with("1:11: ") && found[0].contains("m is more than 1000 m"), "{found:?}");
+}
