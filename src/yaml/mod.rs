@@ -182,6 +182,14 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_number_beyond_any_quantity_is_refused_at_its_place() {
+        let text = "every: 4\nratio: .1e309\nlist: [1e15, -1e16]\n";
+        let said =
+            |number: &str, place: &str| format!("f.yaml:{place}: {number} is no quantity of a cell; expected at most 1e15");
+        assert_eq!(faults(text), [said("1e308", "2:8: ratio"), said("-1e16", "3:14: list[1]")]);
+    }
+
     /// serde reads such an enum through a buffer without places.
     #[derive(Debug, serde::Deserialize)]
     #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]

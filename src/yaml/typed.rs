@@ -84,6 +84,9 @@ impl Node {
     }
 }
 
+/// No setting is larger, in whatever unit: what is would leave the range of numbers on its way through a stage.
+const LARGEST: f64 = 1e15;
+
 impl<'de> Deserializer<'de> for &'de Node {
     type Error = Trouble;
 
@@ -96,6 +99,9 @@ impl<'de> Deserializer<'de> for &'de Node {
                 (_, Ok(value)) => visitor.visit_i64(value),
                 _ => visitor.visit_i128(*value),
             },
+            Value::Float(value) if value.is_finite() && value.abs() > LARGEST => {
+                Err(Trouble::new(format!("{value:e} is no quantity of a cell; expected at most {LARGEST:e}")))
+            }
             Value::Float(value) => visitor.visit_f64(*value),
             Value::Text(text) => visitor.visit_borrowed_str(text),
             Value::List(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
