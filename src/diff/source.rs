@@ -72,7 +72,8 @@ impl Source {
             .collect();
         let units: BTreeMap<String, String> =
             said.get("calib.units").and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
-        let rich = parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()).ok();
+        let rich = raw::decoded(|| parquet_to_arrow_schema(footer.schema_descr(), footer.key_value_metadata()));
+        let rich = rich.map_err(|e| unreadable(ParquetError::General(e)))?.ok();
         let columns = metadata.schema().fields().iter().map(|field| {
             let about = |key: &str| metadata_of(rich.as_ref(), field.name(), key);
             Column {
@@ -126,8 +127,9 @@ impl Source {
         let file = File::open(&self.path).map_err(|e| Error::spec(&place, format!("cannot be read: {e}")))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
         let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
-        let reader = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build();
-        let reader = reader.map_err(|e| Error::spec(&place, format!("not a readable Parquet file: {e}")))?;
+        let unreadable = |e: String| Error::spec(&place, format!("not a readable Parquet file: {e}"));
+        let reader = raw::decoded(|| builder.with_projection(mask).with_batch_size(BATCH_ROWS).build()).map_err(unreadable)?;
+        let reader = reader.map_err(|e| unreadable(e.to_string()))?;
         // The reader gives columns in the file's order.
         let mut ascending: Vec<usize> = columns.to_vec();
         ascending.sort_unstable();
