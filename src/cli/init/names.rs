@@ -105,7 +105,7 @@ fn without_unit(lower: &str) -> Stem<'_> {
 /// Rows of columns that may be the joints, best first: those of usual names, else the longest of four or more that `angle` takes for angles.
 pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
     let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS.iter().filter_map(|listed| named(names, listed)).collect();
-    // Nine letters of a Yaskawa with seven axes hold those of one with six.
+    // The letters of a Yaskawa with seven axes hold those of one with six.
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
     let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();

@@ -278,7 +278,7 @@ impl Reader<'_> {
                     // The centre of mass and the inertia of a LOAD.
                     None if self.source.is_word(&tokens[k - 1], &["CM", "J"]) => {}
                     None if aggregate.is_frame() => {
-                        self.found.warn(inner[0].span.start, "left as it is: taken for a FRAME inside a structure");
+                        self.found.warn(inner[0].span.start, "left as it is: read as a FRAME inside a structure");
                     }
                     None if aggregate.may_be_target() => {
                         let message = format!("the type of this aggregate is not stated; write {}", aggregate.advice());

@@ -147,7 +147,7 @@ fn difference_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayou
         faults.push(Fault::new(place, "`minus` and `plus` at once; say one of them"));
     }
     if scalar.column.is_none() {
-        faults.push(Fault::new(place, format!("`{name}` goes with `column`: the target that the difference is taken from")));
+        faults.push(Fault::new(place, format!("`{name}` needs `column`: the target that the difference is taken from")));
     }
     column(Some(other), file, &format!("{place}.{name}"), faults);
     if let Some(symbol) = &scalar.difference_unit {

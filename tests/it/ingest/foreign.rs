@@ -38,7 +38,7 @@ fn a_difference_goes_with_a_column_of_lengths() {
     let both = faults("minus: xd", "minus: xd, plus: xd");
     assert_eq!(both, "files[0].columns.x: `minus` and `plus` at once; say one of them");
     let constant = faults("{column: xt, minus: xd", "{value: 1, minus: xd");
-    assert_eq!(constant, "files[0].columns.x: `minus` goes with `column`: the target that the difference is taken from");
+    assert_eq!(constant, "files[0].columns.x: `minus` needs `column`: the target that the difference is taken from");
     let unit = faults("difference_unit: um", "difference_unit: deg");
     assert_eq!(unit, "files[0].columns.z.difference_unit: `deg` is the unit of another quantity; allowed: mm, um, m, in");
     let alone = faults("{column: zt, minus: zd, unit", "{column: zt, unit");

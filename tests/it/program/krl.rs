@@ -159,7 +159,7 @@ fn what_is_no_target_stays_and_what_may_be_one_is_refused() {
     assert_eq!(
         warnings(&format!("DECL SPOT S={{P {frame},GUN 1}}\nDECL E6PXS Q={frame}")),
         [
-            "1:16: left as it is: taken for a FRAME inside a structure",
+            "1:16: left as it is: read as a FRAME inside a structure",
             "2:14: left as it is: E6PXS is no type of targets that calib knows"
         ]
     );
