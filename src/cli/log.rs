@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// List the runs, the last first: when, what for, which pipeline, what became of it.
+/// List the runs, the last first: when, what for, which pipeline, how it ended.
 ///
 /// A `run` is a complete one: `calib run` with the tables of every stage. A `partial` one stopped short of that by --only or --until, `failed`
 /// and `unfinished` ones did not end; `compensate`, `export`, `diagnose`, `simulate` and `fleet` ran what that verb needed.

@@ -45,13 +45,13 @@ impl Apart<'_> {
         let (was, will, count) = (least(before), least(&proposed.after), proposed.poses.rows());
         if will >= TOLD {
             let already = if was >= TOLD { "; the recording alone should do" } else { "" };
-            out.push(format!("measured at {}, they are told apart{already}", counted(count, "pose")));
+            out.push(format!("measured at {}, they are separable{already}", counted(count, "pose")));
         } else {
             let needed = ((TOLD - was) / (will - was) * count as f64).ceil();
             let more =
                 if needed < MOST { format!("some {needed:.0} such poses would") } else { "no number of poses would".into() };
             let size = if alike.contains(&true) { ", if what shows is as large as this recording would have it" } else { "" };
-            out.push(format!("measured at {}, they are not told apart: {more}{size}", counted(count, "pose")));
+            out.push(format!("measured at {}, they are not separable: {more}{size}", counted(count, "pose")));
             out.extend(other.map(|means| format!("instead: {means}")));
         }
         out
