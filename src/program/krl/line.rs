@@ -29,6 +29,15 @@ pub(super) fn declared(source: Source, line: &[Token]) -> Option<(String, Vec<St
     Some((kind, names))
 }
 
+/// The type that a line declares as a structure: `[GLOBAL] STRUC NAME ...`.
+pub(super) fn structure(source: Source, line: &[Token]) -> Option<String> {
+    let skipped = line.iter().take_while(|token| source.is_word(token, &["GLOBAL"])).count();
+    match &line[skipped..] {
+        [word, name, ..] if source.is_word(word, &["STRUC"]) && name.sort == Sort::Word => Some(source.upper(name)),
+        _ => None,
+    }
+}
+
 /// +1 where a bracket opens, -1 where it closes.
 pub(super) fn opens(token: &Token) -> i32 {
     match token.sort {

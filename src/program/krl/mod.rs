@@ -12,8 +12,8 @@ mod line;
 use super::token::{Sort, Source, Token, tokens};
 use super::{DEPTH, Found, Language, quoted};
 use aggregate::{Aggregate, Type};
-use line::{closing, declared, member, opens, variable};
-use std::collections::BTreeMap;
+use line::{closing, declared, member, opens, structure, variable};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
@@ -25,6 +25,9 @@ const LEFT: [&str; 8] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN_REL
 const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
 
 const RELATIVE: &str = "the geometric operator `:` makes a relative pose of its operand; calib corrects absolute ones alone";
+
+/// Types of the system with fields that targets have as well.
+const KNOWN: [&str; 2] = ["FRAME", "INERTIA"];
 
 /// Frames of the system that are kept in files.
 const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
@@ -45,7 +48,8 @@ pub(super) fn read(bytes: &[u8]) -> Found {
             }
         }
     }
-    let mut reader = Reader { source, types, found };
+    let structures = lines.iter().filter_map(|line| structure(source, line)).collect();
+    let mut reader = Reader { source, types, structures, found };
     for line in lines {
         reader.line(line);
     }
@@ -56,6 +60,8 @@ struct Reader<'p> {
     source: Source<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
+    /// Types that the file itself declares by STRUC, in capitals.
+    structures: BTreeSet<String>,
     found: Found,
 }
 
@@ -248,14 +254,7 @@ impl Reader<'_> {
         match prefix.or(by_name) {
             Some(kind) => match Type::of(&kind) {
                 Some(kind) => aggregate.take(kind, &mut self.found),
-                None => {
-                    if kind == "FDAT" {
-                        frames::of_point(self.source, tokens, &mut self.found);
-                    } else if kind != "FRAME" && aggregate.may_be_target() {
-                        self.found.warn(at, format!("left as it is: {kind} is no type of targets that calib knows"));
-                    }
-                    self.nested(tokens);
-                }
+                None => self.of_other_type(&kind, tokens),
             },
             None if aggregate.may_be_target() => {
                 let what = if name.is_empty() { "this aggregate".into() } else { format!("`{name}`") };
@@ -263,6 +262,23 @@ impl Reader<'_> {
             }
             None => self.nested(tokens),
         }
+    }
+
+    /// An aggregate of a type that is none of targets: it is left where the type is known, or declared in this file.
+    fn of_other_type(&mut self, kind: &str, tokens: &[Token]) {
+        let at = tokens[0].span.start;
+        if kind == "FDAT" {
+            frames::of_point(self.source, tokens, &mut self.found);
+        } else if !KNOWN.contains(&kind) && Aggregate::new(self.source, tokens).may_be_target() {
+            if self.structures.contains(kind) {
+                self.found.warn(at, format!("left as it is: {kind} is a structure of this file and no type of targets"));
+            } else {
+                let message = format!("type {kind} is not understood: calib cannot say whether this is a target");
+                self.found.fault(at, message);
+                return;
+            }
+        }
+        self.nested(tokens);
     }
 
     /// Aggregates inside one that is no target: a target by its prefix, a frame, or of a kind that is not told.
@@ -275,6 +291,7 @@ impl Reader<'_> {
                 let aggregate = Aggregate::new(self.source, inner);
                 match aggregate.prefix().as_deref().map(Type::of) {
                     Some(Some(kind)) => aggregate.take(kind, &mut self.found),
+                    Some(None) => self.of_other_type(&aggregate.prefix().unwrap_or_default(), inner),
                     // The centre of mass and the inertia of a LOAD.
                     None if self.source.is_word(&tokens[k - 1], &["CM", "J"]) => {}
                     None if aggregate.is_frame() => {

@@ -157,11 +157,17 @@ fn what_is_no_target_stays_and_what_may_be_one_is_refused() {
     assert_eq!(faults("H={A1 1,A2 2}"), [format!("1:3: {}", unstated("`H`", "`{E6AXIS: ...}`"))]);
     assert_eq!(faults(&format!("MOVE({frame})")), [format!("1:6: {}", unstated("this aggregate", pose))]);
     assert_eq!(
-        warnings(&format!("DECL SPOT S={{P {frame},GUN 1}}\nDECL E6PXS Q={frame}")),
+        warnings(&format!("STRUC SPAN FRAME P,INT GUN\nDECL SPOT S={{P {frame},GUN 1}}\nDECL SPAN Q={frame}")),
         [
-            "1:16: left as it is: read as a FRAME inside a structure",
-            "2:14: left as it is: E6PXS is no type of targets that calib knows"
+            "2:16: left as it is: read as a FRAME inside a structure",
+            "3:13: left as it is: SPAN is a structure of this file and no type of targets"
         ]
+    );
+    let unknown = |name: &str| format!("type {name} is not understood: calib cannot say whether this is a target");
+    assert_eq!(faults("DECL AXISx XP2={A1 10,A2 -80,A3 95,A4 10,A5 30,A6 -20}"), [format!("1:16: {}", unknown("AXISX"))]);
+    assert_eq!(
+        faults(&format!("DECL SPOT S={{P {{E6PXS: X 1}}}}\nDECL E6PXS Q={frame}")),
+        [format!("1:16: {}", unknown("E6PXS")), format!("2:14: {}", unknown("E6PXS"))]
     );
     assert_eq!(
         faults("DECL SPOT S={P {X 1,Y 2,Z 3,A 4,B 5,C 6,S 1,T 2},GUN 1}"),

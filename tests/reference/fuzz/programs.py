@@ -22,6 +22,9 @@ def number(text):
     return float(text) if NUMBER.match(text) and math.isfinite(float(text)) else None
 
 
+COMMENT, TEXT = "\x01", "\x02"
+
+
 def bare(text, comment):
     """The text with comments and strings blanked, position for position."""
     out, state = [], ""
@@ -30,15 +33,15 @@ def bare(text, comment):
             state = ""
         elif state == "" and c == '"':
             state = '"'
-            out.append("\x01")
+            out.append(TEXT)
             continue
         elif state == '"' and c == '"':
             state = ""
-            out.append("\x01")
+            out.append(TEXT)
             continue
         elif state == "" and c == comment:
             state = ";"
-        out.append(c if not state else "\x01")
+        out.append(c if not state else TEXT if state == '"' else COMMENT)
     return "".join(out)
 
 
@@ -98,7 +101,7 @@ def krl_target(head, group, tail):
         r"\s*(?:GLOBAL\s+)?(?:DECL\s+)?(?:E6AXIS|E6POS|AXIS|POS)\s+[A-Z_][A-Z0-9_]*\s*=\s*", head, re.I)
     ordered = [n for n in names if n in wanted] == list(wanted)
     quiet = re.fullmatch(r"\s*(?:C_(?:PTP|DIS|VEL|ORI))?\s*\x01*\r?\Z", tail, re.I) is not None
-    sure = bool(plain) and quiet and ordered and (moves or bool(declared)) and "\x01" not in group
+    sure = bool(plain) and quiet and ordered and (moves or bool(declared)) and not {COMMENT, TEXT} & set(group)
     return ("joints" if wanted is AXES else "frame"), values, sure
 
 
@@ -188,7 +191,7 @@ def pairs_of_rapid(before, after):
     pairs = []
     for (p, q), (s, t) in zip(gb, ga):
         statement = b[b.rfind(";", 0, p) + 1:p]
-        old_lists = rapid_lists(b[p:q].replace("\x01", "")) if "\x01" not in b[p:q] else None
+        old_lists = rapid_lists(b[p:q].replace(COMMENT, " ")) if TEXT not in b[p:q] else None
         old = rapid_targets(old_lists) if old_lists is not None else None
         if before[p:q] == after[s:t]:
             sure = re.fullmatch(r"\s*(?:LOCAL\s+|TASK\s+)?(?:CONST|PERS|VAR)\s+(jointtarget|robtarget)\s+[A-Za-z]\w*\s*:=\s*", statement, re.I) \
@@ -196,7 +199,7 @@ def pairs_of_rapid(before, after):
             if old and sure:
                 raise Wrong(f"left a target as it was: {before[p:q]!r}")
             continue
-        new_lists = rapid_lists(a[s:t]) if "\x01" not in a[s:t] else None
+        new_lists = rapid_lists(a[s:t].replace(COMMENT, " ")) if TEXT not in a[s:t] else None
         new = rapid_targets(new_lists) if new_lists is not None else None
         if not old or not new or [k for k, _ in old] != [k for k, _ in new]:
             raise Wrong(f"changed what is no whole target: {before[p:q]!r} to {after[s:t]!r}")
