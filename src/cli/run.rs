@@ -6,6 +6,7 @@ use crate::error::{Result, counted};
 use crate::identified::standing_of;
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
+use crate::table::Withdrawn;
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
@@ -115,10 +116,13 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
     let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
-        let withdrawn = stands.withdrawn.iter().map(|gone| {
+        let compared = |gone: &Withdrawn| {
             json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
-        });
-        json!({ "step": stands.step, "model": stands.model, "withdrawn": withdrawn.collect::<Vec<_>>() })
+        };
+        json!({
+            "step": stands.step, "model": stands.model, "withdrawn": stands.withdrawn.iter().map(compared).collect::<Vec<_>>(),
+            "contradicted": stands.contradicted.as_ref().map(|contradicted| compared(&contradicted.0)),
+        })
     });
     let stages: Vec<serde_json::Value> = manifest
         .stages

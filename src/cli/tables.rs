@@ -43,7 +43,7 @@ pub(super) fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: 
 /// step that was worse.
 pub(super) fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
     let Some(standing) = standing else { return Ok(String::new()) };
-    let mut text: String = standing.withdrawn.iter().map(|gone| format!("{gone}\n")).collect();
+    let mut text: String = standing.warnings().map(|warning| format!("{warning}\n")).collect();
     if !standing.withdrawn.is_empty() {
         text.push_str(&format!("`calib compensate` and `calib export` take the step `{}`\n", standing.model));
     }

@@ -35,6 +35,8 @@ pub struct Arm {
     model: Model,
     base: Pose,
     correction: Option<Correction>,
+    /// Parameters of the measurement itself, which are zero here.
+    quiet: Vec<usize>,
 }
 
 impl Arm {
@@ -43,15 +45,20 @@ impl Arm {
         let of_it = |form: &Form| form.is_of_the_measurement();
         let effects = model.stack.effects().filter(|(effect, _)| effect.form().is_some_and(of_it));
         let quiet: Vec<usize> = effects.flat_map(|(_, range)| range).collect();
-        for parameter in quiet {
-            model.x[parameter] = 0.0;
+        for parameter in &quiet {
+            model.x[*parameter] = 0.0;
         }
         let base = model.base();
-        Self { model, base, correction }
+        Self { model, base, correction, quiet }
     }
 
     pub fn model(&self) -> &Model {
         &self.model
+    }
+
+    /// Positions of the parameters that belonged to the measurement by which the arm was identified.
+    pub(super) fn of_the_measurement(&self) -> &[usize] {
+        &self.quiet
     }
 
     /// The base in the tracker's frame.

@@ -6,6 +6,7 @@ use super::triangle::{Triangle, dot};
 use crate::robot::Measurements;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Covariance of the free parameters as `root * root^T`.
 #[derive(Debug, Clone)]
@@ -25,6 +26,45 @@ impl Covariance {
     /// From a root.
     pub(crate) fn of_root(root: Triangle, free: &[usize]) -> Self {
         Self { free: free.to_vec(), root }
+    }
+
+    /// From the covariance (SI) of pairs of parameters of the stack, each once with the smaller position first; pairs that are not there
+    /// are independent. `None` of no pairs, and where it is no covariance.
+    pub fn of_pairs(values: &BTreeMap<(usize, usize), f64>) -> Option<Self> {
+        let free: Vec<usize> = values.keys().filter(|(a, b)| a == b).map(|(a, _)| *a).collect();
+        let p = free.len();
+        let sigma: Vec<f64> = free.iter().map(|k| values[&(*k, *k)].sqrt()).collect();
+        // Factored from the last row up: the root is upper triangular.
+        let correlation = DMatrix::from_fn(p, p, |i, j| {
+            let (a, b) = (p - 1 - i, p - 1 - j);
+            let value = values.get(&(free[a.min(b)], free[a.max(b)])).copied().unwrap_or(0.0);
+            value / (sigma[a] * sigma[b])
+        });
+        let factor = correlation.cholesky()?.unpack();
+        let root = Triangle::from_fn(p, |i, j| sigma[i] * factor[(p - 1 - i, p - 1 - j)]);
+        (p > 0).then_some(Self { free, root })
+    }
+
+    /// Positions in the stack of the parameters that it is of.
+    pub fn parameters(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// Every pair of parameters of the stack once, each with itself too: their covariance (SI) and correlation.
+    pub fn pairs(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> + '_ {
+        let sigma: Vec<f64> = (0..self.free.len()).map(|row| self.sigma(row)).collect();
+        let pairs = (0..self.free.len()).flat_map(|a| (a..self.free.len()).map(move |b| (a, b)));
+        pairs.map(move |(a, b)| {
+            let value = self.product(a, b);
+            let correlation = if a == b { 1.0 } else { (value / (sigma[a] * sigma[b])).clamp(-1.0, 1.0) };
+            (self.free[a], self.free[b], value, correlation)
+        })
+    }
+
+    /// Length (m) of the one-sigma error of a point with these derivatives (m per unit) by [`Covariance::parameters`].
+    pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> f64 {
+        let along = |k: usize| -> Vector3<f64> { self.root.column(k).iter().zip(jacobian).map(|(root, by)| by * *root).sum() };
+        (0..self.free.len()).map(|k| along(k).norm_squared()).sum::<f64>().sqrt()
     }
 
     /// Standard deviation of the `row`-th free parameter, SI.

@@ -1,5 +1,5 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
-//! blocks. Rows of one pose stay together: a pose that was seen is no test.
+//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do.
 //!
 //! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
 //! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
@@ -21,6 +21,8 @@ use rayon::prelude::*;
 
 /// Least share of what is known in any direction that must be left without a fold: with less, other parameters may be seen.
 const LEFT: f64 = 0.02;
+/// Stretches into which the recording of a moving arm is cut.
+const STRETCHES: usize = 40;
 /// Departure from a straight line (of the fold's errors) up to which a step is small.
 const STRAIGHT: f64 = 0.01;
 
@@ -47,8 +49,8 @@ pub fn cross_validate(
 ) -> Option<Folds> {
     let candidates: Vec<usize> =
         (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_))).collect();
-    let poses = Poses::of(data, rows);
-    let mut order: Vec<&Vec<usize>> = poses.all().iter().collect();
+    let parts = parts(data, rows);
+    let mut order: Vec<&Vec<usize>> = parts.iter().collect();
     let left = (rows.len() * (count.max(1) - 1)) / count.max(1);
     if count < 2 || order.len() < 2 * count || 3 * left <= candidates.len() {
         return None;
@@ -56,16 +58,25 @@ pub fn cross_validate(
     let blocks = deal(&order, rows.len(), count);
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let random = deal(&order, rows.len(), count);
-    let parts: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
+    let folds: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
     let problem = Problem { data, rows, unmodelled: fitted.beyond() };
     let near = Near::of(&problem, model, fitted);
     let one = |part: &&Vec<usize>| {
         let close = near.as_ref().and_then(|near| near.without(&problem, model, part));
         close.unwrap_or_else(|| without(model, data, rows, &candidates, part))
     };
-    let errors: Vec<Vec<f64>> = parts.par_iter().map(one).collect();
+    let errors: Vec<Vec<f64>> = folds.par_iter().map(one).collect();
     let (one, other) = errors.split_at(count);
     Some(Folds { count, random: gather(data, rows, &random, one), blocks: gather(data, rows, &blocks, other) })
+}
+
+/// Rows that belong together, in the order of recording: those of one pose; of a moving arm, whose neighbouring rows know each other,
+/// stretches of rows.
+fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
+    if !data.in_motion(rows) {
+        return Poses::of(data, rows).all().to_vec();
+    }
+    rows.chunks(rows.len().div_ceil(STRETCHES).max(1)).map(<[usize]>::to_vec).collect()
 }
 
 /// Rows of each fold, sorted: poses in the given order, about as many rows in each.

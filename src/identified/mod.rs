@@ -7,8 +7,8 @@ pub use standing::standing_of;
 use crate::compensate::{Arm, Coverage, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
-use crate::estimate::Model;
 use crate::estimate::network::Correction;
+use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw;
 use crate::robot::description::RobotDescription;
@@ -17,7 +17,7 @@ use crate::robot::{Instrument, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
-use crate::table::{Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
+use crate::table::{CovarianceTable, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
 use std::path::{Path, PathBuf};
 
 /// What was identified, and from what.
@@ -26,6 +26,8 @@ pub struct Identified {
     pub parameters: Parameters,
     pub model: Model,
     pub correction: Option<Correction>,
+    /// Of the estimated parameters, where it is known.
+    pub covariance: Option<Covariance>,
     /// The recording, where it is known.
     pub data: Option<Measurements>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
@@ -84,8 +86,12 @@ impl Identified {
         };
         let data = recording.map(|table| table.measurements(&Instrument::default()));
         let origin = format!("run {run}, stage {}", stage.id);
-        let warnings = stands.iter().flat_map(|stands| &stands.withdrawn).map(ToString::to_string).collect();
-        Ok(Self { correction, data, warnings, ..Self::of(robot, parameters, origin)? })
+        let warnings = stands.iter().flat_map(Standing::warnings).collect();
+        let covariance = stage.outputs.iter().find(|output| output.kind == CovarianceTable::KIND);
+        let covariance = covariance.map(|output| CovarianceTable::from_frame(&load(&output.table)?)).transpose()?;
+        let own = Self::of(robot, parameters, origin)?;
+        let covariance = covariance.and_then(|table| table.of_model(&own.model));
+        Ok(Self { correction, covariance, data, warnings, ..own })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -110,26 +116,16 @@ impl Identified {
             return Err(Error::spec(origin, message));
         }
         let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
-        Ok(Self { robot, parameters, model, correction: None, data: None, origin, warnings: Vec::new() })
+        Ok(Self { robot, parameters, model, correction: None, covariance: None, data: None, origin, warnings: Vec::new() })
     }
 
     pub fn coverage(&self) -> Option<Coverage> {
         self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
     }
 
-    /// The uncertainty of what the model predicts; none where it was not identified from a recording that is at hand.
+    /// The uncertainty of what the model predicts, from the rows that it was fitted to; none for a table of parameters alone.
     pub fn uncertainty(&self, arm: &Arm) -> Option<Uncertainty> {
-        let data = self.data.as_ref()?;
-        let specs = self.model.stack.specs();
-        let known = |name: &str| self.parameters.0.iter().any(|row| row.name == name && row.sigma.is_some());
-        let free: Vec<usize> = (0..specs.len()).filter(|k| known(&specs[*k].name)).collect();
-        let mut off: Vec<f64> =
-            self.model.predict(data).iter().zip(&data.position).map(|(model, measured)| (model - measured).norm()).collect();
-        off.sort_by(f64::total_cmp);
-        // Of a point with one sigma per axis, half the errors are shorter: suspects do not count.
-        const MEDIAN: f64 = 1.538;
-        let sigma = off.get(off.len() / 2)? / MEDIAN;
-        Uncertainty::new(arm, &free, data, sigma)
+        self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance))
     }
 }
 

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{Diagnose, Stage};
 use crate::store::{Store, TableRef};
-use crate::table::{HeldOut, Parameters, Prediction, Standing, Step, Table, standing};
+use crate::table::{Parameters, Prediction, Standing, Step, Table, Unseen, standing};
 
 /// The step that stands for a run; none where nothing predicts, or the last diagnosis speaks of an outside simulation. Fails where a
 /// table has left the store.
@@ -20,8 +20,8 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
         return Ok(None);
     }
     let step = |(stage, prediction): (&StageReport, TableRef)| -> Result<Step> {
-        let held_out = HeldOut::of_frame(&store.load(&prediction)?)?;
-        Ok(Step { id: stage.id.clone(), own: of(stage, Parameters::KIND).is_some(), held_out })
+        let unseen = Unseen::of_frame(&store.load(&prediction)?)?;
+        Ok(Step { id: stage.id.clone(), own: of(stage, Parameters::KIND).is_some(), unseen })
     };
     let steps = steps.map(step).collect::<Result<Vec<Step>>>()?;
     Ok(standing(&steps, diagnosed.map(|(stage, _)| stage.id.as_str())))

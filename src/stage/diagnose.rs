@@ -2,11 +2,12 @@
 
 use crate::diagnose::{Question, Verdict as Said, beside, diagnose};
 use crate::error::{Error, Fault, Result};
-use crate::estimate::{Suspect, gauge};
+use crate::estimate::{Suspect, cross_validate, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
-    FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict,
+    CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split,
+    Suspects, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,6 +29,8 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
+/// Parts of the rows that were fitted, each predicted by a fit without it.
+const FOLDS: usize = 5;
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
 
@@ -50,6 +53,7 @@ crate::stage::writes! {
         shares: Shares,
         spectrum: Spectrum,
         parameters: Parameters,
+        covariance: CovarianceTable,
         prediction: Prediction,
         suspects: Suspects,
     }
@@ -58,7 +62,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 8;
+    const IMPLEMENTATION: u32 = 9;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -103,6 +107,9 @@ impl Stage for Diagnose {
         fit.iter().for_each(|row| held_out[*row] = false);
         let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
         let covariance = diagnosis.fitted.covariance.as_ref();
+        let kept = &diagnosis.kept;
+        let folds = cross_validate(&diagnosis.model, &data, kept, &diagnosis.fitted, FOLDS, context.seed);
+        let errors = folds.iter().flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         Ok(DiagnoseWrites {
             verdict: Verdict::of(step, &diagnosis),
@@ -112,8 +119,10 @@ impl Stage for Diagnose {
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
             parameters: if reads.recording.simulated.is_some() { parameters.beside() } else { parameters },
+            covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
-                .with_suspects(aside),
+                .with_suspects(aside)
+                .with_folds(errors),
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })
     }

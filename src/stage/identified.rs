@@ -5,7 +5,7 @@ use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_v
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
-use crate::table::{Beside, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
+use crate::table::{Beside, CovarianceTable, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -114,6 +114,7 @@ crate::stage::writes! {
     /// Output ports of `identify`, `stiffness` and `transfer`.
     pub struct Identified {
         parameters: Parameters,
+        covariance: CovarianceTable,
         fit: Fit,
         observability: Observability,
         prediction: Prediction,
@@ -134,6 +135,8 @@ pub struct Fitting<'a> {
     /// Parameters that the user holds.
     pub held: &'a [usize],
     pub earlier: Option<&'a Parameters>,
+    /// Of these.
+    pub earlier_covariance: Option<&'a CovarianceTable>,
     /// Rows that an earlier step was fitted to.
     pub seen_before: &'a [bool],
     /// Geometric rank: found and expected.
@@ -152,8 +155,10 @@ impl Identified {
         for row in fitting.asked {
             held_out[*row] = false;
         }
-        // Of a fit on top of another only the last parameters' uncertainty is known, which would flatter.
-        let covariance = fitted.covariance.as_ref().filter(|_| fitting.earlier.is_none());
+        let covariance = CovarianceTable::of(model, fitted, fitting.earlier_covariance);
+        // Of a fit on top of another without its covariance only the last parameters' uncertainty is known, which would flatter.
+        let known = fitting.earlier.is_none() || fitting.earlier_covariance.is_some();
+        let of_model = if known { covariance.of_model(model) } else { None };
         note(context, model, fitted, fitting);
         if let Some(repeated) = &fitted.repeated {
             repeated::note(context, repeated);
@@ -171,14 +176,16 @@ impl Identified {
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
         };
-        let prediction = Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, covariance)
-            .with_suspects(aside)
-            .with_folds(errors);
+        let prediction =
+            Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
+                .with_suspects(aside)
+                .with_folds(errors);
         let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
         let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
         suspicion.into_iter().for_each(|line| context.services.warn(line));
         Self {
             parameters: Parameters::of(step, model, fitted, fitting.held, fitting.earlier).with_advice(&advice),
+            covariance,
             fit: Fit::of(step, fitted),
             observability: Observability::of(step, fitted, &beside),
             prediction,

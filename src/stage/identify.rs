@@ -49,7 +49,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 6;
+    const IMPLEMENTATION: u32 = 7;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -107,6 +107,7 @@ impl Stage for Identify {
             screening: &screening,
             held: &held,
             earlier: None,
+            earlier_covariance: None,
             seen_before: &vec![false; data.rows()],
             geometry: geometric_rank(&model, &data, &rows, &fitted),
             repeatability,

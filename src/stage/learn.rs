@@ -180,7 +180,7 @@ writes! {
 impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str = "learns what the model leaves over: rivals compared, the best kept, and only where it helps";
-    const IMPLEMENTATION: u32 = 5;
+    const IMPLEMENTATION: u32 = 6;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -387,6 +387,10 @@ fn corrected(
     }
     for row in trained {
         rows[*row].held_out = false;
+        if correction.is_some() {
+            // Those were of the model alone.
+            (rows[*row].fold_error_mm, rows[*row].block_error_mm) = (None, None);
+        }
     }
     if fading + outside > 0 {
         context.services.note(format!(

@@ -6,8 +6,9 @@ use crate::report::{Limits, Tables, Wishes, pages};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, HeldOut, Intake, Observability, Parameters,
-    Prediction, Recording, Rejected, Rivals, Robot, Split, Statistics, Step, Suspects, Table, Training, Verdict, standing,
+    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
+    Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
+    Verdict, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,12 +83,12 @@ impl Stage for Report {
         let step = |step: &Labelled<Prediction>| Step {
             id: step.table.0.first().map_or_else(|| step.stage.clone(), |row| row.step.clone()),
             own: model(&step.stage).is_some(),
-            held_out: HeldOut::of(&step.table),
+            unseen: Unseen::of(&step.table),
         };
         let steps: Vec<Step> = reads.prediction.iter().map(step).collect();
         let stands = standing(&steps, diagnosed.map(String::as_str)).filter(|_| reads.recording.simulated.is_none());
         let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
-        withdrawn.iter().for_each(|gone| context.services.warn(gone.to_string()));
+        stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
         let tables = Tables {
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),

@@ -6,7 +6,7 @@ use crate::robot::RobotModel;
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
-use crate::table::{Parameters, Prediction, Recording, Robot, Split};
+use crate::table::{CovarianceTable, Parameters, Prediction, Recording, Robot, Split};
 
 crate::stage::identified::identification! {
     /// Settings of `stiffness`.
@@ -26,6 +26,7 @@ crate::stage::reads! {
         recording: Recording,
         split: Split,
         parameters: Parameters,
+        covariance: Option<CovarianceTable>,
         prediction: Prediction,
     }
 }
@@ -33,7 +34,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses, everything identified before is kept";
-    const IMPLEMENTATION: u32 = 6;
+    const IMPLEMENTATION: u32 = 7;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -78,6 +79,7 @@ impl Stage for Stiffness {
             screening: &screening,
             held: &held,
             earlier: Some(&reads.parameters),
+            earlier_covariance: reads.covariance.as_ref(),
             seen_before: &seen_before,
             geometry: None,
             repeatability,

@@ -7,7 +7,7 @@ use crate::robot::RobotModel;
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Stage};
-use crate::table::{Parameters, Recording, Robot, Split};
+use crate::table::{CovarianceTable, Parameters, Recording, Robot, Split};
 
 crate::stage::identified::identification! {
     /// Settings of `transfer`.
@@ -29,13 +29,14 @@ crate::stage::reads! {
         recording: Recording,
         split: Split,
         parameters: Parameters,
+        covariance: Option<CovarianceTable>,
     }
 }
 
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tries an identified model on another recording of the robot; only its base is found anew";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = TransferReads;
     type Writes = Identified;
 
@@ -74,6 +75,7 @@ impl Stage for Transfer {
             screening: &screening,
             held: &held,
             earlier: Some(&earlier),
+            earlier_covariance: reads.covariance.as_ref(),
             seen_before: &vec![false; data.rows()],
             geometry: None,
             repeatability,

@@ -60,6 +60,7 @@ pub(crate) use rows;
 
 mod changes;
 mod corrections;
+mod covariance;
 mod curves;
 mod document;
 mod findings;
@@ -86,6 +87,7 @@ mod verdict;
 
 pub use changes::{ChangeRow, Changes};
 pub use corrections::{Corrections, CorrectionsRow};
+pub use covariance::{CovarianceRow, CovarianceTable};
 pub use curves::{CurveRow, Curves};
 pub use document::{Document, DocumentRow};
 pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
@@ -103,7 +105,7 @@ pub use robot::{Robot, RobotRow};
 pub use scoreboard::{Scoreboard, ScoreboardRow};
 pub use searches::{SearchCourse, SearchCourseRow, Searches, SearchesRow};
 pub use split::{Split, SplitRow};
-pub use standing::{HeldOut, Standing, Step, Withdrawn, standing};
+pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
@@ -115,6 +117,7 @@ pub use verdict::{Verdict, VerdictRow};
 pub const TABLES: &[&str] = &[
     Changes::KIND,
     Corrections::KIND,
+    CovarianceTable::KIND,
     Curves::KIND,
     Document::KIND,
     FindingNumbers::KIND,

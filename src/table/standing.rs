@@ -1,31 +1,41 @@
 //! Which step stands for a run: the diagnosed model with what was learned on it, without a diagnosis the last step; never a step that is
-//! worse on held-out points than one before it.
+//! worse than one before it on points that neither has seen.
 //!
-//! Held-out points are a guard here and choose nothing else: a step that they find worse is withdrawn, the step before it stands, and
-//! every figure of the withdrawn one is said to be of a withdrawn step.
+//! The points that judge are those of the fit, each as the folds of its step predict it, or as a step does that was not fitted to it.
+//! Points that no step was fitted to choose nothing: where they contradict the choice, that is said.
 
 use super::{Frame, Prediction};
 use crate::error::Result;
 use crate::estimate::rows_alike;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-/// A step is worse where its held-out rms is larger by this share, and its squares by so many standard errors.
+/// A step is worse where its rms is larger by this share, and its squares by so many standard errors.
 const WORSE: f64 = 0.03;
 const CLEARLY: f64 = 2.0;
 /// Fewer points than this say nothing.
 const FEWEST: usize = 5;
 
-/// Errors (mm) of the whole points that a step did not see, its suspects apart, by row of the recording.
+/// Errors (mm) by row of the recording.
+type Errors = BTreeMap<i64, f64>;
+
+/// Errors of the whole points that a step did not see, its suspects apart.
 #[derive(Debug, Clone, Default)]
-pub struct HeldOut(BTreeMap<i64, f64>);
+pub struct Unseen {
+    /// Of rows that it was fitted to, by fits without their folds.
+    folds: Errors,
+    /// Of all other rows.
+    held_out: Errors,
+    /// Rows that it, or a step before it, was fitted to.
+    fitted: BTreeSet<i64>,
+}
 
 /// A step that predicts.
 pub struct Step {
     pub id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
     pub own: bool,
-    pub held_out: HeldOut,
+    pub unseen: Unseen,
 }
 
 /// The step that stands.
@@ -36,9 +46,11 @@ pub struct Standing {
     pub model: String,
     /// Later steps that were worse.
     pub withdrawn: Vec<Withdrawn>,
+    /// An earlier step that is better at points that no step was fitted to.
+    pub contradicted: Option<Contradicted>,
 }
 
-/// A step that was worse than one before it, rms of the same held-out points.
+/// A step that was worse than one before it, rms of the same points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Withdrawn {
     pub step: String,
@@ -48,48 +60,86 @@ pub struct Withdrawn {
     pub points: usize,
 }
 
+/// The same of the step that stands, at points that choose nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contradicted(pub Withdrawn);
+
 impl fmt::Display for Withdrawn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { step, rms_mm, than, than_rms_mm, points } = self;
         write!(
             f,
-            "`{step}` is withdrawn, `{than}` stands: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} held-out points"
+            "`{step}` is withdrawn, `{than}` stands: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} points, predicted by fits without them"
         )
     }
 }
 
-impl HeldOut {
+impl fmt::Display for Contradicted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Withdrawn { step, rms_mm, than, than_rms_mm, points } = &self.0;
+        write!(
+            f,
+            "the {points} held-out points contradict the choice of `{step}`: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}`. They judge and choose nothing: something differs there that the fitted points do not show"
+        )
+    }
+}
+
+impl Standing {
+    /// What a person must know of the choice, a sentence each.
+    pub fn warnings(&self) -> impl Iterator<Item = String> + '_ {
+        self.withdrawn.iter().map(ToString::to_string).chain(self.contradicted.iter().map(ToString::to_string))
+    }
+}
+
+impl Unseen {
     pub fn of(prediction: &Prediction) -> Self {
-        let rows = prediction.0.iter().filter(|row| row.held_out && !row.suspect && row.measured.is_none());
-        Self(rows.map(|row| (row.sequence, row.error_mm)).collect())
+        let mut out = Self::default();
+        for row in prediction.0.iter().filter(|row| !row.suspect && row.measured.is_none()) {
+            out.add(row.sequence, row.error_mm, row.held_out, row.fold_error_mm);
+        }
+        out
     }
 
     /// The same from a table `prediction` of which nothing else is read.
     pub fn of_frame(frame: &Frame) -> Result<Self> {
         let (sequence, error) = (frame.read::<i64>("sequence")?, frame.read::<f64>("error_mm")?);
         let (held_out, suspect) = (frame.read::<bool>("held_out")?, frame.read::<bool>("suspect")?);
-        let measured = frame.read::<Option<String>>("measured")?;
-        let counts = |row: &usize| held_out[*row] && !suspect[*row] && measured[*row].is_none();
-        Ok(Self((0..sequence.len()).filter(counts).map(|row| (sequence[row], error[row])).collect()))
+        let (measured, fold) = (frame.read::<Option<String>>("measured")?, frame.read::<Option<f64>>("fold_error_mm")?);
+        let mut out = Self::default();
+        for row in (0..sequence.len()).filter(|row| !suspect[*row] && measured[*row].is_none()) {
+            out.add(sequence[row], error[row], held_out[row], fold[row]);
+        }
+        Ok(out)
     }
 
-    /// Rms of both at the points that both have, and how many, where this one is worse.
-    fn worse_than(&self, other: &Self) -> Option<(f64, f64, usize)> {
-        let pairs: Vec<(f64, f64)> =
-            self.0.iter().filter_map(|(row, own)| Some((own * own, other.0.get(row).map(|error| error * error)?))).collect();
-        if pairs.len() < FEWEST {
-            return None;
+    fn add(&mut self, row: i64, error: f64, held_out: bool, fold: Option<f64>) {
+        if !held_out {
+            self.fitted.insert(row);
         }
-        let count = pairs.len() as f64;
-        let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-        let (own, theirs) = (mean(|pair| pair.0), mean(|pair| pair.1));
-        let off: Vec<f64> = pairs.iter().map(|(own_square, square)| own_square - square - (own - theirs)).collect();
-        let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
-        // Points along a path are not as many opinions as there are points.
-        let error = (variance * rows_alike(&off, 1) / count).sqrt();
-        let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && own - theirs > CLEARLY * error;
-        is_worse.then(|| (own.sqrt(), theirs.sqrt(), pairs.len()))
+        match fold {
+            Some(fold) => self.folds.insert(row, fold),
+            None if held_out => self.held_out.insert(row, error),
+            None => None,
+        };
     }
+}
+
+/// Rms of both at the points that both have, and how many, where the first is worse.
+fn worse(one: &Errors, other: &Errors) -> Option<(f64, f64, usize)> {
+    let pairs: Vec<(f64, f64)> =
+        one.iter().filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?))).collect();
+    if pairs.len() < FEWEST {
+        return None;
+    }
+    let count = pairs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let (own, theirs) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let off: Vec<f64> = pairs.iter().map(|(own_square, square)| own_square - square - (own - theirs)).collect();
+    let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
+    // Points along a path are not as many opinions as there are points.
+    let error = (variance * rows_alike(&off, 1) / count).sqrt();
+    let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && own - theirs > CLEARLY * error;
+    is_worse.then(|| (own.sqrt(), theirs.sqrt(), pairs.len()))
 }
 
 /// The step that stands for a run of `steps`, in the order of the pipeline, with the last diagnosis `diagnosed` where there is one.
@@ -99,14 +149,20 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
         Some(own) => own + 1 + steps[own + 1..].iter().take_while(|step| !step.own).count(),
         None => steps.len(),
     };
+    let never = never_fitted(steps);
+    let judged = |step: &Step| -> Errors {
+        let others = step.unseen.held_out.iter().filter(|(row, _)| !never.contains(row));
+        step.unseen.folds.iter().chain(others).map(|(row, error)| (*row, *error)).collect()
+    };
+    let compared = |a: &Step, b: &Step, found: Option<(f64, f64, usize)>| {
+        let (rms_mm, than_rms_mm, points) = found?;
+        Some(Withdrawn { step: a.id.clone(), rms_mm, than: b.id.clone(), than_rms_mm, points })
+    };
     let mut stands = 0;
     let mut withdrawn: Vec<Withdrawn> = Vec::new();
     for (at, step) in steps.iter().enumerate().take(end).skip(1) {
-        match step.held_out.worse_than(&steps[stands].held_out) {
-            Some((rms_mm, than_rms_mm, points)) => {
-                let than = steps[stands].id.clone();
-                withdrawn.push(Withdrawn { step: step.id.clone(), rms_mm, than, than_rms_mm, points });
-            }
+        match compared(step, &steps[stands], worse(&judged(step), &judged(&steps[stands]))) {
+            Some(gone) => withdrawn.push(gone),
             None => {
                 stands = at;
                 // What stands after them makes up for what was worse before.
@@ -115,35 +171,53 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
         }
     }
     let model = steps[..end].get(..=stands)?.iter().rfind(|step| step.own).unwrap_or(&steps[stands]);
-    Some(Standing { step: steps[stands].id.clone(), model: model.id.clone(), withdrawn })
+    let chosen = &steps[stands];
+    let guard = |step: &Step| -> Errors {
+        step.unseen.held_out.iter().filter(|(row, _)| never.contains(row)).map(|(row, error)| (*row, *error)).collect()
+    };
+    let better = steps[..stands].iter().filter_map(|step| compared(chosen, step, worse(&guard(chosen), &guard(step))));
+    let contradicted = better.min_by(|a, b| a.than_rms_mm.total_cmp(&b.than_rms_mm)).map(Contradicted);
+    Some(Standing { step: chosen.id.clone(), model: model.id.clone(), withdrawn, contradicted })
+}
+
+/// Rows that no step was fitted to.
+fn never_fitted(steps: &[Step]) -> BTreeSet<i64> {
+    let rows: BTreeSet<i64> = steps.iter().flat_map(|step| step.unseen.held_out.keys().copied()).collect();
+    let fitted: BTreeSet<i64> = steps.iter().flat_map(|step| step.unseen.fitted.iter().copied()).collect();
+    rows.difference(&fitted).copied().collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Steps with a model of their own or without, each with one error at all points but for a little scatter; `first` points are not
-    /// held out.
-    fn steps(all: &[(&str, bool, f64, i64)]) -> Vec<Step> {
-        let errors = |mean: f64, first: i64| (first..40).map(move |row| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32))));
-        let step = |(id, own, mean, first): &(&str, bool, f64, i64)| Step {
+    /// Steps with a model of their own or without, each with one error at all points but for a little scatter; the first so many points
+    /// are folds of a fit to them, all others are held out.
+    fn steps(all: &[(&str, bool, f64, f64)], folds: i64) -> Vec<Step> {
+        let scattered = |mean: f64, row: i64| (row, mean * (1.0 + 0.1 * f64::from((row % 3) as i32)));
+        let step = |(id, own, fold, held_out): &(&str, bool, f64, f64)| Step {
             id: (*id).into(),
             own: *own,
-            held_out: HeldOut(errors(*mean, *first).collect()),
+            unseen: Unseen {
+                folds: (0..folds).map(|row| scattered(*fold, row)).collect(),
+                held_out: (folds..80).map(|row| scattered(*held_out, row)).collect(),
+                fitted: (0..folds).collect(),
+            },
         };
         all.iter().map(step).collect()
     }
 
     #[test]
     fn a_diagnosis_stands_with_what_was_learned_on_it_and_not_with_another_model() {
-        let all = steps(&[
-            ("nominal", true, 0.9, 0),
-            ("network", false, 0.8, 0),
-            ("diagnose", true, 0.1, 0),
-            ("on_top", false, 0.08, 0),
-            ("joint", true, 0.07, 0),
-            ("more", false, 0.06, 0),
-        ]);
+        let all = [
+            ("nominal", true, 0.9),
+            ("network", false, 0.8),
+            ("diagnose", true, 0.1),
+            ("on_top", false, 0.08),
+            ("joint", true, 0.07),
+            ("more", false, 0.06),
+        ];
+        let all = steps(&all.map(|(id, own, error)| (id, own, error, error)), 40);
         let of = |diagnosed| standing(&all, diagnosed).map(|s| (s.step, s.model));
         assert_eq!(of(Some("diagnose")), Some(("on_top".into(), "diagnose".into())));
         assert_eq!(of(Some("joint")), Some(("more".into(), "joint".into())));
@@ -153,8 +227,8 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_is_worse_on_the_same_held_out_points_is_withdrawn() {
-        let worse = steps(&[("geometry", true, 0.232, 0), ("diagnose", true, 0.498, 0)]);
+    fn a_step_that_is_worse_at_points_that_it_did_not_see_is_withdrawn() {
+        let worse = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2)], 40);
         let found = standing(&worse, Some("diagnose")).expect("a step");
         assert_eq!((found.step.as_str(), found.model.as_str()), ("geometry", "geometry"));
         let [gone] = found.withdrawn.as_slice() else { panic!("{:?}", found.withdrawn) };
@@ -164,15 +238,37 @@ mod tests {
             (gone.rms_mm - 0.498 * 1.21125f64.sqrt()).abs() < 1e-9
                 && (gone.than_rms_mm / gone.rms_mm - 0.232 / 0.498).abs() < 1e-9
         );
+        assert_eq!(found.contradicted, None);
         // What was learned on it and is no worse stands all the same.
-        let mended = steps(&[("geometry", true, 0.232, 0), ("diagnose", true, 0.498, 0), ("network", false, 0.2, 0)]);
+        let mended = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2), ("network", false, 0.2, 0.2)], 40);
         let found = standing(&mended, Some("diagnose")).expect("a step");
         assert_eq!((found.step, found.model, found.withdrawn), ("network".into(), "diagnose".into(), Vec::new()));
-        // Points that only one of them did not see say nothing.
-        let apart = steps(&[("geometry", true, 0.232, 38), ("diagnose", true, 0.498, 0)]);
-        assert_eq!(standing(&apart, Some("diagnose")).map(|s| s.step), Some("diagnose".into()));
+        // Fewer points than five say nothing.
+        let few = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.498, 0.2)], 4);
+        assert_eq!(standing(&few, Some("diagnose")).map(|s| s.step), Some("diagnose".into()));
         // A share that does not matter is none.
-        let close = steps(&[("geometry", true, 0.232, 0), ("diagnose", true, 0.236, 0)]);
+        let close = steps(&[("geometry", true, 0.232, 0.2), ("diagnose", true, 0.236, 0.2)], 40);
         assert_eq!(standing(&close, Some("diagnose")).map(|s| s.step), Some("diagnose".into()));
+    }
+
+    #[test]
+    fn points_that_no_step_was_fitted_to_choose_nothing_and_are_heard() {
+        let all = |held_out: f64| steps(&[("geometry", true, 0.232, 0.25), ("diagnose", true, 0.1, held_out)], 40);
+        let [agreed, against] = [0.12, 0.9].map(|held_out| standing(&all(held_out), Some("diagnose")).expect("a step"));
+        assert_eq!((&agreed.step, &against.step), (&"diagnose".to_string(), &"diagnose".to_string()));
+        assert_eq!((agreed.contradicted, &against.withdrawn), (None, &Vec::new()));
+        let Contradicted(found) = against.contradicted.expect("a contradiction");
+        assert_eq!((found.step.as_str(), found.than.as_str(), found.points), ("diagnose", "geometry", 40));
+    }
+
+    #[test]
+    fn rows_that_a_later_step_was_fitted_to_judge_by_its_folds_and_by_the_earlier_step_as_it_is() {
+        let all = steps(&[("geometry", true, 0.1, 0.2), ("stiffness", true, 0.5, 0.2)], 40);
+        let [mut geometry, stiffness] = <[Step; 2]>::try_from(all).ok().expect("two steps");
+        // The first step was fitted to none of the rows.
+        geometry.unseen.held_out.append(&mut geometry.unseen.folds);
+        geometry.unseen.fitted.clear();
+        let found = standing(&[geometry, stiffness], None).expect("a step");
+        assert_eq!((found.step.as_str(), found.withdrawn[0].points), ("geometry", 40));
     }
 }

@@ -53,6 +53,7 @@ fn paper_sequence(seed: u64) -> (Recording, Split, Prediction) {
         recording: recording.clone(),
         split: split.clone(),
         parameters: only::<Parameters>(&tables),
+        covariance: None,
         prediction: only(&tables),
     };
     let stiffness = settings::<Stiffness>(json!({"on": ["loaded"], "load": "current"}));

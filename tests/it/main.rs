@@ -17,6 +17,7 @@ mod cmd;
 mod compensate;
 mod computed;
 mod conceal;
+mod covariance;
 mod curves;
 mod desk;
 mod diagnose;

@@ -264,6 +264,24 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     assert!(refused >= 18, "useless corrections pass: {refused} of 20 refused");
 }
 
+/// A recording that goes through its poses once for each of three targets: what each pose adds is the same for all of them.
+#[test]
+fn targets_of_one_pose_do_not_vouch_for_each_other() {
+    let once = arm(60, 0.0, 0.5e-3, 77);
+    let mut rng = ChaCha8Rng::seed_from_u64(78);
+    let mut thrice = Samples::default();
+    for _target in 0..3 {
+        thrice.sources.extend(once.sources.iter().cloned());
+        thrice.residual.extend(once.residual.iter().map(|r| r.map(|value| value + 0.02e-3 * normal(&mut rng))));
+    }
+    assert_eq!(thrice.poses(), (0..180).map(|row| row % 60).collect::<Vec<_>>());
+    let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
+    let comparison = compare(&thrice, &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5), |_, _| {});
+    assert_eq!(comparison.chosen, 0, "nothing carries over to another pose");
+    // Of rows that share a pose with trained ones a Gaussian process leaves next to nothing.
+    assert!(error(&comparison, Rival::Process) > 0.8 * comparison.judged[0].mean());
+}
+
 #[test]
 fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
     let (correction, _) = train(&arm(120, 1.0, 0.1e-3, 5), &recipe(6), |_| {});

@@ -68,7 +68,7 @@ fn papers_sequence(of: &Experiment, remainder: &str) -> (Prediction, Prediction)
     let stage: Stiffness = settings("stiffness", remainder);
     let Experiment { robot, recording, split, .. } = of;
     let (robot, recording, split) = (robot.clone(), recording.clone(), split.clone());
-    let reads = StiffnessReads { robot, recording, split, parameters, prediction: prediction.clone() };
+    let reads = StiffnessReads { robot, recording, split, parameters, covariance: None, prediction: prediction.clone() };
     (prediction, table(&Desk::default().run(&stage, reads).expect("stiffness runs")).remove(0))
 }
 

@@ -116,6 +116,7 @@ fn transferred(parameters: &Parameters, to: &Series) -> Result<[f64; 2]> {
         recording: to.recording.clone(),
         split: to.split.clone(),
         parameters: parameters.clone(),
+        covariance: None,
     };
     let prediction: Prediction = table(&Desk::default().run(&stage, reads)?).remove(0);
     let errors = || prediction.0.iter().map(|row| row.error_mm);
@@ -203,7 +204,7 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         *position = moved.point(&Vector3::from(*position)).into();
     }
     let stage = settings::<Transfer>(json!({"folds": 0}));
-    let reads = TransferReads { robot, recording: later, split, parameters: parameters.clone() };
+    let reads = TransferReads { robot, recording: later, split, parameters: parameters.clone(), covariance: None };
     let tables = desk.run(&stage, reads).unwrap();
     let mean = unseen(&tables);
     assert!(mean < 1.2 * own, "{mean} mm, {own} mm in the recording it was identified by");

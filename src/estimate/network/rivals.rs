@@ -1,7 +1,7 @@
 //! Which correction helps most, if any? Decided by cross-validation within the training rows, before anything else sees the result.
 //!
-//! Rows are judged by corrections that did not see them. Folds are made of runs of neighbouring rows, since a recording's neighbours
-//! are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
+//! Rows are judged by corrections that did not see their pose. Folds are made of runs of neighbouring poses, each with all its targets,
+//! since a recording's neighbours are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
 
 use super::arm::Arm;
 use super::basis::{curves, harmonics};
@@ -15,9 +15,9 @@ use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
 
-/// Runs of neighbouring rows per fold.
+/// Runs of neighbouring poses per fold.
 const RUNS: usize = 4;
-/// The mean gain must exceed so many of its standard errors: several rivals are tried, and neighbouring rows are alike.
+/// The mean gain must exceed so many of its standard errors: several rivals are tried, and neighbouring poses are alike.
 const CLEAR: f64 = 3.0;
 
 /// What may be learnt.
@@ -166,9 +166,10 @@ impl Contest<'_> {
 pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
+    let poses = samples.poses();
     let run = |tasks: &[Task]| {
         in_order(contest.recipe.jobs, tasks.len(), |t| {
-            let result = tasks[t].run(samples, contest);
+            let result = tasks[t].run(samples, &poses, contest);
             let mut done = done.lock().expect("no fit panics");
             *done += 1;
             let best = result.as_ref().map_or(f64::NAN, |r| r.left.iter().map(|left| left.1).sum::<f64>() / r.left.len() as f64);
@@ -198,7 +199,7 @@ pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &st
         }
         let results = run(&tasks(&grid));
         let errors: Vec<f64> =
-            results.chunks(contest.folds).map(|folds| together(folds, &before).map_or(f64::NAN, |j| j.mean())).collect();
+            results.chunks(contest.folds).map(|folds| together(folds, &before, &poses).map_or(f64::NAN, |j| j.mean())).collect();
         if let Some(best) = (0..grid.len()).min_by(|a, b| errors[*a].total_cmp(&errors[*b])) {
             let own = entered.iter_mut().filter(|(rival, _)| rival.start().is_some_and(|start| kind(start) == *rival));
             own.for_each(|(_, recipe)| *recipe = grid[best].1.clone());
@@ -207,7 +208,7 @@ pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &st
     let results = run(&tasks(&entered));
     for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
         let settings = rival.start().is_some().then_some((recipe.hidden, recipe.decay));
-        if let Some(row) = together(folds, &before) {
+        if let Some(row) = together(folds, &before, &poses) {
             judged.push(Judged { rival: Some(*rival), settings, ..row });
         }
     }
@@ -255,10 +256,11 @@ fn fit(
 }
 
 impl Task {
-    fn run(&self, samples: &Samples, contest: &Contest) -> Option<Done> {
-        let rows = samples.rows();
+    /// `poses`: that of each row.
+    fn run(&self, samples: &Samples, poses: &[usize], contest: &Contest) -> Option<Done> {
+        let count = poses.iter().max()? + 1;
         let (inside, outside): (Vec<usize>, Vec<usize>) =
-            (0..rows).partition(|row| row * contest.folds * RUNS / rows % contest.folds != self.fold);
+            (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);
         let recipe = Recipe { seed: self.recipe.seed ^ (self.fold as u64 + 1), ..self.recipe.clone() };
         let (correction, course) = fit(self.rival, &samples.pick(&inside), contest, &recipe, |_| {})?;
         let left = outside.iter().map(|row| {
@@ -273,7 +275,7 @@ impl Task {
 }
 
 /// All folds of one rival; `None` where one could not be fitted.
-fn together(folds: &[Option<Done>], before: &[f64]) -> Option<Judged> {
+fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<Judged> {
     let mut left = before.to_vec();
     for fold in folds {
         for (row, value) in &fold.as_ref()?.left {
@@ -283,10 +285,13 @@ fn together(folds: &[Option<Done>], before: &[f64]) -> Option<Judged> {
     let first = folds.first()?.as_ref()?;
     let gains: Vec<f64> = before.iter().zip(&left).map(|(before, left)| before - left).collect();
     let gain = mean(&gains);
-    let rows = gains.len() as f64;
-    let variance = gains.iter().map(|g| (g - gain) * (g - gain)).sum::<f64>() / (rows - 1.0).max(1.0);
+    // Targets of one pose are moved together: the gain's scatter is that of poses.
+    let mut off = vec![0.0; poses.iter().max()? + 1];
+    poses.iter().zip(&gains).for_each(|(pose, own)| off[*pose] += own - gain);
+    let (count, rows) = (off.len() as f64, gains.len() as f64);
+    let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0)).sqrt() / rows;
     let (numbers, evaluations) = (first.numbers, first.evaluations);
-    Some(Judged { rival: None, left, gain, sigma: (variance / rows).sqrt(), numbers, evaluations, settings: None })
+    Some(Judged { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
 }
 
 fn length(v: [f64; 3]) -> f64 {
