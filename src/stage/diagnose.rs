@@ -1,6 +1,6 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, Verdict as Said, beside, diagnose};
+use crate::diagnose::{Question, Verdict as Said, against_simulation, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
@@ -79,7 +79,7 @@ impl Stage for Diagnose {
         if let Some(simulated) = &reads.recording.simulated {
             let robot = RobotModel::new(reads.robot.to_description()?);
             let message = "three rows to fit with sim_x, sim_y, sim_z and a measured point are needed to lay one over the other";
-            data = beside(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
+            data = against_simulation(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
             context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
             context.services.warn("parameters correct that simulation: they are not the robot file's".into());
         }

@@ -1,22 +1,22 @@
 //! Motor currents as a second witness of the torque model: holding torque minus what the model says hangs there.
 //!
-//! Only numbers of the torque model (payload, link moments, balancers) can explain it. Bias and friction by direction of
-//! approach are each motor's own; a motor whose current does not follow the model at all says nothing.
+//! Only parameters of the torque model (payload, link moments, balancers) can explain it. Bias and friction by direction of
+//! approach are each motor's own; a motor whose current does not follow the model at all is not usable.
 
 use crate::effect::Sight;
 use crate::estimate::Prior;
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::{DMatrix, DVector};
 
-/// The motors that can be heard.
+/// The motors whose currents are usable.
 pub(crate) struct Currents {
     /// Joints, from 0.
     pub joints: Vec<usize>,
-    /// Nm for each line: rows x joints, row by row.
+    /// Nm for each residual row: rows of the recording x joints, row by row.
     residual: Vec<f64>,
-    /// Standard deviation of each joint's lines, Nm.
+    /// Standard deviation of each joint's residuals, Nm.
     sigma: Vec<f64>,
-    /// Direction of approach in each line.
+    /// Direction of approach in each residual row.
     direction: Vec<f64>,
 }
 
@@ -26,9 +26,9 @@ const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
 const FINEST: f64 = 5e-3;
 
 impl Currents {
-    /// Of `rows` seen as `sights`; `None` where no motor can be heard.
+    /// Of `rows` seen as `sights`; `None` where no current is usable.
     pub fn new(robot: &RobotModel, data: &Measurements, rows: &[usize], sights: &[Sight]) -> Option<Self> {
-        let mut heard: Vec<(usize, Vec<f64>, f64)> = Vec::new();
+        let mut usable: Vec<(usize, Vec<f64>, f64)> = Vec::new();
         for joint in (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)) {
             let described = &robot.description().joints[joint];
             let (Some(ratio), Some(constant)) = (described.reduction_ratio, described.motor_constant) else { continue };
@@ -53,33 +53,33 @@ impl Currents {
             let left = DVector::from_vec(held.clone()) - &features * all;
             let sigma = median_deviation(left.as_slice()).max(FINEST * most);
             let residual = held.iter().zip(&torque).map(|(held, torque)| held * slope.signum() - torque).collect();
-            heard.push((joint, residual, sigma));
+            usable.push((joint, residual, sigma));
         }
-        if heard.is_empty() {
+        if usable.is_empty() {
             return None;
         }
-        let joints: Vec<usize> = heard.iter().map(|(joint, ..)| *joint).collect();
-        let lines = (0..rows.len()).flat_map(|i| heard.iter().map(move |(_, residual, _)| residual[i]));
+        let joints: Vec<usize> = usable.iter().map(|(joint, ..)| *joint).collect();
+        let residual = (0..rows.len()).flat_map(|i| usable.iter().map(move |(_, residual, _)| residual[i]));
         let direction = rows.iter().flat_map(|row| joints.iter().map(|joint| data.direction(*row, *joint)));
         Some(Self {
-            residual: lines.collect(),
-            sigma: heard.iter().map(|(.., sigma)| *sigma).collect(),
+            residual: residual.collect(),
+            sigma: usable.iter().map(|(.., sigma)| *sigma).collect(),
             direction: direction.collect(),
             joints,
         })
     }
 
-    pub fn lines(&self) -> usize {
+    pub fn residual_rows(&self) -> usize {
         self.residual.len()
     }
 
     /// Residuals in standard deviations.
     pub fn whitened(&self) -> impl Iterator<Item = f64> + '_ {
-        self.residual.iter().enumerate().map(|(line, value)| value / self.sigma_of(line))
+        self.residual.iter().enumerate().map(|(row, value)| value / self.sigma_of(row))
     }
 
-    pub fn sigma_of(&self, line: usize) -> f64 {
-        self.sigma[line % self.joints.len()]
+    pub fn sigma_of(&self, row: usize) -> f64 {
+        self.sigma[row % self.joints.len()]
     }
 
     /// Columns that each motor has of its own: bias and friction.
@@ -87,31 +87,31 @@ impl Currents {
         2 * self.joints.len()
     }
 
-    /// Entry of a nuisance in a line, whitened.
-    pub fn nuisance(&self, line: usize, column: usize) -> f64 {
-        let joint = line % self.joints.len();
+    /// Entry of a nuisance in a residual row, whitened.
+    pub fn nuisance(&self, row: usize, column: usize) -> f64 {
+        let joint = row % self.joints.len();
         match column {
             bias if bias == 2 * joint => 1.0 / self.sigma[joint],
-            friction if friction == 2 * joint + 1 => self.direction[line] / self.sigma[joint],
+            friction if friction == 2 * joint + 1 => self.direction[row] / self.sigma[joint],
             _ => 0.0,
         }
     }
 
-    /// What the currents alone say of some numbers with whitened `columns` (of the current lines), now at `values`.
-    pub fn opinion(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
-        let (lines, own) = (self.lines(), columns.len());
+    /// What the currents alone say of some parameters with whitened `columns` (of the residual rows of currents), now at `values`.
+    pub fn priors(&self, columns: &[Vec<f64>], values: &[f64]) -> Option<Vec<Prior>> {
+        let (rows, own) = (self.residual_rows(), columns.len());
         let seen: Vec<f64> = self
             .whitened()
             .enumerate()
-            .map(|(line, value)| value + columns.iter().zip(values).map(|(column, x)| column[line] * x).sum::<f64>())
+            .map(|(row, value)| value + columns.iter().zip(values).map(|(column, x)| column[row] * x).sum::<f64>())
             .collect();
         let scale: Vec<f64> = columns.iter().map(|c| c.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300)).collect();
-        let matrix = DMatrix::from_fn(lines, own + self.nuisances(), |line, k| {
-            if k < own { columns[k][line] / scale[k] } else { self.nuisance(line, k - own) }
+        let matrix = DMatrix::from_fn(rows, own + self.nuisances(), |row, k| {
+            if k < own { columns[k][row] / scale[k] } else { self.nuisance(row, k - own) }
         });
         let solution = solve(&matrix, &seen)?;
         let left = DVector::from_vec(seen) - &matrix * &solution;
-        let scatter = left.norm_squared() / lines.saturating_sub(matrix.ncols()).max(1) as f64;
+        let scatter = left.norm_squared() / rows.saturating_sub(matrix.ncols()).max(1) as f64;
         let inverse = (matrix.transpose() * &matrix).pseudo_inverse(1e-10).ok()?;
         let prior = |k: usize| Prior {
             mean: solution[k] / scale[k],

@@ -1,16 +1,13 @@
 //! How well the joints repeat: one standard deviation for all, by maximum likelihood on repeats or on a residual without structure.
 
+use crate::diagnose::types::Repeatability;
+use crate::diagnose::whitened::WhitenedProblem;
+use crate::estimate::{Fitted, Model};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
-/// One joint repeatability (rad) and what it rests on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Repeatability {
-    pub sigma: f64,
-    /// Immediate repeats of a pose; none where it was taken from the residual.
-    pub repeats: usize,
-}
-
+/// Repeats that make the noise known; with fewer it is taken from a residual without structure.
+pub(crate) const REPEATS: usize = 10;
 /// Fewer repeats than this say too little.
 const FEW: usize = 4;
 /// Standard deviations tried, rad.
@@ -20,13 +17,20 @@ const STEPS: usize = 60;
 /// A squared whitened error counts at most this much.
 const CAP: f64 = 30.0;
 
-/// Sum of outer products of the motions by each joint: covariance (m2) per squared joint deviation.
-pub(crate) fn by_all(by_joint: &[Vector3<f64>]) -> Matrix3<f64> {
-    by_joint.iter().map(|motion| motion * motion.transpose()).sum()
+/// Covariance (m2) of every row's point per squared joint deviation.
+pub(super) fn spreads(model: &Model, data: &Measurements) -> Vec<Matrix3<f64>> {
+    let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
+    let by_all = |row| problem.by_joint(row).iter().map(|motion| motion * motion.transpose()).sum();
+    (0..data.rows()).map(by_all).collect()
 }
 
-/// From immediate repeats among `rows`: row i measured the pose of the row before again. `spread[row]` is [`by_all`] of that row.
-pub(crate) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> Repeatability {
+/// Covariance (m2) of every row's point with this deviation (rad) of every joint.
+pub(super) fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
+    spread.iter().map(|matrix| matrix * (sigma * sigma)).collect()
+}
+
+/// From immediate repeats among `rows`: row i measured the pose of the row before again. `spread` as of [`spreads`].
+pub(super) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> Repeatability {
     if data.in_motion(rows) {
         // Rows of a halt tell nothing of what the joints do on the way.
         return Repeatability { sigma: 0.0, repeats: 0 };
@@ -46,21 +50,16 @@ pub(crate) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix
     Repeatability { sigma: likeliest(&pairs, 2.0), repeats: pairs.len() }
 }
 
-/// From residuals (m) of `rows` that hold no structure any more, with `parameters` estimated from them.
-pub(crate) fn from_residuals(
-    data: &Measurements,
-    rows: &[usize],
-    residuals: &[Vector3<f64>],
-    spread: &[Matrix3<f64>],
-    parameters: usize,
-) -> Repeatability {
+/// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
+pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: &Measurements, spread: &[Matrix3<f64>]) -> f64 {
+    let predicted = model.predict(data);
     let values = 3 * rows.len();
-    let freedom = (values as f64 / values.saturating_sub(parameters).max(1) as f64).sqrt();
-    let one = |(row, residual): (&usize, &Vector3<f64>)| {
+    let freedom = (values as f64 / values.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
+    let one = |row: &usize| {
+        let residual = data.position[*row] - predicted[*row];
         (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread[*row])
     };
-    let all: Vec<_> = rows.iter().zip(residuals).map(one).collect();
-    Repeatability { sigma: likeliest(&all, 6.0), repeats: 0 }
+    likeliest(&rows.iter().map(one).collect::<Vec<_>>(), 6.0)
 }
 
 /// The likeliest deviation; none unless it is better than none by `evidence`.

@@ -1,45 +1,38 @@
 //! Findings that the last fit leaves without size, or that make held-out rows worse, are taken back, and the model is fitted
 //! without them: the search judges a linear picture of each, the fit the whole model.
 
-use super::group::{Groups, groups, ranges};
-use super::judge::{HeldOut, Worth};
-use super::pool::Pool;
-use super::{Chosen, Course, Question, start_of};
-use crate::effect::{Effect, Survey};
+use super::comparison::ModelComparison;
+use super::held_out::{HeldOutErrors, HoldoutGain};
+use crate::diagnose::round::FitState;
+use crate::diagnose::words::{FindingGroups, groups};
+use crate::effect::Effect;
 use crate::estimate::Fate;
-use crate::robot::Measurements;
 
-/// What a judgement rests on.
-pub(crate) struct Court<'a, 'b> {
-    pub pool: &'b Pool<'a>,
-    pub survey: &'b Survey<'a>,
-    pub data: &'b Measurements,
-    pub question: &'b Question<'b>,
-    /// Fits the model of a course anew with these causes.
-    pub refit: &'b dyn Fn(&Course, &[Chosen]) -> Course,
-}
-
-/// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the chosen causes' positions in the pool
-/// in their order, `worths` what held-out rows say of them.
-pub(crate) fn withdraw(mut now: Course, set: &mut Vec<usize>, worths: &mut Vec<Worth>, court: &Court) -> (Course, Vec<String>) {
+/// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool
+/// in their order, `gains` what held-out rows say of them.
+pub(super) fn withdraw(
+    mut now: FitState,
+    set: &mut Vec<usize>,
+    gains: &mut Vec<HoldoutGain>,
+    comparison: &ModelComparison,
+) -> (FitState, Vec<String>) {
     let mut said = Vec::new();
     if now.screening.apart.is_some() {
         return (now, said);
     }
-    while let Some((gone, sentence, course)) = empty(&now, set, court).or_else(|| harmful(&now, set, worths, court)) {
+    while let Some((gone, sentence, state)) = empty(&now, set, comparison).or_else(|| harmful(&now, set, gains, comparison)) {
         let kept = |i: &usize| !gone.contains(i);
         *set = (0..set.len()).filter(kept).map(|i| set[i]).collect();
         said.push(sentence);
-        now = course;
+        now = state;
     }
     (now, said)
 }
 
 /// The finding that was not estimated, else the weakest of those that are smaller than their own uncertainty.
-fn empty(now: &Course, set: &[usize], court: &Court) -> Option<(Vec<usize>, String, Course)> {
-    let ranges = ranges(now);
+fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<(Vec<usize>, String, FitState)> {
     let strength = |members: &[usize]| -> Option<f64> {
-        let own = members.iter().flat_map(|i| ranges[*i].clone());
+        let own = members.iter().flat_map(|i| now.ranges[*i].clone());
         let free: Vec<usize> = own.filter(|k| matches!(now.fitted.fates[*k], Fate::Free(_))).collect();
         if free.is_empty() {
             return Some(0.0);
@@ -48,7 +41,7 @@ fn empty(now: &Course, set: &[usize], court: &Court) -> Option<(Vec<usize>, Stri
         let square = now.fitted.covariance.as_ref()?.distance(&free, &values)?;
         Some(square / free.len() as f64)
     };
-    let groups = groups(now, set, court.pool, court.survey);
+    let groups = groups(now, set, comparison.pool, comparison.survey);
     let weak = groups.into_iter().filter_map(|(key, members)| Some((strength(&members)?, key, members)));
     let (size, (effect, place), members) = weak.filter(|(size, ..)| *size < 1.0).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let why = if size == 0.0 {
@@ -56,54 +49,48 @@ fn empty(now: &Course, set: &[usize], court: &Court) -> Option<(Vec<usize>, Stri
     } else {
         "in the whole model it is smaller than its own uncertainty"
     };
-    let course = without(now, &members, court);
-    Some((members, format!("{effect} at {place}: {why}"), course))
+    let state = comparison.without(now, &members);
+    Some((members, format!("{effect} at {place}: {why}"), state))
 }
 
 /// The finding without which held-out rows are better beyond their scatter, of those that do no good there or were not asked alone.
-fn harmful(now: &Course, set: &[usize], worths: &mut Vec<Worth>, court: &Court) -> Option<(Vec<usize>, String, Course)> {
-    let seen = HeldOut::of(now, court.data, court.question)?;
-    let groups: Groups = groups(now, set, court.pool, court.survey);
+fn harmful(
+    now: &FitState,
+    set: &[usize],
+    gains: &mut Vec<HoldoutGain>,
+    comparison: &ModelComparison,
+) -> Option<(Vec<usize>, String, FitState)> {
+    let seen = HeldOutErrors::of(now, comparison.fitter)?;
+    let groups: FindingGroups = groups(now, set, comparison.pool, comparison.survey);
     for ((effect, place), members) in groups {
-        let names: Vec<&'static str> = members.iter().map(|i| court.name(set[*i])).collect();
-        let alike = names.iter().all(|name| *name == names[0]);
-        let known = worths.iter_mut().find(|worth| alike && worth.effect == names[0] && worth.place == place);
-        if known.as_ref().is_some_and(|worth| worth.gain >= 0.0) {
+        let names: Vec<&'static str> = members.iter().map(|i| comparison.pool.hypotheses[set[*i]].form.name()).collect();
+        let same = names.iter().all(|name| *name == names[0]);
+        let known = gains.iter_mut().find(|known| same && known.effect == names[0] && known.place == place);
+        if known.as_ref().is_some_and(|known| known.gain >= 0.0) {
             continue;
         }
-        let course = without(now, &members, court);
-        let bare = HeldOut::of(&course, court.data, court.question)?;
+        let state = comparison.without(now, &members);
+        let bare = HeldOutErrors::of(&state, comparison.fitter)?;
         if bare.is_beyond_doubt_better_than(&seen) {
-            return Some((members, format!("{effect} at {place}: held-out points are better without it"), course));
+            return Some((members, format!("{effect} at {place}: held-out points are better without it"), state));
         }
         match known {
-            Some(worth) => worth.gain = bare.rms() - seen.rms(),
-            None if alike => worths.push(Worth { effect: names[0], place, gain: bare.rms() - seen.rms() }),
+            Some(known) => known.gain = bare.rms() - seen.rms(),
+            None if same => gains.push(HoldoutGain { effect: names[0], place, gain: bare.rms() - seen.rms() }),
             None => (),
         }
     }
     None
 }
 
-impl Court<'_, '_> {
-    fn name(&self, k: usize) -> &'static str {
-        self.pool.hypotheses[k].form.name()
-    }
-}
-
-/// The fit without some of the chosen causes.
-fn without(now: &Course, members: &[usize], court: &Court) -> Course {
-    let all = start_of(now).into_iter().enumerate();
-    let rest: Vec<Chosen> = all.filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause).collect();
-    (court.refit)(now, &rest)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::lens::Lens;
-    use super::super::{base_model, fitted, pool_of};
     use super::*;
-    use crate::effect::{EffectStack, Form, GearCyclic};
+    use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
+    use crate::diagnose::round::{EstimatedCause, Fitter};
+    use crate::diagnose::types::Question;
+    use crate::diagnose::whitened::WhitenedProblem;
+    use crate::effect::{EffectStack, Form, GearCyclic, Survey, hypotheses};
     use crate::estimate::Model;
     use crate::robot::import::{Text, read_calib};
     use crate::robot::{Measurements, RobotModel};
@@ -164,26 +151,23 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         let rows: Vec<usize> = (0..ROWS).collect();
         let (fit, validate) = rows.split_at(FITTED);
         let question = Question { robot: &robot, data: &data, fit, validate, set: &[0; ROWS], seed: 1 };
-        let base = base_model(&robot, &data, fit);
-        let rigid = base.stack.effects().count();
-        let now = fitted((&base, rigid), None, &[], &data, &question);
-        let free: Vec<usize> = (0..now.fitted.fates.len()).filter(|k| matches!(now.fitted.fates[*k], Fate::Free(_))).collect();
-        let lens = Lens::new(&now.model, &data, fit, false);
+        let (fitter, now) = Fitter::start(&question);
+        let problem = WhitenedProblem::new(&now.model, &data, fit.to_vec());
         // So that a payload is proposed at all.
-        let (torque, yielding) = (lens.torques(), vec![1e-6; 6]);
-        let survey = Survey::new(&robot, &data, fit, &torque, &yielding);
-        let pool = pool_of(&lens, &now, &free, &survey);
+        let (torque, compliance) = (problem.torques(), vec![1e-6; 6]);
+        let survey = Survey::new(&robot, &data, fit, &torque, &compliance);
+        let (jacobian, all) = (problem.jacobian(fitter.free()), hypotheses(&survey));
+        let pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &problem.residual, 1.0, all));
         let at = |key: &&str| pool.keys.iter().position(|other| other == key).unwrap_or_else(|| panic!("{key}: {:?}", pool.keys));
         let mut set: Vec<usize> = keys.iter().map(at).collect();
-        let chosen: Vec<Chosen> = (set.iter())
+        let causes: Vec<EstimatedCause> = (set.iter())
             .map(|k| {
                 let form = pool.hypotheses[*k].form.clone();
-                Chosen { coefficients: vec![0.0; form.parameters(&robot).len()], form, known: Vec::new() }
+                EstimatedCause { coefficients: vec![0.0; form.parameters(&robot).len()], form, priors: Vec::new() }
             })
             .collect();
-        let refit = |now: &Course, chosen: &[Chosen]| fitted((&now.model, rigid), Some(&free), chosen, &data, &question);
-        let court = Court { pool: &pool, survey: &survey, data: &data, question: &question, refit: &refit };
-        let (last, said) = withdraw(refit(&now, &chosen), &mut set, &mut Vec::new(), &court);
+        let comparison = ModelComparison { pool: &pool, survey: &survey, fitter: &fitter };
+        let (last, said) = withdraw(fitter.fit(&now.model, causes), &mut set, &mut Vec::new(), &comparison);
         let kept: Vec<String> = set.iter().map(|k| pool.keys[*k].clone()).collect();
         let in_model: Vec<String> = last.model.stack.effects().filter_map(|(effect, _)| effect.form()).map(Form::key).collect();
         assert_eq!(kept, in_model);

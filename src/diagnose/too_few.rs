@@ -1,11 +1,11 @@
 //! Too few rows to ask what was left out: the nominal robot in its place, and no findings.
 
-use super::verdict::{Diagnosis, Errors, Verdict};
-use super::{Located, Question, Repeatability};
+use super::misfit::Misfit;
+use super::types::{Diagnosis, ErrorLengths, Located, Question, Repeatability, Verdict};
 use crate::effect::{BasePlacement, Effect, EffectStack};
-use crate::estimate::{FitOptions, Model, Weight, align, fit_screened};
+use crate::estimate::{FitOptions, Model, align, fit_screened};
 
-/// Fewest rows to fit: geometry alone takes some thirty numbers from three of each row.
+/// Fewest rows to fit: geometry alone takes some thirty parameters from three of each row.
 pub(crate) const FEWEST: usize = 15;
 
 /// The nominal robot with its base where the rows to fit have it.
@@ -17,23 +17,14 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     let (fitted, screening) = fit_screened(&mut model, data, &FitOptions { rows: fit, candidates: &candidates }, question.set);
     let predicted = model.predict(data);
-    let aside: Vec<usize> = screening.suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
-    let judges: Vec<usize> = question.validate.iter().copied().filter(|row| !aside.contains(row)).collect();
-    let held_out = !judges.is_empty();
-    let rows = if held_out { &judges } else { &screening.kept };
-    let errors = Errors::of(data, &predicted, rows);
-    let rms = |rows: &[usize], length: &dyn Fn(usize) -> f64| {
-        (rows.iter().map(|row| length(*row).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt()
-    };
-    let kept = screening.kept.clone();
-    let whitened = |row: &usize| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared();
-    let freedom = (3 * kept.len()).saturating_sub(fitted.singular.len()).max(1) as f64;
+    let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
+    let errors = ErrorLengths::of(data, &predicted, &misfit.rows);
     Diagnosis {
         verdict: Verdict::NotAsked,
-        noise_floor: rms(rows, &|row| data.noise(row)),
+        noise_floor: misfit.noise_floor,
         before: errors,
         after: errors,
-        held_out,
+        held_out: misfit.held_out,
         findings: Vec::new(),
         withdrawn: Vec::new(),
         clock: data.has_clock(),
@@ -43,16 +34,16 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
         )],
         signature: None,
         next_measurements: Vec::new(),
-        leftover_rms: rms(&kept, &|row| (data.position[row] - predicted[row]).norm()),
-        chi_square: kept.iter().map(whitened).sum::<f64>() / freedom,
+        leftover_rms: misfit.leftover_rms,
+        chi_square: misfit.chi_square,
         gate_first: None,
         gate_last: None,
         repeatability: Repeatability { sigma: 0.0, repeats: 0 },
         located_before: Located::default(),
         located_after: Located::default(),
+        kept: screening.kept.clone(),
         screening,
         model,
         fitted,
-        kept,
     }
 }

@@ -5,13 +5,15 @@ use crate::estimate::{Model, align};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
 
+/// The error of a reduction ratio whose joint turns the other way.
+pub(crate) const REVERSED: f64 = -2.0;
 /// A nominal robot leaves less than this share of the size of the measured cloud.
 const NOMINAL: f64 = 0.02;
 /// With the right sense so many times less is left.
 const BETTER: f64 = 3.0;
 
 /// Joints whose reversal brings the nominal robot's points onto the measured ones, ascending; usually none.
-pub(crate) fn reversed(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Vec<usize> {
+pub(super) fn reversed(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Vec<usize> {
     let mut data = data.clone();
     let mut out = Vec::new();
     let mut now = left(robot, &data, rows);
@@ -37,7 +39,7 @@ pub(crate) fn reversed(robot: &RobotModel, data: &Measurements, rows: &[usize]) 
 }
 
 /// Reverses a joint in every row.
-pub(crate) fn reverse(data: &mut Measurements, joint: usize) {
+pub(super) fn reverse(data: &mut Measurements, joint: usize) {
     let joints = data.joints;
     data.q.iter_mut().skip(joint).step_by(joints).for_each(|q| *q = -*q);
 }

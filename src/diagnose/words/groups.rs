@@ -1,33 +1,24 @@
 //! Which causes make up one finding: what one part of the arm does by one law, with the rest that its true shape leaves.
 
-use super::Course;
-use super::pool::Pool;
-use super::state::solve;
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::FitState;
 use crate::effect::{
     AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, Unknown,
     Variable, cause,
 };
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// The effect that chosen causes are called, and their place.
-pub(crate) type Key = (&'static str, Place);
+pub(crate) type FindingKey = (&'static str, Place);
 /// Positions among the chosen causes.
-pub(crate) type Groups = BTreeMap<Key, Vec<usize>>;
-
-/// Where in the model's parameters those of each chosen cause are.
-pub(crate) fn ranges(last: &Course) -> Vec<Range<usize>> {
-    let rigid = last.model.stack.effects().count() - last.chosen.len();
-    last.model.stack.effects().skip(rigid).map(|(_, range)| range).collect()
-}
+pub(crate) type FindingGroups = BTreeMap<FindingKey, Vec<usize>>;
 
 /// The chosen causes, whose positions in the pool are `set`, by finding.
-pub(crate) fn groups(last: &Course, set: &[usize], pool: &Pool, survey: &Survey) -> Groups {
-    let mut groups = Groups::new();
-    let ranges = ranges(last);
+pub(crate) fn groups(last: &FitState, set: &[usize], pool: &CachedHypotheses, survey: &Survey) -> FindingGroups {
+    let mut groups = FindingGroups::new();
     for (i, k) in set.iter().enumerate() {
         let form = &pool.hypotheses[*k].form;
-        let values = &last.model.x[ranges[i].clone()];
+        let values = &last.model.x[last.ranges[i].clone()];
         groups.entry((form.called(values, survey), form.place())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
@@ -44,17 +35,17 @@ pub(crate) fn groups(last: &Course, set: &[usize], pool: &Pool, survey: &Survey)
 }
 
 /// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
-fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
+fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
     let mut sorted = set.to_vec();
     sorted.sort_unstable();
-    let whole = solve(pool, &sorted).gain;
+    let whole = pool.solve(&sorted).gain;
     let finer = |name| cause(name).map_or(&[] as &[&str], |cause| cause.finer());
     let gain = |members: &[usize]| {
         let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
         let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
-        whole - solve(pool, &rest).gain
+        whole - pool.solve(&rest).gain
     };
-    let gains: BTreeMap<Key, f64> = groups.iter().map(|(key, members)| (*key, gain(members))).collect();
+    let gains: BTreeMap<FindingKey, f64> = groups.iter().map(|(key, members)| (*key, gain(members))).collect();
     for (small, own) in &gains {
         let main = gains
             .iter()
@@ -72,7 +63,7 @@ fn refine(pool: &Pool, groups: &mut Groups, set: &[usize]) {
 }
 
 /// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
-fn both_angles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
+fn both_angles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
     let form = |i: &usize| &pool.hypotheses[set[*i]].form;
     let main = groups.iter().find_map(|(key, members)| {
         let angles = members.iter().find_map(|i| form(i).term()?.two_angles())?;
@@ -98,7 +89,7 @@ fn both_angles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
 const SLOW: u32 = 2;
 
 /// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
-fn wobbles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
+fn wobbles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
     // Of a joint that follows a sine of another joint's angle, that other joint.
     let by = |i: &usize| {
         let term = pool.hypotheses[set[*i]].form.term()?;
@@ -109,7 +100,7 @@ fn wobbles(pool: &Pool, groups: &mut Groups, set: &[usize]) {
             _ => None,
         }
     };
-    let unknown: Vec<Key> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
+    let unknown: Vec<FindingKey> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
     for key in unknown {
         let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
         if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {

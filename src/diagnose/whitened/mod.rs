@@ -1,34 +1,36 @@
 //! The recording as the present model sees it: whitened residuals, and how any form of an effect would move them.
 //!
-//! Lines are in standard deviations: three a row for the measured point, then one for each motor that can be heard.
+//! Residual rows are in standard deviations: three a row of the recording for the measured point, then one for each usable motor current.
 
-use super::currents::Currents;
+mod currents;
+
 use crate::effect::{Deflection, Effect, Form, Sight};
 use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
+use currents::Currents;
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Fitted rows through the present model.
-pub(crate) struct Lens<'a> {
+pub(crate) struct WhitenedProblem<'a> {
     pub robot: &'a RobotModel,
     pub data: &'a Measurements,
     /// Rows of the recording, ascending.
-    pub rows: &'a [usize],
+    pub rows: Vec<usize>,
     sights: Vec<Sight>,
     weights: Vec<Weight>,
     currents: Option<Currents>,
     /// What a standard deviation of a current counts: that of the points as they are left by the model.
-    loudness: f64,
+    current_weight: f64,
     model: &'a Model,
     /// Whitened measured - predicted.
     pub residual: Vec<f64>,
 }
 
-impl<'a> Lens<'a> {
-    /// Currents are heard only where `listen` says that something yields to torques.
-    pub fn new(model: &'a Model, data: &'a Measurements, rows: &'a [usize], listen: bool) -> Self {
+impl<'a> WhitenedProblem<'a> {
+    /// Of measured points alone.
+    pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
         let sights: Vec<Sight> = rows
             .par_iter()
             .map_init(
@@ -38,28 +40,38 @@ impl<'a> Lens<'a> {
             .collect();
         let weights: Vec<Weight> = rows.iter().map(|row| Weight::of(data, *row, 0.0)).collect();
         let mut residual = Vec::with_capacity(3 * rows.len());
-        for ((sight, weight), row) in sights.iter().zip(&weights).zip(rows) {
+        for ((sight, weight), row) in sights.iter().zip(&weights).zip(&rows) {
             residual.extend(weight.apply(&(data.position[*row] - sight.point)).iter());
         }
-        let loudness = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        let currents = listen.then(|| Currents::new(&model.robot, data, rows, &sights)).flatten();
-        residual.extend(currents.iter().flat_map(Currents::whitened).map(|value| value * loudness));
-        Self { robot: &model.robot, data, rows, residual, sights, weights, currents, loudness, model }
+        let current_weight = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
+        Self { robot: &model.robot, data, rows, residual, sights, weights, currents: None, current_weight, model }
+    }
+
+    /// With the motor currents, which say something where a joint yields to torques.
+    pub fn with_currents(mut self) -> Self {
+        self.currents = Currents::new(self.robot, self.data, &self.rows, &self.sights);
+        self.residual.extend(self.currents.iter().flat_map(Currents::whitened).map(|value| value * self.current_weight));
+        self
     }
 
     fn points(&self) -> usize {
         3 * self.rows.len()
     }
 
-    pub fn lines(&self) -> usize {
+    /// Residuals of the points, three a row.
+    pub fn of_points(&self) -> &[f64] {
+        &self.residual[..self.points()]
+    }
+
+    pub fn residual_rows(&self) -> usize {
         self.residual.len()
     }
 
-    /// The place in `rows` of a line.
-    pub fn row_of(&self, line: usize) -> usize {
+    /// The place in `rows` of a residual row.
+    pub fn row_of(&self, residual_row: usize) -> usize {
         match &self.currents {
-            Some(currents) if line >= self.points() => (line - self.points()) / currents.joints.len(),
-            _ => line / 3,
+            Some(currents) if residual_row >= self.points() => (residual_row - self.points()) / currents.joints.len(),
+            _ => residual_row / 3,
         }
     }
 
@@ -79,25 +91,25 @@ impl<'a> Lens<'a> {
         joints.map(|j| self.sights.iter().map(|sight| sight.by_joint[j].norm()).fold(0.0, f64::max)).collect()
     }
 
-    /// Columns of a form, `lines` each, one after another.
+    /// Columns of a form, one after another.
     pub fn columns(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];
-        let lines = self.lines();
-        let mut out = vec![0.0; count * lines];
+        let rows = self.residual_rows();
+        let mut out = vec![0.0; count * rows];
         let mut buffer = Deflection::new(self.robot.joints());
         for (i, (sight, weight)) in self.sights.iter().zip(&self.weights).enumerate() {
             sight.derivatives(self.robot, self.data, form, &zeros, &mut buffer, |parameter, derivative| {
                 let derivative = weight.apply(&derivative);
                 for axis in 0..3 {
-                    out[parameter * lines + 3 * i + axis] += derivative[axis];
+                    out[parameter * rows + 3 * i + axis] += derivative[axis];
                 }
             });
             let Some(currents) = &self.currents else { continue };
             for (parameter, joint, rate) in buffer.loads() {
-                if let Some(k) = currents.joints.iter().position(|heard| *heard == joint) {
-                    let line = i * currents.joints.len() + k;
-                    out[parameter * lines + self.points() + line] += rate * self.loudness / currents.sigma_of(line);
+                if let Some(k) = currents.joints.iter().position(|usable| *usable == joint) {
+                    let row = i * currents.joints.len() + k;
+                    out[parameter * rows + self.points() + row] += rate * self.current_weight / currents.sigma_of(row);
                 }
             }
         }
@@ -105,13 +117,14 @@ impl<'a> Lens<'a> {
     }
 
     /// Columns of some parameters of the model itself, and what each motor has of its own.
-    pub fn jacobian(&self, model: &Model, free: &[usize]) -> Mat<f64> {
+    pub fn jacobian(&self, free: &[usize]) -> Mat<f64> {
+        let model = self.model;
         let mut column = vec![None; model.stack.specs().len()];
         for (j, parameter) in free.iter().enumerate() {
             column[*parameter] = Some(j);
         }
         let nuisances = self.currents.as_ref().map_or(0, Currents::nuisances);
-        let mut out = Mat::zeros(self.lines(), free.len() + nuisances);
+        let mut out = Mat::zeros(self.residual_rows(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
         for (i, (row, weight)) in self.rows.iter().zip(&self.weights).enumerate() {
             model.stack.derivatives(&model.robot, self.data, *row, &model.x, &mut scratch, |parameter, derivative| {
@@ -124,9 +137,9 @@ impl<'a> Lens<'a> {
             });
         }
         if let Some(currents) = &self.currents {
-            for line in 0..currents.lines() {
+            for row in 0..currents.residual_rows() {
                 for k in 0..nuisances {
-                    out[(self.points() + line, free.len() + k)] = currents.nuisance(line, k) * self.loudness;
+                    out[(self.points() + row, free.len() + k)] = currents.nuisance(row, k) * self.current_weight;
                 }
             }
         }
@@ -134,7 +147,7 @@ impl<'a> Lens<'a> {
     }
 
     /// Values of some forms in the present model, zero where it has them not.
-    pub fn present(&self, forms: &[&Form]) -> Vec<f64> {
+    fn present(&self, forms: &[&Form]) -> Vec<f64> {
         let value = |name: &String| {
             let specs = self.model.stack.specs();
             specs.iter().position(|spec| spec.name == *name).map_or(0.0, |k| self.model.x[k])
@@ -143,13 +156,14 @@ impl<'a> Lens<'a> {
         names.map(|name| value(&name)).collect()
     }
 
-    /// What the currents alone say of the numbers of some forms, now at `values`; `None` where they say nothing.
-    pub fn opinion(&self, forms: &[&Form], values: &[f64]) -> Option<Vec<Prior>> {
-        let currents = self.currents.as_ref()?;
-        let lines = self.lines();
+    /// What the currents alone say of the parameters of some forms; nothing where they say nothing.
+    pub fn priors_by_currents(&self, forms: &[&Form]) -> Vec<Prior> {
+        let Some(currents) = self.currents.as_ref().filter(|_| !forms.is_empty()) else { return Vec::new() };
+        let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
         let columns: Vec<Vec<f64>> =
-            all.chunks(lines).map(|c| c[self.points()..].iter().map(|value| value / self.loudness).collect()).collect();
-        currents.opinion(&columns, values)
+            all.chunks(rows).map(|c| c[self.points()..].iter().map(|value| value / self.current_weight).collect()).collect();
+        // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
+        currents.priors(&columns, &self.present(forms)).unwrap_or_default()
     }
 }

@@ -1,9 +1,10 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
+use crate::diagnose::types::Finding;
 use crate::effect::{Clock, Survey, Told, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
-pub(crate) fn sentence(effect: &str, told: &Told, rms: f64) -> String {
+pub(super) fn sentence(effect: &str, told: &Told, rms: f64) -> String {
     let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(told));
     format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
 }
@@ -12,7 +13,7 @@ pub(crate) fn sentence(effect: &str, told: &Told, rms: f64) -> String {
 const STILL: f64 = 1e-3;
 
 /// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
-pub(crate) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
+pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     let mut out = Vec::new();
     for (joint, reach) in reach.iter().enumerate() {
         let name = joint + 1;
@@ -72,7 +73,7 @@ fn masses(survey: &Survey) -> Option<String> {
 const POSES: &str = "more poses, chosen to tell them apart (`calib poses --run`)";
 
 /// What would tell findings from their rivals, a sentence each.
-pub(crate) fn next(findings: &[super::Finding]) -> Vec<String> {
+pub(super) fn next(findings: &[Finding]) -> Vec<String> {
     let mut out = Vec::new();
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
@@ -83,8 +84,8 @@ pub(crate) fn next(findings: &[super::Finding]) -> Vec<String> {
     out
 }
 
-/// What is not a pose and may separate two effects.
-pub(crate) fn other_means(a: &str, b: &str) -> Option<&'static str> {
+/// What is not a pose and may tell two effects apart, where there is such a thing.
+pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
     let measures = [a, b].into_iter().filter_map(|name| cause(name)?.measure());
     measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
 }
