@@ -2,7 +2,7 @@
 //! quantity that reveals it. A joint's effect is shown as an angle about the joint (residual along its motion over its lever), all
 //! others as millimetres along their own displacement.
 
-use crate::effect::{Effect, Form, Variable};
+use crate::effect::{Effect, Form, Place, Variable};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::robot::Measurements;
@@ -52,7 +52,11 @@ pub(super) fn curves(
         own.iter().for_each(|k| without.x[*k] = 0.0);
         let bare = without.predict(data);
         let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
-        let joint = joint_of(finding).filter(|joint| *joint < data.joints);
+        let place = forms.first().map_or(specs[own[0]].place, |form| form.place());
+        let joint = match place {
+            Place::Joint(joint) if joint < data.joints => Some(joint),
+            _ => None,
+        };
         let principal = principal(&shift);
         let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
         let mut scratch = model.stack.scratch(&model.robot);
@@ -105,12 +109,6 @@ const ROW: &str = "row";
 fn forms(finding: &FindingRow) -> Result<Vec<Form>> {
     serde_json::from_str(&finding.forms)
         .map_err(|error| Error::data("table findings", format!("`{}` are no forms of effects: {error}", finding.forms)))
-}
-
-/// The joint (from 0) at which a finding sits.
-fn joint_of(finding: &FindingRow) -> Option<usize> {
-    let number = finding.place.strip_prefix("joint ")?;
-    number.parse::<usize>().ok()?.checked_sub(1)
 }
 
 /// What reveals the effect of these forms at this joint, its stored unit (none: a row's number, from 1), and its value in SI.

@@ -6,7 +6,7 @@ use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
-    FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict,
+    Corrected, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,9 @@ impl Stage for Diagnose {
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
         let mut data = reads.recording.measurements(&self.tracker);
         let asked = reads.split.rows(&reads.recording, &self.on)?;
+        let mut corrected = Corrected::RobotFile;
         if let Some(simulated) = &reads.recording.simulated {
+            corrected = Corrected::OutsideSimulation;
             let robot = RobotModel::new(reads.robot.to_description()?);
             let message = "three rows to fit with sim_x, sim_y, sim_z and a measured point are needed to lay one over the other";
             data = against_simulation(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
@@ -111,7 +113,7 @@ impl Stage for Diagnose {
             rivals: Rivals::of(&diagnosis),
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
-            parameters: if reads.recording.simulated.is_some() { parameters.beside() } else { parameters },
+            parameters: parameters.correcting(corrected),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside),
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),

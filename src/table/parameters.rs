@@ -40,8 +40,25 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
 
-/// The remark of parameters that correct what stood in `sim_x`, `sim_y`, `sim_z`.
-const BESIDE: &str = "corrects the outside simulation, not the robot file's model";
+/// What parameters correct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Corrected {
+    RobotFile,
+    /// What stood in `sim_x`, `sim_y`, `sim_z`.
+    OutsideSimulation,
+}
+
+impl Corrected {
+    /// The first sentence of the remarks that say so.
+    const OUTSIDE: &str = "corrects the outside simulation, not the robot file's model";
+
+    fn of(row: &ParameterRow) -> Self {
+        match row.remark.as_deref().and_then(|remark| remark.split("; ").next()) {
+            Some(Self::OUTSIDE) => Self::OutsideSimulation,
+            _ => Self::RobotFile,
+        }
+    }
+}
 
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
 const SILENT: f64 = 10.0;
@@ -133,17 +150,21 @@ impl Parameters {
         self
     }
 
-    /// The same, marked as a correction of an outside simulation.
-    pub fn beside(mut self) -> Self {
-        for row in &mut self.0 {
-            row.remark = Some(row.remark.take().map_or_else(|| BESIDE.into(), |remark| format!("{BESIDE}; {remark}")));
+    /// The same, with what they correct in their remarks.
+    pub fn correcting(mut self, corrected: Corrected) -> Self {
+        if corrected == Corrected::OutsideSimulation {
+            let outside = Corrected::OUTSIDE;
+            for row in &mut self.0 {
+                row.remark = Some(row.remark.take().map_or_else(|| outside.into(), |remark| format!("{outside}; {remark}")));
+            }
         }
         self
     }
 
-    /// Whether these correct an outside simulation, and say nothing of the robot file's model.
-    pub fn is_beside(&self) -> bool {
-        self.0.iter().any(|row| row.remark.as_ref().is_some_and(|remark| remark.starts_with(BESIDE)))
+    /// What these correct: of an outside simulation they say nothing of the robot file's model.
+    pub fn corrected(&self) -> Corrected {
+        let outside = self.0.iter().map(Corrected::of).find(|corrected| *corrected == Corrected::OutsideSimulation);
+        outside.unwrap_or(Corrected::RobotFile)
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
