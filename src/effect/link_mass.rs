@@ -34,7 +34,7 @@ impl Cause for LinkMass {
 
     /// Every link carried by a joint that yields in the present model.
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let carried = |link: &usize| (0..=*link).any(|joint| survey.yielding[joint] > 0.0);
+        let carried = |link: &usize| (0..=*link).any(|joint| survey.compliance[joint] > 0.0);
         let body = |link: &usize| &survey.robot.description().joints[*link];
         let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);

@@ -32,7 +32,7 @@ impl Cause for PayloadError {
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let yields = survey.yielding.iter().any(|compliance| *compliance > 0.0);
+        let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
         forms.map(|centre| Hypothesis::new(WrongPayload { centre }, 2)).collect()
     }

@@ -48,7 +48,7 @@ impl PartialEq for Spring {
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
     pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
-        let joints = survey.revolute().filter(|joint| here(*joint) && survey.yielding[*joint] > 0.0);
+        let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs = joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: Shape { joint, orders } }));
         springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).charged(2.0)).collect()
     }

@@ -186,7 +186,7 @@ impl EffectStack {
         self.velocities(robot, point, scratch);
         let Scratch { deflection, by_station, by_joint, .. } = scratch;
         for (parameter, direction) in &deflection.partials {
-            emit(*parameter, along(direction, by_joint, by_station, &deflection.yielding));
+            emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
         }
     }
 
@@ -215,7 +215,7 @@ impl EffectStack {
             let turn = match direction {
                 Direction::Joint(k, rate) => joint(*k) * *rate,
                 Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
-                Direction::Torque(k, rate) => joint(*k) * (deflection.yielding[*k] * *rate),
+                Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
                 Direction::Anchor(_) => continue,
             };
             emit(*parameter, turn);
@@ -248,7 +248,7 @@ impl EffectStack {
         for (parameter, direction) in &deflection.partials {
             let velocity = match direction {
                 Direction::Anchor(rate) => -rate,
-                other => along(other, by_joint, by_station, &deflection.yielding),
+                other => along(other, by_joint, by_station, &deflection.compliance),
             };
             emit(*parameter, velocity);
         }
@@ -282,7 +282,7 @@ impl EffectStack {
             row,
             point,
             posture: scratch.posture.clone(),
-            yielding: scratch.deflection.yielding.clone(),
+            compliance: scratch.deflection.compliance.clone(),
             by_station: scratch.by_station.clone(),
             by_joint: scratch.by_joint.clone(),
         }
@@ -327,7 +327,7 @@ pub struct Sight {
     pub point: Vector3<f64>,
     pub posture: Posture,
     /// rad/Nm.
-    yielding: Vec<f64>,
+    compliance: Vec<f64>,
     by_station: Vec<Matrix3x6<f64>>,
     /// m/rad (m/m).
     pub by_joint: Vec<Vector3<f64>>,
@@ -349,16 +349,16 @@ impl Sight {
         buffer.start(0);
         effect.deflect(robot, &ArmState::new(data, self.row, &self.posture), zeros, buffer);
         for (parameter, direction) in &buffer.partials {
-            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.yielding));
+            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.compliance));
         }
     }
 }
 
-fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], yielding: &[f64]) -> Vector3<f64> {
+fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], compliance: &[f64]) -> Vector3<f64> {
     match direction {
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
-        Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
+        Direction::Torque(joint, rate) => by_joint[*joint] * (compliance[*joint] * *rate),
         Direction::Anchor(_) => Vector3::zeros(),
     }
 }

@@ -12,7 +12,7 @@ pub struct Survey<'a> {
     /// Load torque (Nm) of every fitted row and joint, row-major.
     pub torque: &'a [f64],
     /// How far each joint yields under load in the present model, rad/Nm.
-    pub yielding: &'a [f64],
+    pub compliance: &'a [f64],
     /// Lowest and highest position of each joint, rad or m.
     pub range: Vec<[f64; 2]>,
     /// Times (s) between neighbouring fitted rows, ascending, ends left out.
@@ -27,7 +27,13 @@ pub struct Survey<'a> {
 const EDGE: usize = 5;
 
 impl<'a> Survey<'a> {
-    pub fn new(robot: &'a RobotModel, data: &'a Measurements, rows: &'a [usize], torque: &'a [f64], yielding: &'a [f64]) -> Self {
+    pub fn new(
+        robot: &'a RobotModel,
+        data: &'a Measurements,
+        rows: &'a [usize],
+        torque: &'a [f64],
+        compliance: &'a [f64],
+    ) -> Self {
         let range = (0..robot.joints())
             .map(|joint| {
                 let values = rows.iter().map(|row| data.q(*row)[joint]);
@@ -41,7 +47,7 @@ impl<'a> Survey<'a> {
         let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
         let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
         let reference_c = rows.first().and_then(|row| data.temperature(*row));
-        Self { robot, data, rows, torque, yielding, range, boundaries, time, reference_c }
+        Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c }
     }
 
     pub fn joints(&self) -> usize {

@@ -6,7 +6,8 @@ use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
-    Corrected, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects, Verdict,
+    Corrected, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split, Suspects,
+    Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
