@@ -36,7 +36,7 @@ impl Cause for AxisWobble {
                 [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
             })
         });
-        forms.map(|form| Hypothesis::new(form, 12).charged(4.0).within(LARGEST)).collect()
+        forms.map(|form| Hypothesis::new(form, 12).penalised(4.0).within(LARGEST)).collect()
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {

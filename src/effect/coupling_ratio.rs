@@ -37,9 +37,9 @@ impl Cause for CouplingRatio {
         let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
         let pairs = pairs.filter(|(by, moved)| by != moved && !declared(*by, *moved));
         let pair = |(by, moved): (usize, usize)| {
-            let charge = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
+            let penalty = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
             let term = Term::new(&Self, Motion::Coupled { by, moved }, Law::of(Variable::Angle { joint: by }));
-            Hypothesis::new(term, 1).charged(charge)
+            Hypothesis::new(term, 1).penalised(penalty)
         };
         pairs.map(pair).collect()
     }

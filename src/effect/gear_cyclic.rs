@@ -44,7 +44,7 @@ impl Cause for GearCyclic {
             let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
             orders.flat_map(move |order| {
                 let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
-                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).charged(OVERTONE));
+                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).penalised(OVERTONE));
                 [Some(pure), wheel].into_iter().flatten()
             })
         });

@@ -70,9 +70,9 @@ impl Cause for JointHardening {
             let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
             let laws = laws.chain([0.1, 0.3, 0.6].map(|share| Law::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).charged(4.0)));
+            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).penalised(4.0)));
             let curve = BentWindup { joint, law: Law::Curve { low_nm: low, high_nm: high } };
-            out.push(Hypothesis::new(curve, 1).charged(4.0));
+            out.push(Hypothesis::new(curve, 1).penalised(4.0));
         }
         out
     }

@@ -43,7 +43,7 @@ impl Cause for JointTable {
                 if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
                     let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize });
                     let term = Term::new(&Self, Motion::Joint { joint }, law);
-                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).charged(4.0));
+                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).penalised(4.0));
                 }
             }
         }

@@ -62,7 +62,7 @@ impl Cause for LinkCompliance {
         let odds = |form: &BentLink| if form.link + WRIST >= n { UNLIKELY } else { RARER };
         forms
             .map(|form| (odds(&form), form))
-            .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().charged(odds))
+            .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
             .collect()
     }
 

@@ -39,7 +39,7 @@ impl Cause for LinkMass {
         let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
         let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-        forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()
+        forms.map(|form| Hypothesis::new(form, 2).penalised(4.0)).collect()
     }
 
     fn sentence(&self, told: &Told) -> String {

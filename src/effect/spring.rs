@@ -50,7 +50,7 @@ impl Spring {
     pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs = joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: Shape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).charged(2.0)).collect()
+        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(2.0)).collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.

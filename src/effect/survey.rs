@@ -120,10 +120,10 @@ impl<'a> Survey<'a> {
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
     pub form: Form,
-    /// How many forms of the kind are tried; twice its logarithm is charged.
+    /// How many forms of the kind are tried; twice its logarithm is the penalty.
     pub tried: f64,
     /// -2 ln of the prior odds beyond those of effects, places and forms being alike.
-    pub charge: f64,
+    pub prior_penalty: f64,
     /// True where only positive coefficients make sense.
     pub positive: bool,
     /// The largest coefficient that makes sense, SI.
@@ -132,7 +132,7 @@ pub struct Hypothesis {
 
 impl Hypothesis {
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self { form: form.into(), tried: tried.max(1) as f64, charge: 0.0, positive: false, largest: f64::INFINITY }
+        Self { form: form.into(), tried: tried.max(1) as f64, prior_penalty: 0.0, positive: false, largest: f64::INFINITY }
     }
 
     pub fn positive(self) -> Self {
@@ -143,7 +143,7 @@ impl Hypothesis {
         Self { largest, ..self }
     }
 
-    pub fn charged(self, charge: f64) -> Self {
-        Self { charge: self.charge + charge, ..self }
+    pub fn penalised(self, prior_penalty: f64) -> Self {
+        Self { prior_penalty: self.prior_penalty + prior_penalty, ..self }
     }
 }

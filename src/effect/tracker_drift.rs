@@ -36,11 +36,11 @@ impl Cause for TrackerDrift {
             let steady = Law::new(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
             out.push(Hypothesis::new(form(axes, steady), 3));
             for (law, tried) in warmth::all(survey) {
-                out.push(Hypothesis::new(form(axes, law), 3 * tried).charged(4.0));
+                out.push(Hypothesis::new(form(axes, law), 3 * tried).penalised(4.0));
             }
         }
         let slow = Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: SLOW });
-        out.push(Hypothesis::new(form(Axes::Place, slow), 1).charged(4.0));
+        out.push(Hypothesis::new(form(Axes::Place, slow), 1).penalised(4.0));
         out
     }
 

@@ -113,7 +113,7 @@ impl<'a> HypothesisSet<'a> {
             self.gradient.extend(own.iter().map(|column| dot(column, &self.residual)));
             self.gram.push(gram(&own));
             let places = hypothesis.form.place().count(joints) as f64;
-            self.prior_penalty.push(2.0 * hypothesis.tried.ln() + hypothesis.charge + 2.0 * places.ln());
+            self.prior_penalty.push(2.0 * hypothesis.tried.ln() + hypothesis.prior_penalty + 2.0 * places.ln());
             self.of_torque_model.push(hypothesis.form.is_of_torque_model());
             self.keys.push(hypothesis.form.key());
             self.hypotheses.push(hypothesis);
