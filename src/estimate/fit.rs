@@ -1,6 +1,6 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
-use super::alike::rows_alike;
+use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::Factor;
@@ -256,7 +256,7 @@ fn lasting(problem: &Problem, residuals: &[Vector3<f64>]) -> f64 {
             (error * (bound(3) / error.norm().max(bound(3)))).data.0[0]
         })
         .collect();
-    rows_alike(&whitened, 3)
+    autocorrelation_time(&whitened, 3)
 }
 
 /// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.

@@ -1,7 +1,7 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
 mod align;
-mod alike;
+mod autocorrelation;
 mod change;
 pub mod choose;
 mod cluster;
@@ -30,7 +30,7 @@ mod triangle;
 
 pub use align::align;
 pub(crate) use align::align_points;
-pub(crate) use alike::rows_alike;
+pub(crate) use autocorrelation::autocorrelation_time;
 pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;

@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
-use crate::estimate::rows_alike;
+use crate::estimate::autocorrelation_time;
 use std::collections::BTreeMap;
 
 /// Causes of one effect and place, and what the held-out rms (m) falls by with them.
@@ -66,7 +66,7 @@ impl HeldOutErrors {
         let variance = falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count - 1.0);
         // Rows along a path are not as many opinions as there are rows.
         let off: Vec<f64> = falls.iter().map(|fall| fall - mean).collect();
-        let count = if self.moving { count / rows_alike(&off, 1) } else { count };
+        let count = if self.moving { count / autocorrelation_time(&off, 1) } else { count };
         let error = (variance / count).sqrt();
         if error.is_nan() { 0.0 } else { mean / error.max(f64::MIN_POSITIVE) }
     }

@@ -1,7 +1,7 @@
 //! Rows that say something of their own: which of them a search looks at, how many count as one, and where one pose ends.
 
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::estimate::rows_alike;
+use crate::estimate::autocorrelation_time;
 use crate::robot::Measurements;
 
 /// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
@@ -24,9 +24,9 @@ pub(super) fn thinned(rows: &[usize]) -> Vec<usize> {
 }
 
 /// How many rows of a moving arm count as one, by what is left; of standing points each is one.
-pub(super) fn autocorrelation_time(problem: &WhitenedProblem) -> f64 {
+pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let rows = &problem.rows;
-    let time = if problem.data.in_motion(rows) { rows_alike(problem.of_points(), 3) } else { 1.0 };
+    let time = if problem.data.in_motion(rows) { autocorrelation_time(problem.of_points(), 3) } else { 1.0 };
     if time < ALONE { 1.0 } else { time.min(rows.len() as f64 / STRETCHES as f64).max(1.0) }
 }
 

@@ -1,7 +1,7 @@
 //! The recording around the present model, as a round looks at it.
 
 use super::fit_state::{EstimatedCause, FitState, Fitter};
-use super::stretches::{autocorrelation_time, poses, thinned};
+use super::stretches::{bounded_autocorrelation_time, poses, thinned};
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{Survey, hypotheses};
@@ -24,7 +24,7 @@ impl<'a> View<'a> {
         if compliance.iter().any(|compliance| *compliance > 0.0) {
             problem = problem.with_currents();
         }
-        let autocorrelation_time = autocorrelation_time(&problem);
+        let autocorrelation_time = bounded_autocorrelation_time(&problem);
         let pose = poses(&fitter.data, &problem.rows, autocorrelation_time);
         Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }
     }

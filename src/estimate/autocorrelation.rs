@@ -11,7 +11,7 @@ const FARTHEST: usize = 20;
 const CHANCE: f64 = 3.0;
 
 /// How many rows in a row count as one, from `each` numbers a row in the order of recording; at least 1.
-pub(crate) fn rows_alike(residual: &[f64], each: usize) -> f64 {
+pub(crate) fn autocorrelation_time(residual: &[f64], each: usize) -> f64 {
     let rows = residual.len() / each.max(1);
     let square: f64 = residual.iter().map(|value| value * value).sum();
     if rows < FARTHEST || square == 0.0 {
@@ -52,7 +52,7 @@ mod tests {
     fn lasting_noise_counts_for_as_many_rows_as_theory_says() {
         // 1 + 2 sum share^k = (1 + share) / (1 - share).
         for (share, expected) in [(0.0, 1.0), (0.5, 3.0), (0.9, 19.0)] {
-            let found = rows_alike(&lasting(share), 3);
+            let found = autocorrelation_time(&lasting(share), 3);
             assert!((found / expected - 1.0).abs() < 0.25, "{share}: {found}");
         }
     }
