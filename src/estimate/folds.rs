@@ -6,7 +6,7 @@
 
 use super::cluster::pieces;
 use super::factor::Factor;
-use super::fit::{Fate, FitOptions, Fitted, fit};
+use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
@@ -45,8 +45,9 @@ pub fn cross_validate(
     count: usize,
     seed: u64,
 ) -> Option<Folds> {
-    let candidates: Vec<usize> =
-        (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_))).collect();
+    let candidates: Vec<usize> = (0..fitted.statuses.len())
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
+        .collect();
     let poses = Poses::of(data, rows);
     let mut order: Vec<&Vec<usize>> = poses.all().iter().collect();
     let left = (rows.len() * (count.max(1) - 1)) / count.max(1);
@@ -98,7 +99,8 @@ impl Near {
         if model.known.values().any(|known| known.bounds.is_some()) {
             return None;
         }
-        let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+        let free: Vec<usize> =
+            (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
         let factor = problem.evaluate(model, &free).factor;
         let inverse = factor.inverse()?;
         let inverse = Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j));

@@ -34,7 +34,7 @@ pub(crate) use autocorrelation::autocorrelation_time;
 pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
-pub use fit::{Fate, FitOptions, Fitted, fit};
+pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub use folds::{Folds, cross_validate};
 pub use gauge::gauge;
 pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};

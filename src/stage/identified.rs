@@ -1,7 +1,7 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
@@ -237,8 +237,8 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             ));
         }
     }
-    let stopped: Vec<&str> = (0..fitted.fates.len())
-        .filter(|k| matches!(fitted.fates[*k], Fate::Bound(_)))
+    let stopped: Vec<&str> = (0..fitted.statuses.len())
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_)))
         .map(|k| model.stack.specs()[k].name.as_str())
         .collect();
     if !stopped.is_empty() {

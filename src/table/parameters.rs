@@ -30,7 +30,7 @@ crate::table::rows! { "parameters",
 
 use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
-use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
+use crate::estimate::{CONFLICT, Fitted, Model, Opinion, ParameterStatus};
 use crate::robot::{self, Gauging, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -82,7 +82,7 @@ impl Parameters {
             for k in range.clone() {
                 let spec = &specs[k];
                 let before = earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
-                if let (Fate::Kept, Some(before)) = (&fitted.fates[k], before) {
+                if let (ParameterStatus::Kept, Some(before)) = (&fitted.statuses[k], before) {
                     let status = if before.status == "free" { "earlier".to_string() } else { before.status.clone() };
                     rows.push(ParameterRow { status, ..before.clone() });
                     continue;
@@ -92,8 +92,8 @@ impl Parameters {
                     let list: Vec<&str> = with.iter().take(4).map(|(j, _)| specs[*j].name.as_str()).collect();
                     if list.is_empty() { "several others".to_string() } else { list.join(", ") }
                 };
-                let (status, sigma, remark) = match &fitted.fates[k] {
-                    Fate::Free(sigma) => {
+                let (status, sigma, remark) = match &fitted.statuses[k] {
+                    ParameterStatus::Free(sigma) => {
                         let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
                         let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
                         let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
@@ -101,19 +101,21 @@ impl Parameters {
                         let remarks: Vec<String> = opinion.into_iter().chain(pair).collect();
                         ("free", Some(spec.unit.from_si(*sigma)), (!remarks.is_empty()).then(|| remarks.join("; ")))
                     }
-                    Fate::Bound(wanted) => {
+                    ParameterStatus::Bound(wanted) => {
                         let end = if *wanted > model.x[k] { "upper" } else { "lower" };
                         let wanted = spec.unit.from_si(*wanted);
                         ("bound", None, Some(format!("stopped by its {end} bound; the data would have it at {wanted:.4e}")))
                     }
-                    Fate::Kept if held.contains(&k) => ("held", None, Some("held at nominal by the pipeline".to_string())),
-                    Fate::Kept => ("held", None, None),
-                    Fate::Redundant(with) => (
+                    ParameterStatus::Kept if held.contains(&k) => {
+                        ("held", None, Some("held at nominal by the pipeline".to_string()))
+                    }
+                    ParameterStatus::Kept => ("held", None, None),
+                    ParameterStatus::Redundant(with) => (
                         "redundant",
                         None,
                         Some(format!("the measured points cannot tell it from {}; kept at nominal", names(with))),
                     ),
-                    Fate::Unseen => (
+                    ParameterStatus::Unseen => (
                         "unseen",
                         None,
                         Some("no plausible value of it would move the measured points beyond their noise".to_string()),

@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::effect::{EffectStack, Load, Setting, identified, whole};
 use calib::estimate::choose::{Aim, Proposal, Score, Site, Wish, median, propose};
-use calib::estimate::{Fate, FitOptions, Model, fit};
+use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
@@ -98,7 +98,11 @@ fn scatter(robot: &RobotDescription, poses: &Measurements, free: &[usize], scale
         let mut fitted = model(robot, &effects);
         let outcome = fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
         for (k, parameter) in free.iter().enumerate() {
-            assert!(matches!(outcome.fates[*parameter], Fate::Free(_)), "{}", fitted.stack.specs()[*parameter].name);
+            assert!(
+                matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),
+                "{}",
+                fitted.stack.specs()[*parameter].name
+            );
             squares[k] += ((fitted.x[*parameter] - truth.x[*parameter]) / scale[k]).powi(2);
         }
     }

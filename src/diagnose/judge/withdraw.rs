@@ -6,7 +6,7 @@ use super::held_out::{HeldOutErrors, HoldoutGain};
 use crate::diagnose::round::FitState;
 use crate::diagnose::words::{FindingGroups, groups};
 use crate::effect::Effect;
-use crate::estimate::Fate;
+use crate::estimate::ParameterStatus;
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool
 /// in their order, `gains` what held-out rows say of them.
@@ -33,7 +33,7 @@ pub(super) fn withdraw(
 fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<(Vec<usize>, String, FitState)> {
     let strength = |members: &[usize]| -> Option<f64> {
         let own = members.iter().flat_map(|i| now.ranges[*i].clone());
-        let free: Vec<usize> = own.filter(|k| matches!(now.fitted.fates[*k], Fate::Free(_))).collect();
+        let free: Vec<usize> = own.filter(|k| matches!(now.fitted.statuses[*k], ParameterStatus::Free(_))).collect();
         if free.is_empty() {
             return Some(0.0);
         }

@@ -5,7 +5,7 @@ use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
 use crate::diagnose::types::{Question, Repeatability};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{BaseFrame, Effect, EffectStack, Form, Load, ParameterSpec, Setting, Term, whole};
-use crate::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, Screening, fit_screened};
+use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
 use std::ops::Range;
@@ -98,8 +98,8 @@ impl<'a> Fitter<'a> {
         };
         let base = base_model(question.robot, &fitter.data, question.fit);
         let mut now = fitter.fit(&base, Vec::new());
-        let fates = &now.fitted.fates;
-        fitter.free = Some((0..fates.len()).filter(|k| matches!(fates[*k], Fate::Free(_))).collect());
+        let statuses = &now.fitted.statuses;
+        fitter.free = Some((0..statuses.len()).filter(|k| matches!(statuses[*k], ParameterStatus::Free(_))).collect());
         fitter.spread = spreads(&now.model, &fitter.data);
         fitter.repeatability = from_repeats(&fitter.data, &now.screening.kept, &fitter.spread);
         if fitter.repeatability.sigma > 0.0 {

@@ -4,7 +4,7 @@ use crate::diagnose::round::{FitState, REVERSED};
 use crate::diagnose::types::Finding;
 use crate::effect::{JointLogLag, Number, ParameterSpec, Place, ReductionRatio};
 use crate::error::counted;
-use crate::estimate::{Fate, Kind, Screening, Suspect};
+use crate::estimate::{Kind, ParameterStatus, Screening, Suspect};
 
 /// Joints and points of all rows that are so many rows apart.
 pub(super) fn rows_apart(offset: i64) -> Finding {
@@ -17,11 +17,11 @@ pub(super) fn rows_apart(offset: i64) -> Finding {
 
 /// Joints that turn the other way than the robot file says.
 pub(super) fn reversals(last: &FitState) -> Vec<Finding> {
-    let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.fates);
+    let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.statuses);
     let reversed =
         specs.filter(|((spec, x), _)| spec.name.starts_with(ReductionRatio::NAME) && (*x - REVERSED).abs() < REVERSED_WITHIN);
-    let one = |((spec, x), fate): ((&ParameterSpec, &f64), &Fate)| {
-        let sigma = if let Fate::Free(sigma) = fate { Some(*sigma) } else { None };
+    let one = |((spec, x), status): ((&ParameterSpec, &f64), &ParameterStatus)| {
+        let sigma = if let ParameterStatus::Free(sigma) = status { Some(*sigma) } else { None };
         let place = spec.place;
         let statement =
             format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");

@@ -10,7 +10,7 @@ use crate::diagnose::pool::{HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding};
 use crate::effect::{Basis, Clock, Effect, Form, Number, Place, Told, Variable, people};
-use crate::estimate::{Fate, tail};
+use crate::estimate::{ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first.
 pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
@@ -83,8 +83,8 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
 fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Number> {
     let one = |k: usize| {
         let spec = &state.model.stack.specs()[k];
-        let sigma = match state.fitted.fates[k] {
-            Fate::Free(sigma) => Some(sigma),
+        let sigma = match state.fitted.statuses[k] {
+            ParameterStatus::Free(sigma) => Some(sigma),
             _ => None,
         };
         let (unit, symbol) = people(spec.unit);
