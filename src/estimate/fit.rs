@@ -4,7 +4,7 @@ use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::Factor;
-use super::known::Opinion;
+use super::known::PriorCheck;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
@@ -54,7 +54,7 @@ pub struct Fitted {
     /// Measured points, orientations and distances with Huber weight below one.
     pub downweighted: usize,
     /// Parameters with a prior: what it says against what the data say.
-    pub opinions: BTreeMap<usize, Opinion>,
+    pub prior_checks: BTreeMap<usize, PriorCheck>,
     /// Singular values of the free parameters (priors included) scaled by prior sigma, largest first.
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
@@ -134,13 +134,13 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
             .map(|inverse| Covariance::of_root(clustered(&problem, model, &free, &inverse, poses), &free)),
         None => Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free),
     };
-    let mut opinions = BTreeMap::new();
+    let mut prior_checks = BTreeMap::new();
     if let Some(covariance) = &covariance {
         for (row, k) in free.iter().enumerate() {
             let sigma = covariance.sigma(row);
             statuses[*k] = ParameterStatus::Free(sigma);
             if let Some(prior) = model.known(*k).prior {
-                opinions.insert(*k, Opinion::of(prior, model.x[*k], sigma * sigma));
+                prior_checks.insert(*k, PriorCheck::of(prior, model.x[*k], sigma * sigma));
             }
         }
     }
@@ -156,7 +156,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         unmodelled_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
-        opinions,
+        prior_checks,
         repeated: poses.against(problem.data, options.rows, &all.residuals, free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),

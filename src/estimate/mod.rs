@@ -37,7 +37,7 @@ pub(crate) use fisher::tail;
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub use folds::{Folds, cross_validate};
 pub use gauge::gauge;
-pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};
+pub use known::{Bounds, CONFLICT, Known, Prior, PriorCheck};
 pub use levenberg::{Iteration, Stop};
 pub use miss::Miss;
 pub use model::Model;

@@ -221,18 +221,18 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             turn.to_degrees()
         ));
     }
-    for (k, opinion) in &fitted.opinions {
+    for (k, prior_check) in &fitted.prior_checks {
         let spec = &model.stack.specs()[*k];
-        if let (Some((alone, sigma)), true) = (opinion.without, opinion.conflict > CONFLICT) {
+        if let (Some((alone, sigma)), true) = (prior_check.without, prior_check.conflict > CONFLICT) {
             let show = |value: f64| format!("{:.4}", spec.unit.from_si(value));
             services.warn(format!(
                 "{}: the prior says {} +- {} {unit}, the data say {} +- {} {unit}, {:.1} sigma apart: one of them is wrong",
                 spec.name,
-                show(opinion.prior.mean),
-                show(opinion.prior.sigma),
+                show(prior_check.prior.mean),
+                show(prior_check.prior.sigma),
                 show(alone),
                 show(sigma),
-                opinion.conflict,
+                prior_check.conflict,
                 unit = spec.unit.symbol()
             ));
         }

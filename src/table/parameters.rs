@@ -30,7 +30,7 @@ crate::table::rows! { "parameters",
 
 use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
-use crate::estimate::{CONFLICT, Fitted, Model, Opinion, ParameterStatus};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{self, Gauging, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -97,8 +97,8 @@ impl Parameters {
                         let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
                         let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
                         let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
-                        let opinion = fitted.opinions.get(&k).and_then(|opinion| told(opinion, spec.unit));
-                        let remarks: Vec<String> = opinion.into_iter().chain(pair).collect();
+                        let of_prior = fitted.prior_checks.get(&k).and_then(|check| against_prior(check, spec.unit));
+                        let remarks: Vec<String> = of_prior.into_iter().chain(pair).collect();
                         ("free", Some(spec.unit.from_si(*sigma)), (!remarks.is_empty()).then(|| remarks.join("; ")))
                     }
                     ParameterStatus::Bound(wanted) => {
@@ -284,17 +284,17 @@ impl Parameters {
 }
 
 /// What a prior did to a parameter, where that is worth a word.
-fn told(opinion: &Opinion, unit: Unit) -> Option<String> {
-    match opinion.without {
-        Some((without, sigma)) if opinion.conflict > CONFLICT => {
+fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
+    match check.without {
+        Some((without, sigma)) if check.conflict > CONFLICT => {
             let [mean, own, without, sigma] =
-                [opinion.prior.mean, opinion.prior.sigma, without, sigma].map(|value| unit.from_si(value));
-            let apart = opinion.conflict;
+                [check.prior.mean, check.prior.sigma, without, sigma].map(|value| unit.from_si(value));
+            let apart = check.conflict;
             Some(format!(
                 "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
             ))
         }
-        Some((_, sigma)) if sigma < SILENT * opinion.prior.sigma => None,
+        Some((_, sigma)) if sigma < SILENT * check.prior.sigma => None,
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
 }

@@ -121,10 +121,10 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     assert!((both[k] - expected).abs() < 0.02 * sigma, "{:e} for {expected:e}", both[k]);
     let ParameterStatus::Free(narrow) = fitted.statuses[k] else { panic!("not free") };
     assert!((narrow / (weight(sigma) + weight(own)).powf(-0.5) - 1.0).abs() < 0.02);
-    let opinion = fitted.opinions[&k];
-    let (without, spread) = opinion.without.expect("the data see it");
+    let prior_check = fitted.prior_checks[&k];
+    let (without, spread) = prior_check.without.expect("the data see it");
     assert!((without - free[k]).abs() < 0.05 * sigma && (spread / sigma - 1.0).abs() < 0.03);
-    assert!((opinion.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05, "{}", opinion.conflict);
+    assert!((prior_check.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05, "{}", prior_check.conflict);
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn a_prior_against_the_data_is_called_a_conflict_and_one_that_agrees_is_not() {
     let k = case.position("reduction_ratio.j5");
     let right = case.truth.x[k];
     let (_, agrees) = case.fit(&[(k, about(right, 2e-5))], &[]);
-    assert!(agrees.opinions[&k].conflict < CONFLICT);
+    assert!(agrees.prior_checks[&k].conflict < CONFLICT);
     let (_, contradicts) = case.fit(&[(k, about(right + 5e-4, 5e-5))], &[]);
-    assert!(contradicts.opinions[&k].conflict > CONFLICT);
+    assert!(contradicts.prior_checks[&k].conflict > CONFLICT);
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn what_only_a_prior_tells_keeps_its_mean_and_its_sigma() {
     let ParameterStatus::Free(sigma) = fitted.statuses[k] else { panic!("{:?}", fitted.statuses[k]) };
     assert!((x[k] - 2e-3).abs() < 1e-8, "{:e}", x[k]);
     assert!((sigma / 1e-4 - 1.0).abs() < 1e-3);
-    assert_eq!(fitted.opinions[&k].without, None);
+    assert_eq!(fitted.prior_checks[&k].without, None);
 }
 
 fn stage(settings: serde_json::Value) -> Identify {
