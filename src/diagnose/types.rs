@@ -1,6 +1,6 @@
 //! What a diagnosis is asked, and what it answers.
 
-use crate::effect::{Form, Number, Place};
+use crate::effect::{Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Model, Screening};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
@@ -55,7 +55,7 @@ pub struct Finding {
     pub effect: &'static str,
     pub place: Place,
     pub statement: String,
-    pub parameters: Vec<Number>,
+    pub parameters: Vec<ParameterEstimate>,
     /// None for faults of single rows.
     pub evidence: Option<Evidence>,
     pub rivals: Vec<RivalCause>,

@@ -2,7 +2,9 @@
 
 use super::form::parameters;
 use super::motion::{SHORT, extent};
-use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable,
+};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -66,8 +68,8 @@ impl Cause for LinkCompliance {
             .collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("{} bends under what it carries by {}", told.place, told.value())
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("{} bends under what it carries by {}", summary.place, summary.value())
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -3,7 +3,8 @@
 use super::form::parameters;
 use super::spring::{MEASURE, Spring};
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable,
 };
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;
@@ -42,8 +43,8 @@ impl Cause for LinkMass {
         forms.map(|form| Hypothesis::new(form, 2).penalised(4.0)).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the mass or centre of {} in the torque model is wrong", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the mass or centre of {} in the torque model is wrong", summary.place)
     }
 
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {

@@ -3,8 +3,8 @@
 use super::form::parameters;
 use super::spring::MEASURE;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
-    figure,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, figure,
 };
 use crate::robot::{Burden, RobotModel};
 use crate::units::Unit;
@@ -37,8 +37,8 @@ impl Cause for PayloadError {
         forms.map(|centre| Hypothesis::new(WrongPayload { centre }, 2)).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        match told.numbers.first() {
+    fn sentence(&self, summary: &Summary) -> String {
+        match summary.parameters.first() {
             Some(n) => {
                 let how = if n.value < 0.0 { "lighter" } else { "heavier" };
                 format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))

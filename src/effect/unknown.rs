@@ -3,7 +3,7 @@
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth,
+    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term, Variable, warmth,
 };
 use crate::robot::RobotModel;
 
@@ -203,9 +203,9 @@ impl Cause for Unknown {
         if is_hose(term) { "cable_drag" } else { Self::NAME }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let law = told.terms(Self::NAME).next().map(|law| described(law, told.clock)).unwrap_or_default();
-        format!("{} has an error that no entry of the library explains: {law}", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        let law = summary.terms(Self::NAME).next().map(|law| described(law, summary.clock)).unwrap_or_default();
+        format!("{} has an error that no entry of the library explains: {law}", summary.place)
     }
 
     fn is_nameless(&self) -> bool {

@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people,
-    whole,
+    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Setting, Summary, Survey, cause,
+    hypotheses, people, whole,
 };
 use calib::robot::{Burden, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -199,15 +199,16 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
         let variables: Vec<String> = form.variables().iter().map(ToString::to_string).collect();
         assert!(!variables.is_empty() && variables.iter().all(|name| !name.is_empty()), "{form:?}");
         places.insert(form.place());
-        let numbers: Vec<Number> = specs
+        let numbers: Vec<ParameterEstimate> = specs
             .iter()
-            .map(|spec| Number { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
+            .map(|spec| ParameterEstimate { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
             .collect();
-        let told = Told { place: form.place(), forms: std::slice::from_ref(form), numbers: &numbers, clock: Clock::Seconds };
+        let summary =
+            Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock: Clock::Seconds };
         let coefficients = vec![0.0; specs.len()];
         for name in [form.name(), form.called(&coefficients, survey)] {
             let cause = cause(name).unwrap_or_else(|| panic!("{name} has no cause"));
-            let sentence = cause.sentence(&told);
+            let sentence = cause.sentence(&summary);
             assert_ne!(sentence, format!("{name} at {}", form.place()), "{form:?} has no sentence of its own");
             assert!(sentence.len() > 20, "{sentence}");
         }

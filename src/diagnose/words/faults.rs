@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, REVERSED};
 use crate::diagnose::types::Finding;
-use crate::effect::{JointLogLag, Number, ParameterSpec, Place, ReductionRatio};
+use crate::effect::{JointLogLag, ParameterEstimate, ParameterSpec, Place, ReductionRatio};
 use crate::error::counted;
 use crate::estimate::{Kind, ParameterStatus, Screening, Suspect};
 
@@ -25,7 +25,7 @@ pub(super) fn reversals(last: &FitState) -> Vec<Finding> {
         let place = spec.place;
         let statement =
             format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
-        let parameters = vec![Number { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
+        let parameters = vec![ParameterEstimate { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
         Finding { place, parameters, ..of_the_recording(ReductionRatio::NAME, statement) }
     };
     reversed.map(one).collect()

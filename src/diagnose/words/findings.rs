@@ -9,7 +9,7 @@ use crate::diagnose::judge::HoldoutGain;
 use crate::diagnose::pool::{HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding};
-use crate::effect::{Basis, Clock, Effect, Form, Number, Place, Told, Variable, people};
+use crate::effect::{Basis, Clock, Effect, Form, ParameterEstimate, Place, Summary, Variable, people};
 use crate::estimate::{ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first.
@@ -74,13 +74,13 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     };
     let parameters = parameters(state, effect, members);
     let clock = Clock::of(last.survey.data);
-    let statement = sentence(effect, &Told { place, forms: &forms, numbers: &parameters, clock }, effect_rms);
+    let statement = sentence(effect, &Summary { place, forms: &forms, parameters: &parameters, clock }, effect_rms);
     let valid = valid(&forms, last);
     Finding { effect, place, statement, parameters, evidence: Some(evidence), rivals, valid, forms }
 }
 
 /// The fitted parameters of some causes, as people read them.
-fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Number> {
+fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
     let one = |k: usize| {
         let spec = &state.model.stack.specs()[k];
         let sigma = match state.fitted.statuses[k] {
@@ -89,7 +89,7 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Number> 
         };
         let (unit, symbol) = people(spec.unit);
         let name = spec.name.strip_prefix(effect).unwrap_or(&spec.name).trim_start_matches('.');
-        Number {
+        ParameterEstimate {
             name: name.to_string(),
             value: unit.from_si(state.model.x[k]),
             unit: symbol,

@@ -1,11 +1,11 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
 use crate::diagnose::types::Finding;
-use crate::effect::{Clock, Survey, Told, cause, figure};
+use crate::effect::{Clock, Summary, Survey, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
-pub(super) fn sentence(effect: &str, told: &Told, rms: f64) -> String {
-    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(told));
+pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
+    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
 }
 

@@ -5,7 +5,7 @@ use crate::units::Unit;
 
 /// A coefficient of a finding in the unit in which people read it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Number {
+pub struct ParameterEstimate {
     pub name: String,
     pub value: f64,
     pub unit: &'static str,
@@ -24,15 +24,15 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
 
 /// A finding: its place, its forms and their fitted numbers.
 #[derive(Debug, Clone, Copy)]
-pub struct Told<'a> {
+pub struct Summary<'a> {
     pub place: Place,
     pub forms: &'a [Form],
-    pub numbers: &'a [Number],
+    pub parameters: &'a [ParameterEstimate],
     /// What counts time in the recording.
     pub clock: Clock,
 }
 
-impl<'a> Told<'a> {
+impl<'a> Summary<'a> {
     /// The first form of a type.
     pub(super) fn form<T: super::Placed>(&self) -> Option<&'a T> {
         self.forms.iter().find_map(Form::as_a)
@@ -45,12 +45,12 @@ impl<'a> Told<'a> {
 
     /// The first number with its unit.
     pub(super) fn value(&self) -> String {
-        self.numbers.first().map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit))
+        self.parameters.first().map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit))
     }
 
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
-        self.numbers.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit))
+        self.parameters.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit))
     }
 
     /// When the first term of a cause changes, if it does.
@@ -64,7 +64,7 @@ impl<'a> Told<'a> {
 }
 
 /// The amplitude of a sine and a cosine.
-pub(super) fn amplitude(pair: Option<&[Number]>) -> String {
+pub(super) fn amplitude(pair: Option<&[ParameterEstimate]>) -> String {
     match pair {
         Some([a, b]) => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
         _ => String::new(),
