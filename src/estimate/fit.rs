@@ -46,9 +46,9 @@ pub struct Fitted {
     pub course: Vec<Iteration>,
     pub stop: Stop,
     /// Standard deviation per axis that the rows show beyond the instrument's, m.
-    pub unmodelled: f64,
+    pub excess_sigma: f64,
     /// The same about each axis, rad, where orientations were measured.
-    pub unmodelled_turn: Option<f64>,
+    pub excess_sigma_turn: Option<f64>,
     /// Numbers that were measured in the fitted rows.
     pub values: usize,
     /// Measured points, orientations and distances with Huber weight below one.
@@ -71,8 +71,8 @@ pub struct Fitted {
 
 impl Fitted {
     /// What the rows show beyond their own noise.
-    pub(crate) fn beyond(&self) -> Unmodelled {
-        Unmodelled { point: self.unmodelled, turn: self.unmodelled_turn.unwrap_or_default() }
+    pub(crate) fn excess(&self) -> Unmodelled {
+        Unmodelled { point: self.excess_sigma, turn: self.excess_sigma_turn.unwrap_or_default() }
     }
 }
 
@@ -152,8 +152,8 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         statuses,
         course,
         stop,
-        unmodelled: problem.unmodelled.point,
-        unmodelled_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
+        excess_sigma: problem.unmodelled.point,
+        excess_sigma_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
         prior_checks,

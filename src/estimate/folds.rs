@@ -58,7 +58,7 @@ pub fn cross_validate(
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let random = deal(&order, rows.len(), count);
     let parts: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
-    let problem = Problem { data, rows, unmodelled: fitted.beyond() };
+    let problem = Problem { data, rows, unmodelled: fitted.excess() };
     let near = Near::of(&problem, model, fitted);
     let one = |part: &&Vec<usize>| {
         let close = near.as_ref().and_then(|near| near.without(&problem, model, part));

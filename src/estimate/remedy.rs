@@ -49,7 +49,7 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
-    let unmodelled = fitted.beyond();
+    let unmodelled = fitted.excess();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
         Problem { data, rows: &rows, unmodelled }.observe(model, &candidates).factor

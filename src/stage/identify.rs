@@ -210,8 +210,8 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
             "{opening}; with `{COMPLIANCE}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
             list(&rival, &suspects),
-            fitted.unmodelled * 1e3,
-            refitted.unmodelled * 1e3
+            fitted.excess_sigma * 1e3,
+            refitted.excess_sigma * 1e3
         ));
     } else {
         context.services.note(format!("{opening}; compliance under self-weight does not explain it better"));
@@ -226,5 +226,5 @@ fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
     let rows = fitting.rows.len() as f64;
     let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row).powi(2) / 3.0).sum::<f64>() / rows;
     let values = 3.0 * rows;
-    values * (noise + fitted.unmodelled * fitted.unmodelled).ln() + fitted.singular.len() as f64 * values.ln()
+    values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln() + fitted.singular.len() as f64 * values.ln()
 }

@@ -195,8 +195,12 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         let name = &cell.description.name;
         assert_eq!(free(&fitted), axes + 6, "{name}");
         // The median of 80 scatters by a tenth.
-        assert!(fitted.unmodelled < 0.6 * SIGMA, "{name}: {:e} m", fitted.unmodelled);
-        assert!(fitted.unmodelled_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN), "{name}: {:?} rad", fitted.unmodelled_turn);
+        assert!(fitted.excess_sigma < 0.6 * SIGMA, "{name}: {:e} m", fitted.excess_sigma);
+        assert!(
+            fitted.excess_sigma_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
+            "{name}: {:?} rad",
+            fitted.excess_sigma_turn
+        );
         let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.turn).collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
         assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
