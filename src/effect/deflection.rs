@@ -123,7 +123,7 @@ impl Deflection {
         })
     }
 
-    /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is the effect's burden.
+    /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is a correction of the load.
     pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
         self.partial(parameter, Direction::Torque(joint, rate));
     }

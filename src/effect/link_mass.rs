@@ -6,7 +6,7 @@ use super::{
     About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
     Variable,
 };
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -90,7 +90,7 @@ impl Effect for WrongLinkMass {
         true
     }
 
-    fn burden(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.body[self.link] += p[0];
         if self.centre {
             out.body_moment[self.link] += Vector3::new(p[1], p[2], p[3]);

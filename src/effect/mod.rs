@@ -80,7 +80,7 @@ pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
 pub use words::{Clock, figure};
 
-use crate::robot::{Burden, Measurements, Posture, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -186,7 +186,7 @@ pub trait Effect: Send + Sync {
     }
     /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared
     /// `payload` (kg); its partials belong into `deflect`.
-    fn burden(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut Burden) {}
+    fn load_correction(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut LoadCorrection) {}
     /// Its place and shape, for effects that have one; none for effects of the whole arm.
     fn form(&self) -> Option<&Form> {
         None

@@ -6,7 +6,7 @@ use super::{
     About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
     Variable, figure,
 };
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ impl Effect for WrongPayload {
         true
     }
 
-    fn burden(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.payload += p[0] * payload;
         if self.centre {
             out.payload_moment += Vector3::new(p[1], p[2], p[3]) * payload;

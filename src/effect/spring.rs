@@ -5,7 +5,7 @@
 
 use super::form::parameters;
 use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable};
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,7 @@ impl Effect for Spring {
         true
     }
 
-    fn burden(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
     }
 }

@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
-use crate::robot::{Burden, Measurements, Posture, RobotModel, Travel};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub struct Scratch {
     deflection: Deflection,
     /// Commanded travel of each joint.
     commanded: Vec<Travel>,
-    burden: Burden,
+    load_correction: LoadCorrection,
     posture: Posture,
     stations: Vec<Station>,
     /// Frame in front of E_k.
@@ -100,7 +100,7 @@ impl EffectStack {
         Scratch {
             deflection: Deflection::new(n),
             commanded: vec![Travel::default(); n],
-            burden: Burden::new(n),
+            load_correction: LoadCorrection::new(n),
             posture: Posture::new(n),
             stations: vec![Station::of(&Twist::zeros()); n + 1],
             before: vec![Pose::identity(); n + 1],
@@ -143,12 +143,12 @@ impl EffectStack {
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
             scratch.deflection.keep();
-            scratch.burden.clear();
+            scratch.load_correction.clear();
             for (effect, range) in &self.effects {
-                effect.burden(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.burden);
+                effect.load_correction(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.load_correction);
             }
             for _ in 0..2 {
-                scratch.posture.hang(robot, data.payload[row], &scratch.burden);
+                scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
                 scratch.deflection.restore();
                 self.deflect(Needs::Torque, robot, data, row, x, scratch);
                 point = self.chain(robot, scratch);
@@ -275,7 +275,7 @@ impl EffectStack {
     pub fn sight(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Sight {
         let point = self.point(robot, data, row, x, scratch);
         if !self.needs_torque {
-            scratch.posture.hang(robot, data.payload[row], &scratch.burden);
+            scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
         }
         self.velocities(robot, &point, scratch);
         Sight {

@@ -5,7 +5,7 @@ use calib::effect::{
     CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Setting, Summary, Survey, cause,
     hypotheses, people, whole,
 };
-use calib::robot::{Burden, Measurements, Posture, RobotModel};
+use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -239,9 +239,9 @@ fn every_cause_is_listed_once_and_described() {
 fn a_burden_is_that_of_the_forms_alone() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
-        let mut burden = Burden::new(survey.joints());
-        form.burden(survey.data.q(7), 10.0, &plausible(form, survey.robot), &mut burden);
-        let none = Burden::new(survey.joints());
-        assert_eq!(format!("{burden:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
+        let mut load_correction = LoadCorrection::new(survey.joints());
+        form.load_correction(survey.data.q(7), 10.0, &plausible(form, survey.robot), &mut load_correction);
+        let none = LoadCorrection::new(survey.joints());
+        assert_eq!(format!("{load_correction:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
     });
 }
