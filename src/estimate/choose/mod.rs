@@ -4,11 +4,11 @@
 //! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
 //! fitted, ln |M| - ln |M without the effect|. Only seen parameters count, so redundant ones change nothing.
 
-mod drive;
 mod exchange;
 mod sight;
 mod site;
 mod tell;
+mod visit_order;
 
 pub use sight::{Score, Sight};
 pub use site::{Circumstances, Site};
@@ -114,10 +114,10 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
         let start: Vec<usize> = (0..wish.count).collect();
         poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
     }
-    let mut poses = subset(&poses, &drive::order(&poses, &site.ranges));
+    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     poses.position = model.predict(&poses);
     let whole = whole.clone();
-    let (direction, approach_seen) = drive::approach(&model, &whole, &poses, wish.seed);
+    let (direction, approach_seen) = visit_order::approach(&model, &whole, &poses, wish.seed);
 
     let sets = random_sets(&drawn, wish.count, wish.seed);
     let (rows, around) = (whole.rows(&model, &drawn), whole.rows(&model, &workspace));

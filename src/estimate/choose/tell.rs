@@ -7,7 +7,7 @@
 use super::exchange::{Criterion, Term};
 use super::sight::{Sight, factor, gather};
 use super::site::{Circumstances, Site};
-use super::{STEPS, Wish, drive, median, random_sets, subset};
+use super::{STEPS, Wish, median, random_sets, subset, visit_order};
 use crate::estimate::factor::Factor;
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
@@ -135,12 +135,12 @@ pub fn tell(
         let start: Vec<usize> = (0..wish.count).collect();
         poses = subset(&pool, &criterion.exchange(model, &pool, &start, wish.count));
     }
-    let mut poses = subset(&poses, &drive::order(&poses, &site.ranges));
+    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     let separations = |poses: &Measurements| [0, 1].map(|k: usize| views[k].separation(&views[k].sight.rows(model, poses)));
     let mut after = separations(&poses);
     // Where the side of approach says nothing of the two, it is chosen so that it may say something of others.
     let seen = Sight::of(model, &drawn, &contest.nuisances);
-    let (direction, approach_seen) = drive::approach(model, &seen, &poses, wish.seed);
+    let (direction, approach_seen) = visit_order::approach(model, &seen, &poses, wish.seed);
     let turned = Measurements { direction: Some(direction), ..poses.clone() };
     let other = separations(&turned);
     if (0..2).all(|k| other[k] >= after[k] * (1.0 - NOTHING)) {
