@@ -1,6 +1,6 @@
 //! How to drive the poses: payload by payload along a short path, and from which side each joint comes to rest.
 
-use super::sight::Sight;
+use super::point_jacobian::PointJacobian;
 use crate::effect::{EffectStack, Load, Setting, whole};
 use crate::estimate::model::Model;
 use crate::estimate::triangle::{axpy, dot};
@@ -56,9 +56,9 @@ pub(super) fn order(poses: &Measurements, ranges: &[[f64; 2]]) -> Vec<usize> {
 
 /// Sides of approach (+1, -1; row-major) under which an error by direction is least imitated by seen parameters and by the same
 /// error of earlier joints; and the least share of it, over the joints, that stays visible.
-pub(super) fn approach(model: &Model, sight: &Sight, poses: &Measurements, seed: u64) -> (Vec<f64>, f64) {
+pub(super) fn approach(model: &Model, jacobian: &PointJacobian, poses: &Measurements, seed: u64) -> (Vec<f64>, f64) {
     let (rows, joints) = (poses.rows(), poses.joints);
-    let q = sight.rows(model, poses).qr().compute_thin_Q();
+    let q = jacobian.rows(model, poses).qr().compute_thin_Q();
     let mut basis: Vec<Vec<f64>> = (0..q.ncols()).map(|j| q.col_as_slice(j).to_vec()).collect();
     let turns = turns(model, poses);
     let mut draw = ChaCha8Rng::seed_from_u64(seed.wrapping_add(3));

@@ -17,7 +17,7 @@ const CHUNK: usize = 900;
 
 /// Parameters that are told by candidate poses as a whole, in order of precedence.
 #[derive(Debug, Clone)]
-pub struct Sight {
+pub struct PointJacobian {
     free: Vec<usize>,
     /// The parameters of `free` are in units of these, SI.
     prior: Vec<f64>,
@@ -39,7 +39,7 @@ pub struct Score {
     pub max: f64,
 }
 
-impl Sight {
+impl PointJacobian {
     /// Which of the parameters in `order` the data would see; the earlier one stays where two do the same.
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
