@@ -70,7 +70,7 @@ pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
 pub use place::Place;
 pub use reduction_ratio::ReductionRatio;
-pub use stack::{EffectStack, Scratch, Sight};
+pub use stack::{EffectStack, PointMotion, Scratch};
 pub use summary::{ParameterEstimate, Summary, people};
 pub use survey::{Hypothesis, Survey};
 pub use term::Term;

@@ -272,13 +272,20 @@ impl EffectStack {
     }
 
     /// What the row shows of any effect, in the stack or not. The arm hangs as the stack makes it hang.
-    pub fn sight(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Sight {
+    pub fn point_motion(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &mut Scratch,
+    ) -> PointMotion {
         let point = self.point(robot, data, row, x, scratch);
         if !self.needs_torque {
             scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
         }
         self.velocities(robot, &point, scratch);
-        Sight {
+        PointMotion {
             row,
             point,
             posture: scratch.posture.clone(),
@@ -321,7 +328,7 @@ impl EffectStack {
 }
 
 /// How a row's point moves with everything that an effect can do.
-pub struct Sight {
+pub struct PointMotion {
     row: usize,
     /// Predicted point, tracker frame, m.
     pub point: Vector3<f64>,
@@ -333,7 +340,7 @@ pub struct Sight {
     pub by_joint: Vec<Vector3<f64>>,
 }
 
-impl Sight {
+impl PointMotion {
     /// Derivative of the point by each parameter of an effect at zero, through `emit(parameter, derivative)`, as
     /// [`EffectStack::derivatives`].
     pub fn derivatives(

@@ -61,12 +61,12 @@ pub(super) fn curves(
         let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
         let mut scratch = model.stack.scratch(&model.robot);
         for &row in &shown {
-            let sight = model.stack.sight(&model.robot, data, row, &model.x, &mut scratch);
+            let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
             let turn = joint.filter(|j| model.robot.is_revolute(*j));
             // To the column's unit: rad about the joint, or mm.
             let (direction, scale) = match turn {
-                Some(joint) if sight.by_joint[joint].norm() > LEVER => {
-                    (sight.by_joint[joint] / sight.by_joint[joint].norm_squared(), 1.0)
+                Some(joint) if motion.by_joint[joint].norm() > LEVER => {
+                    (motion.by_joint[joint] / motion.by_joint[joint].norm_squared(), 1.0)
                 }
                 Some(_) => continue,
                 None if shift[row].norm() > SMALL * largest => (shift[row].normalize(), 1e3),
@@ -82,7 +82,7 @@ pub(super) fn curves(
             let variance: Option<f64> =
                 own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
             let residual = data.position[row] - whole[row];
-            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &sight.posture.torque);
+            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &motion.posture.torque);
             let fitted = along(&shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,

@@ -51,8 +51,8 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let stack = EffectStack::new(robot, Pose::identity(), vec![whole("joint_compliance", &setting()).expect("a cause")]);
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
-        let sight = stack.sight(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
-        posture.clone_from(&sight.posture);
+        let motion = stack.point_motion(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
+        posture.clone_from(&motion.posture);
         out.extend_from_slice(&posture.torque);
     }
     out

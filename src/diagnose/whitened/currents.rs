@@ -3,7 +3,7 @@
 //! Only parameters of the torque model (payload, link moments, balancers) can explain it. Bias and friction by direction of
 //! approach are each motor's own; a motor whose current does not follow the model at all is not usable.
 
-use crate::effect::Sight;
+use crate::effect::PointMotion;
 use crate::estimate::Prior;
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::{DMatrix, DVector};
@@ -26,15 +26,15 @@ const FOLLOWS: std::ops::Range<f64> = 0.6..1.6;
 const FINEST: f64 = 5e-3;
 
 impl Currents {
-    /// Of `rows` seen as `sights`; `None` where no current is usable.
-    pub fn new(robot: &RobotModel, data: &Measurements, rows: &[usize], sights: &[Sight]) -> Option<Self> {
+    /// Of `rows` seen as `motions`; `None` where no current is usable.
+    pub fn new(robot: &RobotModel, data: &Measurements, rows: &[usize], motions: &[PointMotion]) -> Option<Self> {
         let mut usable: Vec<(usize, Vec<f64>, f64)> = Vec::new();
         for joint in (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)) {
             let described = &robot.description().joints[joint];
             let (Some(ratio), Some(constant)) = (described.reduction_ratio, described.motor_constant) else { continue };
             let current: Option<Vec<f64>> = rows.iter().map(|row| Some(data.current(*row)?[joint])).collect();
             let Some(current) = current.filter(|all| all.iter().all(|value| value.is_finite())) else { continue };
-            let torque: Vec<f64> = sights.iter().map(|sight| sight.posture.torque[joint]).collect();
+            let torque: Vec<f64> = motions.iter().map(|motion| motion.posture.torque[joint]).collect();
             let most = torque.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
             if most < 1e-6 {
                 continue;

@@ -4,7 +4,7 @@
 
 mod currents;
 
-use crate::effect::{Deflection, Effect, Form, Sight};
+use crate::effect::{Deflection, Effect, Form, PointMotion};
 use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
 use currents::Currents;
@@ -18,7 +18,7 @@ pub(crate) struct WhitenedProblem<'a> {
     pub data: &'a Measurements,
     /// Rows of the recording, ascending.
     pub rows: Vec<usize>,
-    sights: Vec<Sight>,
+    motions: Vec<PointMotion>,
     weights: Vec<Weight>,
     currents: Option<Currents>,
     /// What a standard deviation of a current counts: that of the points as they are left by the model.
@@ -31,25 +31,25 @@ pub(crate) struct WhitenedProblem<'a> {
 impl<'a> WhitenedProblem<'a> {
     /// Of measured points alone.
     pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
-        let sights: Vec<Sight> = rows
+        let motions: Vec<PointMotion> = rows
             .par_iter()
             .map_init(
                 || model.stack.scratch(&model.robot),
-                |scratch, row| model.stack.sight(&model.robot, data, *row, &model.x, scratch),
+                |scratch, row| model.stack.point_motion(&model.robot, data, *row, &model.x, scratch),
             )
             .collect();
         let weights: Vec<Weight> = rows.iter().map(|row| Weight::of(data, *row, 0.0)).collect();
         let mut residual = Vec::with_capacity(3 * rows.len());
-        for ((sight, weight), row) in sights.iter().zip(&weights).zip(&rows) {
-            residual.extend(weight.apply(&(data.position[*row] - sight.point)).iter());
+        for ((motion, weight), row) in motions.iter().zip(&weights).zip(&rows) {
+            residual.extend(weight.apply(&(data.position[*row] - motion.point)).iter());
         }
         let current_weight = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        Self { robot: &model.robot, data, rows, residual, sights, weights, currents: None, current_weight, model }
+        Self { robot: &model.robot, data, rows, residual, motions, weights, currents: None, current_weight, model }
     }
 
     /// With the motor currents, which say something where a joint yields to torques.
     pub fn with_currents(mut self) -> Self {
-        self.currents = Currents::new(self.robot, self.data, &self.rows, &self.sights);
+        self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
         self.residual.extend(self.currents.iter().flat_map(Currents::whitened).map(|value| value * self.current_weight));
         self
     }
@@ -77,18 +77,18 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Load torques (Nm), row-major.
     pub fn torques(&self) -> Vec<f64> {
-        self.sights.iter().flat_map(|sight| sight.posture.torque.iter().copied()).collect()
+        self.motions.iter().flat_map(|motion| motion.posture.torque.iter().copied()).collect()
     }
 
     /// Motion of each row's point by each joint, m/rad; row-major.
     pub fn by_joint(&self, row: usize) -> &[Vector3<f64>] {
-        &self.sights[row].by_joint
+        &self.motions[row].by_joint
     }
 
     /// The largest motion of the point by each joint, m/rad.
     pub fn reach(&self) -> Vec<f64> {
         let joints = 0..self.robot.joints();
-        joints.map(|j| self.sights.iter().map(|sight| sight.by_joint[j].norm()).fold(0.0, f64::max)).collect()
+        joints.map(|j| self.motions.iter().map(|motion| motion.by_joint[j].norm()).fold(0.0, f64::max)).collect()
     }
 
     /// Columns of a form, one after another.
@@ -98,8 +98,8 @@ impl<'a> WhitenedProblem<'a> {
         let rows = self.residual_rows();
         let mut out = vec![0.0; count * rows];
         let mut buffer = Deflection::new(self.robot.joints());
-        for (i, (sight, weight)) in self.sights.iter().zip(&self.weights).enumerate() {
-            sight.derivatives(self.robot, self.data, form, &zeros, &mut buffer, |parameter, derivative| {
+        for (i, (motion, weight)) in self.motions.iter().zip(&self.weights).enumerate() {
+            motion.derivatives(self.robot, self.data, form, &zeros, &mut buffer, |parameter, derivative| {
                 let derivative = weight.apply(&derivative);
                 for axis in 0..3 {
                     out[parameter * rows + 3 * i + axis] += derivative[axis];
