@@ -31,8 +31,8 @@ pub(crate) fn locate(pool: &HypothesisSet, given: &Conditional, survey: &Survey)
     }
     let mut shares: Vec<ExplainedShare> = best.into_values().collect();
     shares.sort_by(|a, b| a.by.cmp(b.by).then(b.share.total_cmp(&a.share)).then(a.name.cmp(&b.name)));
-    spectrum.sort_by_key(|line| (line.joint, line.motor, line.order));
-    debug_assert!(spectrum.iter().all(|line| line.joint < survey.joints()));
+    spectrum.sort_by_key(|wave| (wave.joint, wave.motor, wave.order));
+    debug_assert!(spectrum.iter().all(|wave| wave.joint < survey.joints()));
     Located { shares, spectrum }
 }
 

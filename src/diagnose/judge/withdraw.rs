@@ -116,7 +116,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
     const FITTED: usize = 140;
 
     /// Numbers in [0, 1) without a pattern that a model could follow.
-    fn dice(k: usize) -> f64 {
+    fn scattered(k: usize) -> f64 {
         (k as f64 * 0.618_033_988_749_895 + (k as f64 * 0.317).sin() * 41.7).rem_euclid(1.0)
     }
 
@@ -127,7 +127,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         let mut truth = Model::nominal(robot.clone(), EffectStack::new(robot, Pose::identity(), effects));
         let mut data = Measurements {
             joints: 6,
-            q: (0..6 * ROWS).map(|k| 3.0 * dice(k + 7) - 1.5).collect(),
+            q: (0..6 * ROWS).map(|k| 3.0 * scattered(k + 7) - 1.5).collect(),
             position: vec![Vector3::zeros(); ROWS],
             sigma: vec![Vector3::repeat(2e-5); ROWS],
             payload: (0..ROWS).map(|row| if row % 7 < 3 { 10.0 } else { 0.0 }).collect(),
@@ -138,7 +138,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
             truth.predict(&data)
         };
         let (seen, held) = (predicted([60.0, 0.0, passing, 0.0], &mut truth), predicted([60.0, 0.0, 0.0, 0.0], &mut truth));
-        let noise = |row: usize| Vector3::from_fn(|axis, _| 7e-5 * (dice(3 * row + axis + 5000) - 0.5));
+        let noise = |row: usize| Vector3::from_fn(|axis, _| 7e-5 * (scattered(3 * row + axis + 5000) - 0.5));
         data.position = (0..ROWS).map(|row| if row < FITTED { seen[row] } else { held[row] } + noise(row)).collect();
         data
     }

@@ -35,7 +35,7 @@ impl Progress {
         let round = self.round();
         let forms: Vec<Form> = next.causes.iter().map(|cause| cause.form.clone()).collect();
         let same = forms.len() == now.causes.len() && forms.iter().all(|form| now.causes.iter().any(|cause| cause.form == *form));
-        // A set that comes back after another goes in circles: both fit alike.
+        // A set that comes back after another goes in circles: both fit equally well.
         let circles = !same && self.seen.contains(&forms);
         self.seen.push(forms);
         if round >= ROUNDS || circles || now.screening.apart.is_some() {

@@ -75,7 +75,7 @@ impl CauseSearch<'_, '_> {
         set
     }
 
-    /// Of two laws of one wind-up that explain alike the simpler stands: proportional to the load.
+    /// Of two laws of one wind-up that explain equally well the simpler stands: proportional to the load.
     pub(super) fn simplest(&self, mut set: Vec<usize>) -> Vec<usize> {
         for h in set.clone() {
             let bent = &self.pool.hypotheses[h].form;

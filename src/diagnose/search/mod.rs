@@ -176,7 +176,7 @@ fn best(pool: &CachedHypotheses, given: &Conditional, most: usize) -> Vec<usize>
     given.falls.iter().map(|(_, h)| *h).filter(|h| keys.insert(&pool.keys[*h])).take(most).collect()
 }
 
-/// What the last of so many causes must be worth.
+/// What the last of so many causes must lower the criterion by.
 fn decisive(causes: usize) -> f64 {
     if causes > 1 { FURTHER } else { DECISIVE }
 }

@@ -1,4 +1,4 @@
-//! What explains as well as a finding: other causes that fit alike here, and those that no data could tell from it.
+//! What explains as well as a finding: other causes that fit equally well here, and those that no data could tell from it.
 
 use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
 use crate::diagnose::types::RivalCause;
