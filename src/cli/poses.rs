@@ -152,7 +152,7 @@ pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
     let wish = wish(arguments, aim, sigma);
     let recording = arguments.against.as_ref().map(|path| input::recording(path, &imported, sigma)).transpose()?;
     let proposal = propose(model(), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
-    let recorded = recording.map(|data| proposal.sight.score(&model(), &data, &proposal.workspace));
+    let recorded = recording.map(|data| proposal.jacobian.score(&model(), &data, &proposal.workspace));
     let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
     let ranges = site.ranges;
     let result = Work { arguments, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded };

@@ -9,7 +9,12 @@ use nalgebra::Vector3;
 
 /// Puts the robot file's arm in place of the simulation. `simulated` is the measured point of every row in a frame fixed to the base, m,
 /// NaN where there is none: such rows say nothing. The frames are found from `rows`. `None` where fewer than three of them are simulated.
-pub fn beside(robot: &RobotModel, data: &Measurements, simulated: &[[f64; 3]], rows: &[usize]) -> Option<Measurements> {
+pub fn against_simulation(
+    robot: &RobotModel,
+    data: &Measurements,
+    simulated: &[[f64; 3]],
+    rows: &[usize],
+) -> Option<Measurements> {
     let there = |row: &usize| simulated.get(*row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()));
     let used: Vec<usize> = rows.iter().copied().filter(|row| there(row) && data.whole(*row)).collect();
     if used.len() < 3 {

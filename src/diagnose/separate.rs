@@ -1,9 +1,8 @@
 //! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should tell apart.
 
-use super::lens::Lens;
-use super::pool::Pool;
-use super::state::solve;
-use super::{statement, yielding};
+use super::pool::{CachedHypotheses, HypothesisSet};
+use super::round::compliance;
+use super::whitened::WhitenedProblem;
 use crate::effect::{Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey, Unknown, hypotheses, whole};
 use crate::estimate::Model;
 use crate::estimate::choose::{Contest, Side};
@@ -14,7 +13,7 @@ use std::collections::BTreeSet;
 const LEVELS: i32 = 8;
 
 /// A diagnosed model where it stands.
-pub struct Standing<'a> {
+pub struct DiagnosedModel<'a> {
     pub model: &'a Model,
     pub data: &'a Measurements,
     /// Fitted rows, ascending.
@@ -25,26 +24,26 @@ pub struct Standing<'a> {
 
 /// The finding of these forms beside the rival `effect` at `place` (`joint 2` or `j2`): of its forms the one that fits
 /// best in its place, and as it fits there. Fails with a sentence where the recording knows no such rival.
-pub fn contest(standing: &Standing, finding: &[Form], (effect, place): (&str, &str)) -> Result<(Contest, Form), String> {
-    let Standing { model, data, rows, free } = *standing;
-    let lens = Lens::new(model, data, rows, false);
-    let (torque, yielding) = (lens.torques(), yielding(model));
-    let survey = Survey::new(&model.robot, data, rows, &torque, &yielding);
+pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&str, &str)) -> Result<(Contest, Form), String> {
+    let DiagnosedModel { model, data, rows, free } = *diagnosed;
+    let problem = WhitenedProblem::new(model, data, rows.to_vec());
+    let (torque, compliance) = (problem.torques(), compliance(model));
+    let survey = Survey::new(&model.robot, data, rows, &torque, &compliance);
     let is = |form: &&Form| finding.contains(*form);
     let of = |(other, range): (&dyn Effect, std::ops::Range<usize>)| other.form().filter(is).map(|_| range);
     let own: Vec<usize> = model.stack.effects().filter_map(of).flatten().collect();
-    let mut caused = vec![0.0; lens.lines()];
+    let mut caused = vec![0.0; problem.residual_rows()];
     for (form, range) in model.stack.effects().filter_map(|(other, range)| Some((other.form().filter(is)?, range))) {
-        for (column, size) in lens.columns(form).chunks(lens.lines()).zip(&model.x[range]) {
+        for (column, size) in problem.columns(form).chunks(problem.residual_rows()).zip(&model.x[range]) {
             caused.iter_mut().zip(column).for_each(|(sum, value)| *sum += value * size);
         }
     }
     let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
-    let jacobian = lens.jacobian(model, &nuisances);
+    let jacobian = problem.jacobian(&nuisances);
     let rivals = rivals(&survey, effect, place, finding)?;
-    let open: Vec<f64> = lens.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
+    let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
-    let mut pool = Pool::new(&lens, &jacobian, &open, rivals);
+    let mut pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &open, 1.0, rivals));
     let Some((_, mut best)) = best(&pool, 0) else { return Err(format!("no form of {effect} at {place} can be tried")) };
     for level in 0..LEVELS {
         let own = pool.hypotheses[best].clone();
@@ -55,7 +54,7 @@ pub fn contest(standing: &Standing, finding: &[Form], (effect, place): (&str, &s
             _ => (),
         }
     }
-    let fitted = solve(&pool, &[best]).coefficients;
+    let fitted = pool.solve(&[best]).coefficients;
     let rival = &pool.hypotheses[best];
     let both = with(model, &rival.form);
     let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
@@ -65,20 +64,15 @@ pub fn contest(standing: &Standing, finding: &[Form], (effect, place): (&str, &s
     Ok((Contest { model: both, nuisances, sides }, rival.form.clone()))
 }
 
-/// How well one form fits, with a charge for every number.
-fn score(pool: &Pool, k: usize) -> f64 {
-    let (solution, lines) = (solve(pool, &[k]), pool.lines as f64);
-    lines * ((pool.square - solution.gain).max(f64::MIN_POSITIVE) / lines).ln() + lines.ln() * solution.rank as f64
+/// How well one form fits, with a penalty for every parameter.
+fn score(pool: &CachedHypotheses, k: usize) -> f64 {
+    let (solution, rows) = (pool.solve(&[k]), pool.residual_rows as f64);
+    rows * ((pool.square - solution.gain).max(f64::MIN_POSITIVE) / rows).ln() + rows.ln() * solution.rank as f64
 }
 
 /// The best of the forms from `first` on, with its score.
-fn best(pool: &Pool, first: usize) -> Option<(f64, usize)> {
+fn best(pool: &CachedHypotheses, first: usize) -> Option<(f64, usize)> {
     (first..pool.hypotheses.len()).map(|k| (score(pool, k), k)).min_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// What is not a pose and may tell the two apart, where there is such a thing.
-pub fn other_means(effect: &str, rival: &str) -> Option<&'static str> {
-    statement::other_means(effect, rival)
 }
 
 /// All that diagnosis would try under this name at this place.

@@ -1,7 +1,7 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
-use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable};
+use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -36,7 +36,7 @@ impl Cause for AxisWobble {
                 [None, Some(0), Some(1)].map(|about| Term::new(&Self, Motion::Axis { joint, about, turning }, law))
             })
         });
-        forms.map(|form| Hypothesis::new(form, 12).charged(4.0).within(LARGEST)).collect()
+        forms.map(|form| Hypothesis::new(form, 12).penalised(4.0).within(LARGEST)).collect()
     }
 
     fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
@@ -55,8 +55,8 @@ impl Cause for AxisWobble {
         }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the axis of {} tilts as the joint turns", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the axis of {} tilts as the joint turns", summary.place)
     }
 
     fn measure(&self) -> Option<Measure> {

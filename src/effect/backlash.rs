@@ -1,7 +1,7 @@
 //! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
 
 use super::basis::around;
-use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, figure};
+use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -82,9 +82,9 @@ impl Cause for Backlash {
         scaled(friction_nm).map(|friction_nm| mixed(joint, friction_nm, width)).chain(wider).map(|law| term.with(law)).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let place = told.place;
-        let by = match told.terms(Self::NAME).next().map(|term| term.law().first.of) {
+    fn sentence(&self, summary: &Summary) -> String {
+        let place = summary.place;
+        let by = match summary.terms(Self::NAME).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {
                 let friction = figure(friction_nm.abs(), 0);
@@ -93,7 +93,7 @@ impl Cause for Backlash {
             Some(_) => "by the direction from which it came".to_string(),
             None => return format!("{place} has lost motion to the side that its load pushes it"),
         };
-        format!("{place} has lost motion: half a gap of {} {by}", told.size())
+        format!("{place} has lost motion: half a gap of {} {by}", summary.size())
     }
 
     fn finer(&self) -> &'static [&'static str] {

@@ -1,7 +1,9 @@
 //! `base_compliance`: the foundation tilts about the base origin, or a point below it, under the arm's overturning moment; rad/Nm.
 
 use super::form::parameters;
-use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable,
+};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -42,8 +44,8 @@ impl Cause for BaseCompliance {
         forms.map(|form| Hypothesis::new(form, 2 * DEPTHS.len()).positive()).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the base tilts under the arm's weight by {}", told.value())
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the base tilts under the arm's weight by {}", summary.value())
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

@@ -1,6 +1,6 @@
 //! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
 
-use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, change};
+use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct BaseShift;
@@ -29,8 +29,8 @@ impl Cause for BaseShift {
         change::near(term, survey)
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the base (or the tracker) has moved{}", told.when(self.name()))
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the base (or the tracker) has moved{}", summary.when(self.name()))
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{About, Cause, Form, Hypothesis, Measure, Place, Survey, Told, Unknown};
+use super::{About, Cause, Form, Hypothesis, Measure, Place, Summary, Survey, Unknown};
 
 pub struct CableDrag;
 
@@ -23,10 +23,10 @@ impl Cause for CableDrag {
         Spring::propose(&Self, survey, |joint| !Spring::balances(joint))
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let place = told.place;
-        match told.terms(Unknown::NAME).next() {
-            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law, told.clock)),
+    fn sentence(&self, summary: &Summary) -> String {
+        let place = summary.place;
+        match summary.terms(Unknown::NAME).next() {
+            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law, summary.clock)),
             None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
         }
     }

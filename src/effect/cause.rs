@@ -48,8 +48,8 @@ pub trait Cause: Sync {
     }
 
     /// What a mechanic is told of a finding, without its size at the tool.
-    fn sentence(&self, told: &Told) -> String {
-        format!("{} at {}", self.name(), told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("{} at {}", self.name(), summary.place)
     }
 
     /// Whether it belongs to one measurement and not to the arm.

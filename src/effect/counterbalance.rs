@@ -3,7 +3,7 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{About, Cause, Form, Hypothesis, Measure, Place, Survey, Told};
+use super::{About, Cause, Form, Hypothesis, Measure, Place, Summary, Survey};
 
 pub struct Counterbalance;
 
@@ -23,8 +23,8 @@ impl Cause for Counterbalance {
         Spring::propose(&Self, survey, Spring::balances)
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("a balancer (spring or gas) acts on {} and is missing from the torque model", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("a balancer (spring or gas) acts on {} and is missing from the torque model", summary.place)
     }
 
     fn finer(&self) -> &'static [&'static str] {

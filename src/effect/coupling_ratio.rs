@@ -3,8 +3,8 @@
 //! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Survey, Term,
-    Told, Variable, figure,
+    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Summary,
+    Survey, Term, Variable, figure,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -37,9 +37,9 @@ impl Cause for CouplingRatio {
         let pairs = (0..n).flat_map(|by| (0..n).map(move |moved| (by, moved)));
         let pairs = pairs.filter(|(by, moved)| by != moved && !declared(*by, *moved));
         let pair = |(by, moved): (usize, usize)| {
-            let charge = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
+            let penalty = if by.abs_diff(moved) == 1 { 0.0 } else { DISTANT };
             let term = Term::new(&Self, Motion::Coupled { by, moved }, Law::of(Variable::Angle { joint: by }));
-            Hypothesis::new(term, 1).charged(charge)
+            Hypothesis::new(term, 1).penalised(penalty)
         };
         pairs.map(pair).collect()
     }
@@ -48,9 +48,9 @@ impl Cause for CouplingRatio {
         vec![(String::new(), Unit::One, 0.01)]
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let share = told.numbers.first().map_or_else(String::new, |n| figure(n.value * 100.0, 2));
-        format!("{}: the second moves with the first by {share} % of its angle", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        let share = summary.parameters.first().map_or_else(String::new, |n| figure(n.value * 100.0, 2));
+        format!("{}: the second moves with the first by {share} % of its angle", summary.place)
     }
 }
 

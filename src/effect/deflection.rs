@@ -26,7 +26,7 @@ pub struct Deflection {
     /// How far the row's anchor is from where it was believed, tracker frame, m.
     pub anchor: Vector3<f64>,
     /// How far each joint yields to a torque more, rad/Nm.
-    pub yielding: Vec<f64>,
+    pub compliance: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
     pub partials: Vec<(usize, Direction)>,
     /// Whether no partials are kept, where only the motions are wanted.
@@ -48,7 +48,7 @@ impl Deflection {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
         Self {
             anchor: Vector3::zeros(),
-            yielding: joint.clone(),
+            compliance: joint.clone(),
             joint,
             station,
             partials: Vec::new(),
@@ -62,7 +62,7 @@ impl Deflection {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
         self.anchor = Vector3::zeros();
-        self.yielding.fill(0.0);
+        self.compliance.fill(0.0);
         self.partials.clear();
     }
 
@@ -77,7 +77,7 @@ impl Deflection {
     pub(crate) fn restore(&mut self) {
         self.joint.clone_from(&self.kept.joint);
         self.station.clone_from(&self.kept.station);
-        self.yielding.fill(0.0);
+        self.compliance.fill(0.0);
         self.partials.truncate(self.kept.partials);
     }
 
@@ -100,7 +100,7 @@ impl Deflection {
 
     /// Says that a joint yields to a torque more by `compliance` (rad/Nm).
     pub fn yields(&mut self, joint: usize, compliance: f64) {
-        self.yielding[joint] += compliance;
+        self.compliance[joint] += compliance;
     }
 
     /// Moves everything beyond a station by the twist `p[parameter] * rate`.
@@ -123,7 +123,7 @@ impl Deflection {
         })
     }
 
-    /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is the effect's burden.
+    /// Says that a unit of the parameter loads a joint with `rate` Nm more; the load itself is a correction of the load.
     pub fn load(&mut self, parameter: usize, joint: usize, rate: f64) {
         self.partial(parameter, Direction::Torque(joint, rate));
     }

@@ -3,7 +3,7 @@
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
 use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
-use crate::robot::{Burden, Measurements, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::any::Any;
@@ -137,8 +137,8 @@ impl Effect for Form {
     fn needs_torque(&self) -> bool {
         self.inner.needs_torque()
     }
-    fn burden(&self, q: &[f64], payload: f64, p: &[f64], out: &mut Burden) {
-        self.inner.burden(q, payload, p, out);
+    fn load_correction(&self, q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
+        self.inner.load_correction(q, payload, p, out);
     }
     fn form(&self) -> Option<&Form> {
         Some(self)

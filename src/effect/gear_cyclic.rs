@@ -1,8 +1,10 @@
 //! `gear_cyclic`: transmission or encoder error periodic in the joint angle; a sine and a cosine for each order per joint turn.
 
 use super::joint_table::{JointTable, strongest_orders};
-use super::told::amplitude;
-use super::{About, Basis, Cause, Form, Hypothesis, Law, Motion, Number, NumberSpec, Place, Survey, Term, Told, Variable};
+use super::summary::amplitude;
+use super::{
+    About, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -44,7 +46,7 @@ impl Cause for GearCyclic {
             let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
             orders.flat_map(move |order| {
                 let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
-                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).charged(OVERTONE));
+                let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).penalised(OVERTONE));
                 [Some(pure), wheel].into_iter().flatten()
             })
         });
@@ -64,10 +66,11 @@ impl Cause for GearCyclic {
         }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let mut orders: Vec<String> = told.terms(Self::NAME).map(|term| order(term, &self.variant(term), told.numbers)).collect();
-        orders.extend(told.terms(JointTable::NAME).map(|table| strongest_orders(table, told.numbers)));
-        format!("the transmission or encoder of {} errs periodically with its angle: {}", told.place, orders.join(", "))
+    fn sentence(&self, summary: &Summary) -> String {
+        let mut orders: Vec<String> =
+            summary.terms(Self::NAME).map(|term| order(term, &self.variant(term), summary.parameters)).collect();
+        orders.extend(summary.terms(JointTable::NAME).map(|table| strongest_orders(table, summary.parameters)));
+        format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
     }
 
     fn finer(&self) -> &'static [&'static str] {
@@ -81,10 +84,10 @@ impl Cause for GearCyclic {
 }
 
 /// An order and its amplitude in words.
-fn order(term: &Term, variant: &str, numbers: &[Number]) -> String {
+fn order(term: &Term, variant: &str, numbers: &[ParameterEstimate]) -> String {
     let Basis::Wave { order, .. } = term.basis() else { return String::new() };
     let tag = format!("{variant}.");
-    let own: Vec<Number> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
+    let own: Vec<ParameterEstimate> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
     let overtone = own.get(2..4).map(|pair| format!(" and {} times by {}", 2 * order, amplitude(Some(pair))));
     format!("{order} times a turn by {}{}", amplitude(own.get(0..2)), overtone.unwrap_or_default())
 }

@@ -1,7 +1,7 @@
 //! `gear_motor_cyclic`: error periodic in the motor angle (joint angle times reduction ratio), e.g. of the input stage.
 
-use super::told::amplitude;
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable};
+use super::summary::amplitude;
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -38,8 +38,8 @@ impl Cause for GearMotorCyclic {
         if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let amplitude = amplitude(told.numbers.get(0..2));
-        format!("{} errs periodically with its motor's angle, amplitude {amplitude}", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        let amplitude = amplitude(summary.parameters.get(0..2));
+        format!("{} errs periodically with its motor's angle, amplitude {amplitude}", summary.place)
     }
 }

@@ -3,7 +3,7 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Survey, Told,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Summary, Survey,
     Variable,
 };
 use crate::robot::{Measurements, RobotModel};
@@ -43,8 +43,8 @@ impl Cause for JointCompliance {
         by_gravity.chain(currents).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("{} winds up under its load by {}", told.place, told.value())
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("{} winds up under its load by {}", summary.place, summary.value())
     }
 
     fn finer(&self) -> &'static [&'static str] {

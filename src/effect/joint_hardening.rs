@@ -3,8 +3,8 @@
 use super::basis::cosines;
 use super::form::parameters;
 use super::{
-    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told,
-    Variable, figure,
+    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
+    Survey, Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -70,22 +70,22 @@ impl Cause for JointHardening {
             let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
             let laws = laws.chain([0.1, 0.3, 0.6].map(|share| Law::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
-            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).charged(4.0)));
+            out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).penalised(4.0)));
             let curve = BentWindup { joint, law: Law::Curve { low_nm: low, high_nm: high } };
-            out.push(Hypothesis::new(curve, 1).charged(4.0));
+            out.push(Hypothesis::new(curve, 1).penalised(4.0));
         }
         out
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let shape = match told.form::<BentWindup>().map(|windup| windup.law) {
+    fn sentence(&self, summary: &Summary) -> String {
+        let shape = match summary.form::<BentWindup>().map(|windup| windup.law) {
             Some(Law::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
             Some(Law::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
             Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
             Some(Law::Power { exponent, .. }) => format!("it grows by the load to the power of {}", figure(exponent, 1)),
             _ => "its shape is a free curve of the load".to_string(),
         };
-        format!("{} winds up under its load, but not in proportion: {shape}", told.place)
+        format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
     }
 
     fn finer(&self) -> &'static [&'static str] {

@@ -3,7 +3,7 @@
 
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable, figure,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -57,9 +57,9 @@ impl Cause for JointLogLag {
         [false, true].map(|each| Hypothesis::new(Lag { each, by: Behind::Move }, 2)).to_vec()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let clocks = told.form::<Lag>().is_some_and(|lag| lag.by == Behind::Clock);
-        match told.numbers.first() {
+    fn sentence(&self, summary: &Summary) -> String {
+        let clocks = summary.form::<Lag>().is_some_and(|lag| lag.by == Behind::Clock);
+        match summary.parameters.first() {
             Some(n) if clocks => {
                 let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
                 let ms = figure(n.value.abs(), 2);
@@ -68,12 +68,12 @@ impl Cause for JointLogLag {
                      beside them"
                 )
             }
-            Some(n) if told.numbers.len() == 1 => format!(
+            Some(n) if summary.parameters.len() == 1 => format!(
                 "joints were logged before the arm had settled: {} % of the last move was still to come",
                 figure(n.value * 100.0, 2)
             ),
             Some(_) => {
-                let shares = told.numbers.iter().filter(|n| n.name.contains("share"));
+                let shares = summary.parameters.iter().filter(|n| n.name.contains("share"));
                 let most = shares.map(|n| n.value * 100.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
                 format!(
                     "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \

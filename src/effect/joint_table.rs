@@ -1,6 +1,6 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, Number, NumberSpec, Survey, Term, Told, Variable};
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use std::f64::consts::PI;
@@ -43,7 +43,7 @@ impl Cause for JointTable {
                 if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
                     let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize });
                     let term = Term::new(&Self, Motion::Joint { joint }, law);
-                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).charged(4.0));
+                    out.push(Hypothesis::new(term, RESOLUTIONS.len()).penalised(4.0));
                 }
             }
         }
@@ -60,8 +60,8 @@ impl Cause for JointTable {
         if 2.0 * square(&p[SMOOTH.min(p.len())..]) > square(p) { "gear_cyclic" } else { Self::NAME }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("{} has a repeatable error of no simple form, kept as a table", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("{} has a repeatable error of no simple form, kept as a table", summary.place)
     }
 
     fn finer(&self) -> &'static [&'static str] {
@@ -70,9 +70,10 @@ impl Cause for JointTable {
 }
 
 /// The strongest orders per joint turn of a table, in words.
-pub(super) fn strongest_orders(table: &Term, numbers: &[Number]) -> String {
+pub(super) fn strongest_orders(table: &Term, numbers: &[ParameterEstimate]) -> String {
     let Basis::Fading { low, high, .. } = table.basis() else { return String::new() };
-    let wave = |n: &Number| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
+    let wave =
+        |n: &ParameterEstimate| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
     let mut waves: Vec<(f64, f64)> = numbers.iter().filter(|n| n.name.contains("cos")).filter_map(wave).collect();
     waves.sort_by(|a, b| b.1.total_cmp(&a.1));
     // A cosine of k half periods over the range makes k pi / range periods a turn.

@@ -2,7 +2,9 @@
 
 use super::form::parameters;
 use super::motion::{SHORT, extent};
-use super::{About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Survey, Told, Variable};
+use super::{
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable,
+};
 use crate::robot::RobotModel;
 use crate::spatial::screw;
 use crate::units::Unit;
@@ -62,12 +64,12 @@ impl Cause for LinkCompliance {
         let odds = |form: &BentLink| if form.link + WRIST >= n { UNLIKELY } else { RARER };
         forms
             .map(|form| (odds(&form), form))
-            .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().charged(odds))
+            .map(|(odds, form)| Hypothesis::new(form, bendings.len()).positive().penalised(odds))
             .collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("{} bends under what it carries by {}", told.place, told.value())
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("{} bends under what it carries by {}", summary.place, summary.value())
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {

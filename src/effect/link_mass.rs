@@ -3,9 +3,10 @@
 use super::form::parameters;
 use super::spring::{MEASURE, Spring};
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable,
 };
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -34,16 +35,16 @@ impl Cause for LinkMass {
 
     /// Every link carried by a joint that yields in the present model.
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let carried = |link: &usize| (0..=*link).any(|joint| survey.yielding[joint] > 0.0);
+        let carried = |link: &usize| (0..=*link).any(|joint| survey.compliance[joint] > 0.0);
         let body = |link: &usize| &survey.robot.description().joints[*link];
         let known = |link: &usize| body(link).mass.is_some() && body(link).centre.is_some();
         let links = (1..survey.joints()).filter(carried).filter(known);
         let forms = links.flat_map(|link| [false, true].map(|centre| WrongLinkMass { link, centre }));
-        forms.map(|form| Hypothesis::new(form, 2).charged(4.0)).collect()
+        forms.map(|form| Hypothesis::new(form, 2).penalised(4.0)).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the mass or centre of {} in the torque model is wrong", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the mass or centre of {} in the torque model is wrong", summary.place)
     }
 
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
@@ -89,7 +90,7 @@ impl Effect for WrongLinkMass {
         true
     }
 
-    fn burden(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, _q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.body[self.link] += p[0];
         if self.centre {
             out.body_moment[self.link] += Vector3::new(p[1], p[2], p[3]);

@@ -34,10 +34,10 @@ mod place;
 mod reduction_ratio;
 mod spring;
 mod stack;
+mod summary;
 mod survey;
 mod term;
 mod thermal_growth;
-mod told;
 mod tool_offset;
 mod tool_shift;
 mod tracker_drift;
@@ -70,17 +70,17 @@ pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
 pub use place::Place;
 pub use reduction_ratio::ReductionRatio;
-pub use stack::{EffectStack, Scratch, Sight};
+pub use stack::{EffectStack, PointMotion, Scratch};
+pub use summary::{ParameterEstimate, Summary, people};
 pub use survey::{Hypothesis, Survey};
 pub use term::Term;
-pub use told::{Number, Told, people};
 pub use tool_offset::ToolOffset;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
 pub use words::{Clock, figure};
 
-use crate::robot::{Burden, Measurements, Posture, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
@@ -186,7 +186,7 @@ pub trait Effect: Send + Sync {
     }
     /// Adds what parameters `p` change about the load of the arm at joint positions `q` under the declared
     /// `payload` (kg); its partials belong into `deflect`.
-    fn burden(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut Burden) {}
+    fn load_correction(&self, _q: &[f64], _payload: f64, _p: &[f64], _out: &mut LoadCorrection) {}
     /// Its place and shape, for effects that have one; none for effects of the whole arm.
     fn form(&self) -> Option<&Form> {
         None

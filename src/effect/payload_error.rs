@@ -3,10 +3,10 @@
 use super::form::parameters;
 use super::spring::MEASURE;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Told, Variable,
-    figure,
+    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, figure,
 };
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -32,13 +32,13 @@ impl Cause for PayloadError {
     }
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
-        let yields = survey.yielding.iter().any(|compliance| *compliance > 0.0);
+        let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
         forms.map(|centre| Hypothesis::new(WrongPayload { centre }, 2)).collect()
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        match told.numbers.first() {
+    fn sentence(&self, summary: &Summary) -> String {
+        match summary.parameters.first() {
             Some(n) => {
                 let how = if n.value < 0.0 { "lighter" } else { "heavier" };
                 format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
@@ -85,7 +85,7 @@ impl Effect for WrongPayload {
         true
     }
 
-    fn burden(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.payload += p[0] * payload;
         if self.centre {
             out.payload_moment += Vector3::new(p[1], p[2], p[3]) * payload;

@@ -5,7 +5,7 @@
 
 use super::form::parameters;
 use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Survey, Variable};
-use crate::robot::{Burden, RobotModel};
+use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
@@ -48,9 +48,9 @@ impl PartialEq for Spring {
 impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
     pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
-        let joints = survey.revolute().filter(|joint| here(*joint) && survey.yielding[*joint] > 0.0);
+        let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
         let springs = joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: Shape { joint, orders } }));
-        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).charged(2.0)).collect()
+        springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(2.0)).collect()
     }
 
     /// Whether a joint (from 0) is one that balancers sit on.
@@ -102,7 +102,7 @@ impl Effect for Spring {
         true
     }
 
-    fn burden(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut Burden) {
+    fn load_correction(&self, q: &[f64], _payload: f64, p: &[f64], out: &mut LoadCorrection) {
         out.torque[self.shape.joint] += self.waves(q).zip(p).map(|(wave, p)| wave * p).sum::<f64>();
     }
 }

@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
-use crate::robot::{Burden, Measurements, Posture, RobotModel, Travel};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub struct Scratch {
     deflection: Deflection,
     /// Commanded travel of each joint.
     commanded: Vec<Travel>,
-    burden: Burden,
+    load_correction: LoadCorrection,
     posture: Posture,
     stations: Vec<Station>,
     /// Frame in front of E_k.
@@ -100,7 +100,7 @@ impl EffectStack {
         Scratch {
             deflection: Deflection::new(n),
             commanded: vec![Travel::default(); n],
-            burden: Burden::new(n),
+            load_correction: LoadCorrection::new(n),
             posture: Posture::new(n),
             stations: vec![Station::of(&Twist::zeros()); n + 1],
             before: vec![Pose::identity(); n + 1],
@@ -143,12 +143,12 @@ impl EffectStack {
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
             scratch.deflection.keep();
-            scratch.burden.clear();
+            scratch.load_correction.clear();
             for (effect, range) in &self.effects {
-                effect.burden(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.burden);
+                effect.load_correction(data.q(row), data.payload[row], &x[range.clone()], &mut scratch.load_correction);
             }
             for _ in 0..2 {
-                scratch.posture.hang(robot, data.payload[row], &scratch.burden);
+                scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
                 scratch.deflection.restore();
                 self.deflect(Needs::Torque, robot, data, row, x, scratch);
                 point = self.chain(robot, scratch);
@@ -186,7 +186,7 @@ impl EffectStack {
         self.velocities(robot, point, scratch);
         let Scratch { deflection, by_station, by_joint, .. } = scratch;
         for (parameter, direction) in &deflection.partials {
-            emit(*parameter, along(direction, by_joint, by_station, &deflection.yielding));
+            emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
         }
     }
 
@@ -215,7 +215,7 @@ impl EffectStack {
             let turn = match direction {
                 Direction::Joint(k, rate) => joint(*k) * *rate,
                 Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
-                Direction::Torque(k, rate) => joint(*k) * (deflection.yielding[*k] * *rate),
+                Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
                 Direction::Anchor(_) => continue,
             };
             emit(*parameter, turn);
@@ -248,7 +248,7 @@ impl EffectStack {
         for (parameter, direction) in &deflection.partials {
             let velocity = match direction {
                 Direction::Anchor(rate) => -rate,
-                other => along(other, by_joint, by_station, &deflection.yielding),
+                other => along(other, by_joint, by_station, &deflection.compliance),
             };
             emit(*parameter, velocity);
         }
@@ -272,17 +272,24 @@ impl EffectStack {
     }
 
     /// What the row shows of any effect, in the stack or not. The arm hangs as the stack makes it hang.
-    pub fn sight(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Sight {
+    pub fn point_motion(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &mut Scratch,
+    ) -> PointMotion {
         let point = self.point(robot, data, row, x, scratch);
         if !self.needs_torque {
-            scratch.posture.hang(robot, data.payload[row], &scratch.burden);
+            scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
         }
         self.velocities(robot, &point, scratch);
-        Sight {
+        PointMotion {
             row,
             point,
             posture: scratch.posture.clone(),
-            yielding: scratch.deflection.yielding.clone(),
+            compliance: scratch.deflection.compliance.clone(),
             by_station: scratch.by_station.clone(),
             by_joint: scratch.by_joint.clone(),
         }
@@ -321,19 +328,19 @@ impl EffectStack {
 }
 
 /// How a row's point moves with everything that an effect can do.
-pub struct Sight {
+pub struct PointMotion {
     row: usize,
     /// Predicted point, tracker frame, m.
     pub point: Vector3<f64>,
     pub posture: Posture,
     /// rad/Nm.
-    yielding: Vec<f64>,
+    compliance: Vec<f64>,
     by_station: Vec<Matrix3x6<f64>>,
     /// m/rad (m/m).
     pub by_joint: Vec<Vector3<f64>>,
 }
 
-impl Sight {
+impl PointMotion {
     /// Derivative of the point by each parameter of an effect at zero, through `emit(parameter, derivative)`, as
     /// [`EffectStack::derivatives`].
     pub fn derivatives(
@@ -349,16 +356,16 @@ impl Sight {
         buffer.start(0);
         effect.deflect(robot, &ArmState::new(data, self.row, &self.posture), zeros, buffer);
         for (parameter, direction) in &buffer.partials {
-            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.yielding));
+            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.compliance));
         }
     }
 }
 
-fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], yielding: &[f64]) -> Vector3<f64> {
+fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], compliance: &[f64]) -> Vector3<f64> {
     match direction {
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
-        Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
+        Direction::Torque(joint, rate) => by_joint[*joint] * (compliance[*joint] * *rate),
         Direction::Anchor(_) => Vector3::zeros(),
     }
 }

@@ -12,7 +12,7 @@ pub struct Survey<'a> {
     /// Load torque (Nm) of every fitted row and joint, row-major.
     pub torque: &'a [f64],
     /// How far each joint yields under load in the present model, rad/Nm.
-    pub yielding: &'a [f64],
+    pub compliance: &'a [f64],
     /// Lowest and highest position of each joint, rad or m.
     pub range: Vec<[f64; 2]>,
     /// Times (s) between neighbouring fitted rows, ascending, ends left out.
@@ -27,7 +27,13 @@ pub struct Survey<'a> {
 const EDGE: usize = 5;
 
 impl<'a> Survey<'a> {
-    pub fn new(robot: &'a RobotModel, data: &'a Measurements, rows: &'a [usize], torque: &'a [f64], yielding: &'a [f64]) -> Self {
+    pub fn new(
+        robot: &'a RobotModel,
+        data: &'a Measurements,
+        rows: &'a [usize],
+        torque: &'a [f64],
+        compliance: &'a [f64],
+    ) -> Self {
         let range = (0..robot.joints())
             .map(|joint| {
                 let values = rows.iter().map(|row| data.q(*row)[joint]);
@@ -41,7 +47,7 @@ impl<'a> Survey<'a> {
         let boundaries = between.get(EDGE - 1..between.len().saturating_sub(EDGE - 1)).unwrap_or_default().to_vec();
         let time = [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0)];
         let reference_c = rows.first().and_then(|row| data.temperature(*row));
-        Self { robot, data, rows, torque, yielding, range, boundaries, time, reference_c }
+        Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c }
     }
 
     pub fn joints(&self) -> usize {
@@ -114,10 +120,10 @@ impl<'a> Survey<'a> {
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
     pub form: Form,
-    /// How many forms of the kind are tried; twice its logarithm is charged.
+    /// How many forms of the kind are tried; twice its logarithm is the penalty.
     pub tried: f64,
     /// -2 ln of the prior odds beyond those of effects, places and forms being alike.
-    pub charge: f64,
+    pub prior_penalty: f64,
     /// True where only positive coefficients make sense.
     pub positive: bool,
     /// The largest coefficient that makes sense, SI.
@@ -126,7 +132,7 @@ pub struct Hypothesis {
 
 impl Hypothesis {
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self { form: form.into(), tried: tried.max(1) as f64, charge: 0.0, positive: false, largest: f64::INFINITY }
+        Self { form: form.into(), tried: tried.max(1) as f64, prior_penalty: 0.0, positive: false, largest: f64::INFINITY }
     }
 
     pub fn positive(self) -> Self {
@@ -137,7 +143,7 @@ impl Hypothesis {
         Self { largest, ..self }
     }
 
-    pub fn charged(self, charge: f64) -> Self {
-        Self { charge: self.charge + charge, ..self }
+    pub fn penalised(self, prior_penalty: f64) -> Self {
+        Self { prior_penalty: self.prior_penalty + prior_penalty, ..self }
     }
 }

@@ -1,7 +1,7 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
 use super::motion::{SHORT, extent};
-use super::{About, Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, figure, warmth};
+use super::{About, Basis, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, figure, warmth};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -50,13 +50,13 @@ impl Cause for ThermalGrowth {
         term.with_bases(warmth::near(term.basis(), survey, level))
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let place = told.place;
-        match (told.terms(self.name()).next().map(Term::basis), told.numbers.first()) {
+    fn sentence(&self, summary: &Summary) -> String {
+        let place = summary.place;
+        match (summary.terms(self.name()).next().map(Term::basis), summary.parameters.first()) {
             (Some(Basis::Settling { constant, .. }), Some(n)) => format!(
                 "{place} grows as the robot warms up, {} um/m in the end with a time constant of {}",
                 figure(n.value * 1e6, 0),
-                told.clock.span(constant)
+                summary.clock.span(constant)
             ),
             (Some(_), Some(n)) => format!("{place} grows by {} um/m for each kelvin", figure(n.value * 1e6, 1)),
             _ => format!("{place} grows with warmth"),

@@ -1,6 +1,6 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
-use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Survey, Term, Told, change};
+use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct ToolShift;
@@ -29,8 +29,8 @@ impl Cause for ToolShift {
         change::near(term, survey)
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the target on the tool has moved{}", told.when(self.name()))
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the target on the tool has moved{}", summary.when(self.name()))
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -2,7 +2,7 @@
 
 use super::basis::around;
 use super::{
-    About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Survey, Term, Told, Variable, warmth,
+    About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, warmth,
 };
 use crate::robot::RobotModel;
 
@@ -36,11 +36,11 @@ impl Cause for TrackerDrift {
             let steady = Law::new(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
             out.push(Hypothesis::new(form(axes, steady), 3));
             for (law, tried) in warmth::all(survey) {
-                out.push(Hypothesis::new(form(axes, law), 3 * tried).charged(4.0));
+                out.push(Hypothesis::new(form(axes, law), 3 * tried).penalised(4.0));
             }
         }
         let slow = Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: SLOW });
-        out.push(Hypothesis::new(form(Axes::Place, slow), 1).charged(4.0));
+        out.push(Hypothesis::new(form(Axes::Place, slow), 1).penalised(4.0));
         out
     }
 
@@ -62,15 +62,15 @@ impl Cause for TrackerDrift {
         }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let how = match told.terms(self.name()).next().map(Term::basis) {
+    fn sentence(&self, summary: &Summary) -> String {
+        let how = match summary.terms(self.name()).next().map(Term::basis) {
             Some(Basis::Power { exponent, .. }) if exponent < 0.7 => "slower and slower",
             Some(Basis::Power { exponent, .. }) if exponent > 1.4 => "faster and faster",
             Some(Basis::Power { .. }) => "steadily",
             Some(Basis::Cosines { .. }) | None => "slowly",
             Some(_) => "with the warm-up",
         };
-        let over = if told.clock == Clock::Rows { " over the recording's rows" } else { "" };
+        let over = if summary.clock == Clock::Rows { " over the recording's rows" } else { "" };
         format!("the tracker's frame drifts {how}{over}")
     }
 

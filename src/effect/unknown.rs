@@ -3,7 +3,7 @@
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Survey, Term, Told, Variable, warmth,
+    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term, Variable, warmth,
 };
 use crate::robot::RobotModel;
 
@@ -38,9 +38,9 @@ impl Unknown {
 
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
-        let mut add = |law: Law, tried: usize, charge: f64| {
+        let mut add = |law: Law, tried: usize, penalty: f64| {
             let term = Term::new(&Self, Motion::Joint { joint }, law);
-            out.push(Hypothesis::new(term, tried).charged(OPEN + charge));
+            out.push(Hypothesis::new(term, tried).penalised(OPEN + penalty));
         };
         let own = |basis| Law::new(Variable::Angle { joint }, basis);
         let [low, high] = survey.range[joint];
@@ -102,8 +102,8 @@ impl Cause for Unknown {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out: Vec<Hypothesis> = (0..survey.joints()).flat_map(|joint| Self::at_joint(survey, joint)).collect();
-        let mut add = |motion, law, tried, charge: f64| {
-            out.push(Hypothesis::new(Term::new(&Self, motion, law), tried).charged(OPEN + charge));
+        let mut add = |motion, law, tried, penalty: f64| {
+            out.push(Hypothesis::new(Term::new(&Self, motion, law), tried).penalised(OPEN + penalty));
         };
         let [start, end] = survey.time;
         if end > start {
@@ -203,9 +203,9 @@ impl Cause for Unknown {
         if is_hose(term) { "cable_drag" } else { Self::NAME }
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let law = told.terms(Self::NAME).next().map(|law| described(law, told.clock)).unwrap_or_default();
-        format!("{} has an error that no entry of the library explains: {law}", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        let law = summary.terms(Self::NAME).next().map(|law| described(law, summary.clock)).unwrap_or_default();
+        format!("{} has an error that no entry of the library explains: {law}", summary.place)
     }
 
     fn is_nameless(&self) -> bool {

@@ -2,7 +2,7 @@
 //!
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Survey, Term, Told, Variable, figure};
+use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -42,9 +42,9 @@ impl Cause for ViscousWindup {
         vec![("trail".into(), if turns { Unit::RadianPerRadianPerSecond } else { Unit::Second }, 0.01)]
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        let trail = told.numbers.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value, 2), n.unit));
-        format!("{} trails behind in proportion to its speed, by {trail}", told.place)
+    fn sentence(&self, summary: &Summary) -> String {
+        let trail = summary.parameters.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value, 2), n.unit));
+        format!("{} trails behind in proportion to its speed, by {trail}", summary.place)
     }
 
     fn finer(&self) -> &'static [&'static str] {

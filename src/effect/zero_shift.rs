@@ -1,6 +1,6 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
-use super::{About, Cause, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Survey, Term, Told, change};
+use super::{About, Cause, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct ZeroShift;
@@ -30,8 +30,8 @@ impl Cause for ZeroShift {
         change::near(term, survey)
     }
 
-    fn sentence(&self, told: &Told) -> String {
-        format!("the zero of {} steps by {}{}", told.place, told.size(), told.when(self.name()))
+    fn sentence(&self, summary: &Summary) -> String {
+        format!("the zero of {} steps by {}{}", summary.place, summary.size(), summary.when(self.name()))
     }
 
     fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {

@@ -1,10 +1,10 @@
 //! One identification: choose what the data can see, fit it robustly, learn how much stays unmodelled, state the uncertainty.
 
-use super::alike::rows_alike;
+use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::Factor;
-use super::known::Opinion;
+use super::known::PriorCheck;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
@@ -27,7 +27,7 @@ pub struct FitOptions<'a> {
 
 /// What became of a parameter of the stack.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Fate {
+pub enum ParameterStatus {
     /// Estimated, with its standard deviation (SI).
     Free(f64),
     /// On a bound that it would have to cross; with the value that the data would have (SI).
@@ -42,19 +42,19 @@ pub enum Fate {
 /// The outcome of [`fit`]; the values are in the model.
 #[derive(Clone)]
 pub struct Fitted {
-    pub fates: Vec<Fate>,
+    pub statuses: Vec<ParameterStatus>,
     pub course: Vec<Iteration>,
     pub stop: Stop,
     /// Standard deviation per axis that the rows show beyond the instrument's, m.
-    pub unmodelled: f64,
+    pub excess_sigma: f64,
     /// The same about each axis, rad, where orientations were measured.
-    pub unmodelled_turn: Option<f64>,
+    pub excess_sigma_turn: Option<f64>,
     /// Numbers that were measured in the fitted rows.
     pub values: usize,
     /// Measured points, orientations and distances with Huber weight below one.
     pub downweighted: usize,
     /// Parameters with a prior: what it says against what the data say.
-    pub opinions: BTreeMap<usize, Opinion>,
+    pub prior_checks: BTreeMap<usize, PriorCheck>,
     /// Singular values of the free parameters (priors included) scaled by prior sigma, largest first.
     pub singular: Vec<f64>,
     /// Singular values of all candidates, to show the gap behind the rank.
@@ -71,8 +71,8 @@ pub struct Fitted {
 
 impl Fitted {
     /// What the rows show beyond their own noise.
-    pub(crate) fn beyond(&self) -> Unmodelled {
-        Unmodelled { point: self.unmodelled, turn: self.unmodelled_turn.unwrap_or_default() }
+    pub(crate) fn excess(&self) -> Unmodelled {
+        Unmodelled { point: self.excess_sigma, turn: self.excess_sigma_turn.unwrap_or_default() }
     }
 }
 
@@ -101,20 +101,24 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
     let sight = problem.evaluate(model, options.candidates);
     problem.unmodelled = unmodelled(&problem, &sight, 0);
-    let mut search =
-        Search { fates: vec![Fate::Kept; specs.len()], course: Vec::new(), stop: Stop::NothingFree, free: Vec::new() };
+    let mut search = Search {
+        statuses: vec![ParameterStatus::Kept; specs.len()],
+        course: Vec::new(),
+        stop: Stop::NothingFree,
+        free: Vec::new(),
+    };
     search.settle(&mut problem, model, options.candidates, sight, true);
     let mut all = problem.observe(model, options.candidates);
     if search.reconsider(&mut problem, model, options.candidates, &all) {
         all = problem.observe(model, options.candidates);
     }
-    let Search { mut fates, course, stop, free } = search;
+    let Search { mut statuses, course, stop, free } = search;
     let errors = problem.errors(&all.residuals, &all.rests);
     let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     let (factor, _) = model.with_priors(&free, data);
     let pinned = model.pinned(&free, &factor);
-    bounded(model, &free, &pinned, &factor, &mut fates);
+    bounded(model, &free, &pinned, &factor, &mut statuses);
     let free: Vec<usize> = free.into_iter().zip(pinned).filter(|(_, pinned)| !pinned).map(|(k, _)| k).collect();
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     // The noise is known up to a factor, what was known beforehand is not.
@@ -130,13 +134,13 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
             .map(|inverse| Covariance::of_root(clustered(&problem, model, &free, &inverse, poses), &free)),
         None => Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free),
     };
-    let mut opinions = BTreeMap::new();
+    let mut prior_checks = BTreeMap::new();
     if let Some(covariance) = &covariance {
         for (row, k) in free.iter().enumerate() {
             let sigma = covariance.sigma(row);
-            fates[*k] = Fate::Free(sigma);
+            statuses[*k] = ParameterStatus::Free(sigma);
             if let Some(prior) = model.known(*k).prior {
-                opinions.insert(*k, Opinion::of(prior, model.x[*k], sigma * sigma));
+                prior_checks.insert(*k, PriorCheck::of(prior, model.x[*k], sigma * sigma));
             }
         }
     }
@@ -145,14 +149,14 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let singular = factor.singular_values(&prior(&free));
     let singular_all = everything.singular_values(&prior(options.candidates));
     Fitted {
-        fates,
+        statuses,
         course,
         stop,
-        unmodelled: problem.unmodelled.point,
-        unmodelled_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
+        excess_sigma: problem.unmodelled.point,
+        excess_sigma_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
-        opinions,
+        prior_checks,
         repeated: poses.against(problem.data, options.rows, &all.residuals, free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
@@ -164,7 +168,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
 
 /// The way to a minimum in what the data see.
 struct Search {
-    fates: Vec<Fate>,
+    statuses: Vec<ParameterStatus>,
     course: Vec<Iteration>,
     stop: Stop,
     /// What was estimated last.
@@ -207,11 +211,11 @@ impl Search {
             let prior: Vec<f64> = candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
             let seen = visibility(&sight.factor, &prior);
             for (k, verdict) in candidates.iter().zip(&seen) {
-                self.fates[*k] = match verdict {
-                    Visibility::Seen => Fate::Free(f64::NAN),
-                    Visibility::Unseen => Fate::Unseen,
+                self.statuses[*k] = match verdict {
+                    Visibility::Seen => ParameterStatus::Free(f64::NAN),
+                    Visibility::Unseen => ParameterStatus::Unseen,
                     Visibility::Redundant(with) => {
-                        Fate::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect())
+                        ParameterStatus::Redundant(with.iter().map(|(j, share)| (candidates[*j], *share)).collect())
                     }
                 };
             }
@@ -256,7 +260,7 @@ fn lasting(problem: &Problem, residuals: &[Vector3<f64>]) -> f64 {
             (error * (bound(3) / error.norm().max(bound(3)))).data.0[0]
         })
         .collect();
-    rows_alike(&whitened, 3)
+    autocorrelation_time(&whitened, 3)
 }
 
 /// The poses, where enough rows repeat one and poses are enough to tell the spread of all parameters.
@@ -266,12 +270,12 @@ fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize
 }
 
 /// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.
-fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, fates: &mut [Fate]) {
+fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, statuses: &mut [ParameterStatus]) {
     for (j, k) in free.iter().enumerate().filter(|(j, _)| pinned[*j]) {
         let fixed: Vec<Option<f64>> = pinned.iter().enumerate().map(|(i, pinned)| (*pinned && i != j).then_some(0.0)).collect();
         let among = fixed.iter().take(j).filter(|fixed| fixed.is_none()).count();
         let step = factor.given(&fixed).solve(0.0).and_then(|step| step.get(among).copied());
-        fates[*k] = Fate::Bound(model.x[*k] + step.unwrap_or_default());
+        statuses[*k] = ParameterStatus::Bound(model.x[*k] + step.unwrap_or_default());
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::cluster::pieces;
 use super::factor::Factor;
-use super::fit::{Fate, FitOptions, Fitted, fit};
+use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
@@ -47,8 +47,9 @@ pub fn cross_validate(
     count: usize,
     seed: u64,
 ) -> Option<Folds> {
-    let candidates: Vec<usize> =
-        (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_))).collect();
+    let candidates: Vec<usize> = (0..fitted.statuses.len())
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
+        .collect();
     let parts = parts(data, rows);
     let mut order: Vec<&Vec<usize>> = parts.iter().collect();
     let left = (rows.len() * (count.max(1) - 1)) / count.max(1);
@@ -59,7 +60,7 @@ pub fn cross_validate(
     order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let random = deal(&order, rows.len(), count);
     let folds: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
-    let problem = Problem { data, rows, unmodelled: fitted.beyond() };
+    let problem = Problem { data, rows, unmodelled: fitted.excess() };
     let near = Near::of(&problem, model, fitted);
     let one = |part: &&Vec<usize>| {
         let close = near.as_ref().and_then(|near| near.without(&problem, model, part));
@@ -109,7 +110,8 @@ impl Near {
         if model.known.values().any(|known| known.bounds.is_some()) {
             return None;
         }
-        let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+        let free: Vec<usize> =
+            (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
         let factor = problem.evaluate(model, &free).factor;
         let inverse = factor.inverse()?;
         let inverse = Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j));

@@ -24,7 +24,7 @@ pub struct Bounds {
 
 /// What a prior and the data say of one parameter, after a fit with both.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Opinion {
+pub struct PriorCheck {
     pub prior: Prior,
     /// Estimate and standard deviation without this prior, SI; `None` where the data alone say nothing.
     pub without: Option<(f64, f64)>,
@@ -35,7 +35,7 @@ pub struct Opinion {
 /// A prior and data farther apart than this many standard deviations contradict each other.
 pub const CONFLICT: f64 = 3.0;
 
-impl Opinion {
+impl PriorCheck {
     /// From the estimate and its variance with the prior: the prior's information taken off again.
     pub(crate) fn of(prior: Prior, estimate: f64, variance: f64) -> Self {
         let (own, off) = (prior.sigma * prior.sigma, estimate - prior.mean);

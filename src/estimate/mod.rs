@@ -1,7 +1,7 @@
 //! Estimation: robust least squares on streamed QR factors, what the data can see, and the model that comes of it.
 
 mod align;
-mod alike;
+mod autocorrelation;
 mod change;
 pub mod choose;
 mod cluster;
@@ -30,14 +30,14 @@ mod triangle;
 
 pub use align::align;
 pub(crate) use align::align_points;
-pub(crate) use alike::rows_alike;
+pub(crate) use autocorrelation::autocorrelation_time;
 pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
-pub use fit::{Fate, FitOptions, Fitted, fit};
+pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub use folds::{Folds, cross_validate};
 pub use gauge::gauge;
-pub use known::{Bounds, CONFLICT, Known, Opinion, Prior};
+pub use known::{Bounds, CONFLICT, Known, Prior, PriorCheck};
 pub use levenberg::{Iteration, Stop};
 pub use miss::Miss;
 pub use model::Model;

@@ -4,7 +4,7 @@
 //! beside the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
 use super::factor::Factor;
-use super::fit::{Fate, Fitted};
+use super::fit::{Fitted, ParameterStatus};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
@@ -40,16 +40,16 @@ const TARGET_PRIOR: f64 = 0.1;
 
 /// What would show each redundant or unseen parameter of a fit to `rows`.
 pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> BTreeMap<usize, Remedy> {
-    let estimated = |k: &usize| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_));
-    let hidden = |k: &usize| matches!(fitted.fates[*k], Fate::Redundant(_) | Fate::Unseen);
-    let count = fitted.fates.len();
+    let estimated = |k: &usize| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
+    let hidden = |k: &usize| matches!(fitted.statuses[*k], ParameterStatus::Redundant(_) | ParameterStatus::Unseen);
+    let count = fitted.statuses.len();
     let mut candidates: Vec<usize> = (0..count).filter(estimated).collect();
     let known = candidates.len();
     candidates.extend((0..count).filter(hidden));
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
-    let unmodelled = fitted.beyond();
+    let unmodelled = fitted.excess();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
         Problem { data, rows: &rows, unmodelled }.observe(model, &candidates).factor

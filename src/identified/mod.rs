@@ -17,7 +17,7 @@ use crate::robot::{Instrument, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
-use crate::table::{CovarianceTable, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
+use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
 use std::path::{Path, PathBuf};
 
 /// What was identified, and from what.
@@ -110,7 +110,7 @@ impl Identified {
     }
 
     fn of(robot: RobotDescription, parameters: Parameters, origin: String) -> Result<Self> {
-        if parameters.is_beside() {
+        if parameters.corrected() == Corrected::OutsideSimulation {
             let message = "these parameters correct the simulation of sim_x, sim_y, sim_z, not the model of the robot file, which alone can be \
                            compensated and exported: take another stage's with --step, or diagnose the recording without these columns";
             return Err(Error::spec(origin, message));

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{Diagnose, Stage};
 use crate::store::{Store, TableRef};
-use crate::table::{Parameters, Prediction, Standing, Step, Table, Unseen, standing};
+use crate::table::{Corrected, Parameters, Prediction, Standing, Step, Table, Unseen, standing};
 
 /// The step that stands for a run; none where nothing predicts, or the last diagnosis speaks of an outside simulation. Fails where a
 /// table has left the store.
@@ -15,7 +15,7 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
     let steps = manifest.stages.iter().filter_map(|stage| Some((stage, of(stage, Prediction::KIND)?)));
     let diagnosed = steps.clone().rfind(|(stage, _)| stage.uses == Diagnose::NAME);
     if let Some(table) = diagnosed.as_ref().and_then(|(stage, _)| of(stage, Parameters::KIND))
-        && Parameters::from_frame(&store.load(&table)?)?.is_beside()
+        && Parameters::from_frame(&store.load(&table)?)?.corrected() == Corrected::OutsideSimulation
     {
         return Ok(None);
     }

@@ -16,6 +16,6 @@ pub use gauging::{Anchor, Gauging, Target};
 pub use measured::{Distance, Distances, Named, Turns};
 pub use model::RobotModel;
 pub use observation::{Instrument, Measurements};
-pub use posture::{Burden, Carried, Posture};
+pub use posture::{Carried, LoadCorrection, Posture};
 pub use rows::{Row, Rows};
 pub use travel::Travel;

@@ -13,7 +13,7 @@ impl RobotModel {
 
 /// What differs from the robot file's masses and the declared payload.
 #[derive(Debug, Clone)]
-pub struct Burden {
+pub struct LoadCorrection {
     /// Payload beyond the declared, kg.
     pub payload: f64,
     /// Its first moment beyond the declared, kg m, zero-pose base axes of the last body.
@@ -26,7 +26,7 @@ pub struct Burden {
     pub torque: Vec<f64>,
 }
 
-impl Burden {
+impl LoadCorrection {
     pub fn new(joints: usize) -> Self {
         let none = vec![0.0; joints];
         let body_moment = vec![Vector3::zeros(); joints];
@@ -79,27 +79,27 @@ impl Posture {
     /// Computes what is carried and the torques from the frames, with `payload` kg declared on the tool.
     ///
     /// Gravity is known in the base frame as corrected, hence `behind[0]`. Bodies without mass count as massless.
-    pub fn hang(&mut self, robot: &RobotModel, payload: f64, burden: &Burden) {
+    pub fn gravity_torques(&mut self, robot: &RobotModel, payload: f64, load_correction: &LoadCorrection) {
         let description = robot.description();
         let n = robot.joints();
         self.gravity = self.behind[0].rotation * Vector3::from(description.gravity);
         let last = self.body[n - 1];
         let mut carried = Carried {
-            mass: payload + burden.payload,
-            moment: last.point(&Vector3::from(description.payload_centre)) * (payload + burden.payload)
-                + last.rotation * burden.payload_moment,
+            mass: payload + load_correction.payload,
+            moment: last.point(&Vector3::from(description.payload_centre)) * (payload + load_correction.payload)
+                + last.rotation * load_correction.payload_moment,
         };
         self.carried[n] = carried;
         for j in (0..n).rev() {
             if let (Some(own), Some(centre)) = (description.joints[j].mass, description.joints[j].centre) {
-                let mass = own + burden.body[j];
+                let mass = own + load_correction.body[j];
                 carried.mass += mass;
                 carried.moment += self.body[j].point(&Vector3::from(centre)) * mass;
             }
-            carried.moment += self.body[j].rotation * burden.body_moment[j];
+            carried.moment += self.body[j].rotation * load_correction.body_moment[j];
             self.carried[j] = carried;
             let axis = self.axis(robot, j);
-            self.torque[j] = burden.torque[j]
+            self.torque[j] = load_correction.torque[j]
                 + if robot.is_revolute(j) {
                     axis.dot(&(carried.moment - self.behind[j].point(robot.point(j)) * carried.mass).cross(&self.gravity))
                 } else {

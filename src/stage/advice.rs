@@ -1,6 +1,6 @@
 //! What a person could measure to see what these data do not show, in words.
 
-use crate::estimate::{Fate, Fitted, Model, Remedy, remedies};
+use crate::estimate::{Fitted, Model, ParameterStatus, Remedy, remedies};
 use crate::robot::Measurements;
 use crate::stage::Context;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ pub fn advice(
     let mut sentences = BTreeMap::new();
     for (k, remedy) in &found {
         *counts.entry(remedy).or_default() += 1;
-        let redundant = matches!(fitted.fates[*k], Fate::Redundant(_));
+        let redundant = matches!(fitted.statuses[*k], ParameterStatus::Redundant(_));
         let sentence = match measure(remedy, last) {
             Some(measure) => format!("{measure} would show it"),
             None if redundant => "no measured point ever can: they are one and the same to it".into(),

@@ -2,7 +2,7 @@
 //! quantity that reveals it. A joint's effect is shown as an angle about the joint (residual along its motion over its lever), all
 //! others as millimetres along their own displacement.
 
-use crate::effect::{Effect, Form, Variable};
+use crate::effect::{Effect, Form, Place, Variable};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::robot::Measurements;
@@ -52,17 +52,21 @@ pub(super) fn curves(
         own.iter().for_each(|k| without.x[*k] = 0.0);
         let bare = without.predict(data);
         let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
-        let joint = joint_of(finding).filter(|joint| *joint < data.joints);
+        let place = forms.first().map_or(specs[own[0]].place, |form| form.place());
+        let joint = match place {
+            Place::Joint(joint) if joint < data.joints => Some(joint),
+            _ => None,
+        };
         let principal = principal(&shift);
         let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
         let mut scratch = model.stack.scratch(&model.robot);
         for &row in &shown {
-            let sight = model.stack.sight(&model.robot, data, row, &model.x, &mut scratch);
+            let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
             let turn = joint.filter(|j| model.robot.is_revolute(*j));
             // To the column's unit: rad about the joint, or mm.
             let (direction, scale) = match turn {
-                Some(joint) if sight.by_joint[joint].norm() > LEVER => {
-                    (sight.by_joint[joint] / sight.by_joint[joint].norm_squared(), 1.0)
+                Some(joint) if motion.by_joint[joint].norm() > LEVER => {
+                    (motion.by_joint[joint] / motion.by_joint[joint].norm_squared(), 1.0)
                 }
                 Some(_) => continue,
                 None if shift[row].norm() > SMALL * largest => (shift[row].normalize(), 1e3),
@@ -78,7 +82,7 @@ pub(super) fn curves(
             let variance: Option<f64> =
                 own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
             let residual = data.position[row] - whole[row];
-            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &sight.posture.torque);
+            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &motion.posture.torque);
             let fitted = along(&shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,
@@ -105,12 +109,6 @@ const ROW: &str = "row";
 fn forms(finding: &FindingRow) -> Result<Vec<Form>> {
     serde_json::from_str(&finding.forms)
         .map_err(|error| Error::data("table findings", format!("`{}` are no forms of effects: {error}", finding.forms)))
-}
-
-/// The joint (from 0) at which a finding sits.
-fn joint_of(finding: &FindingRow) -> Option<usize> {
-    let number = finding.place.strip_prefix("joint ")?;
-    number.parse::<usize>().ok()?.checked_sub(1)
 }
 
 /// What reveals the effect of these forms at this joint, its stored unit (none: a row's number, from 1), and its value in SI.

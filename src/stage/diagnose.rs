@@ -1,13 +1,13 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, Verdict as Said, beside, diagnose};
+use crate::diagnose::{Question, Verdict as Said, against_simulation, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, cross_validate, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
-    CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum, Split,
-    Suspects, Verdict,
+    Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
+    Split, Suspects, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,10 +80,12 @@ impl Stage for Diagnose {
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
         let mut data = reads.recording.measurements(&self.tracker);
         let asked = reads.split.rows(&reads.recording, &self.on)?;
+        let mut corrected = Corrected::RobotFile;
         if let Some(simulated) = &reads.recording.simulated {
+            corrected = Corrected::OutsideSimulation;
             let robot = RobotModel::new(reads.robot.to_description()?);
             let message = "three rows to fit with sim_x, sim_y, sim_z and a measured point are needed to lay one over the other";
-            data = beside(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
+            data = against_simulation(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
             context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
             context.services.warn("parameters correct that simulation: they are not the robot file's".into());
         }
@@ -118,7 +120,7 @@ impl Stage for Diagnose {
             rivals: Rivals::of(&diagnosis),
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
-            parameters: if reads.recording.simulated.is_some() { parameters.beside() } else { parameters },
+            parameters: parameters.correcting(corrected),
             covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside)

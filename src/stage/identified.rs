@@ -1,7 +1,7 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
-use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
@@ -215,37 +215,37 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     }
     let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
-    if fitted.unmodelled > noise_axis {
+    if fitted.excess_sigma > noise_axis {
         services.note(format!(
             "{:.3} mm per axis is left beyond the instrument's {:.3} mm: this model does not explain it",
-            fitted.unmodelled * 1e3,
+            fitted.excess_sigma * 1e3,
             noise_axis * 1e3
         ));
     }
-    if let Some(turn) = fitted.unmodelled_turn.filter(|turn| *turn > ASKEW) {
+    if let Some(turn) = fitted.excess_sigma_turn.filter(|turn| *turn > ASKEW) {
         services.warn(format!(
             "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
             turn.to_degrees()
         ));
     }
-    for (k, opinion) in &fitted.opinions {
+    for (k, prior_check) in &fitted.prior_checks {
         let spec = &model.stack.specs()[*k];
-        if let (Some((alone, sigma)), true) = (opinion.without, opinion.conflict > CONFLICT) {
+        if let (Some((alone, sigma)), true) = (prior_check.without, prior_check.conflict > CONFLICT) {
             let show = |value: f64| format!("{:.4}", spec.unit.from_si(value));
             services.warn(format!(
                 "{}: the prior says {} +- {} {unit}, the data say {} +- {} {unit}, {:.1} sigma apart: one of them is wrong",
                 spec.name,
-                show(opinion.prior.mean),
-                show(opinion.prior.sigma),
+                show(prior_check.prior.mean),
+                show(prior_check.prior.sigma),
                 show(alone),
                 show(sigma),
-                opinion.conflict,
+                prior_check.conflict,
                 unit = spec.unit.symbol()
             ));
         }
     }
-    let stopped: Vec<&str> = (0..fitted.fates.len())
-        .filter(|k| matches!(fitted.fates[*k], Fate::Bound(_)))
+    let stopped: Vec<&str> = (0..fitted.statuses.len())
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_)))
         .map(|k| model.stack.specs()[k].name.as_str())
         .collect();
     if !stopped.is_empty() {

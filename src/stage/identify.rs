@@ -4,7 +4,7 @@
 
 use crate::effect::{Anchor, Effect, EffectStack, Setting, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
-use crate::estimate::{Fate, FitOptions, Fitted, Model, fit, gauge};
+use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::stage::identified::{Fitting, Identified};
@@ -154,7 +154,7 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
         .effects()
         .filter(|(effect, _)| GEOMETRY.contains(&effect.name()))
         .flat_map(|(_, range)| range)
-        .filter(|k| matches!(fitted.fates[*k], Fate::Free(_) | Fate::Bound(_)))
+        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
         .count();
     let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>()
         + gauging.targets.iter().map(|target| if target.oriented { 6 } else { 3 }).sum::<usize>().max(3)
@@ -176,8 +176,8 @@ const COMPLIANCE: &str = "joint_compliance";
 fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &Setting, context: &Context) {
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
         let specs = model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("reduction_ratio."));
-        let free = specs.filter_map(|(k, _)| match &fitted.fates[k] {
-            Fate::Free(sigma) if model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => Some(k),
+        let free = specs.filter_map(|(k, _)| match &fitted.statuses[k] {
+            ParameterStatus::Free(sigma) if model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => Some(k),
             _ => None,
         });
         free.collect()
@@ -211,8 +211,8 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
             "{opening}; with `{COMPLIANCE}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
             list(&rival, &suspects),
-            fitted.unmodelled * 1e3,
-            refitted.unmodelled * 1e3
+            fitted.excess_sigma * 1e3,
+            refitted.excess_sigma * 1e3
         ));
     } else {
         context.services.note(format!("{opening}; compliance under self-weight does not explain it better"));
@@ -227,5 +227,5 @@ fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
     let rows = fitting.rows.len() as f64;
     let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row).powi(2) / 3.0).sum::<f64>() / rows;
     let values = 3.0 * rows;
-    values * (noise + fitted.unmodelled * fitted.unmodelled).ln() + fitted.singular.len() as f64 * values.ln()
+    values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln() + fitted.singular.len() as f64 * values.ln()
 }

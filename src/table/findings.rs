@@ -81,7 +81,7 @@ impl Findings {
 impl FindingNumbers {
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
-            finding.numbers.iter().map(move |number| FindingNumberRow {
+            finding.parameters.iter().map(move |number| FindingNumberRow {
                 rank,
                 name: number.name.clone(),
                 value: number.value,

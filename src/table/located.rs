@@ -49,7 +49,7 @@ impl Shares {
                 by: share.by.into(),
                 name: share.name.clone(),
                 share: share.share,
-                numbers: share.numbers as i64,
+                numbers: share.parameters as i64,
                 delta_bic: share.delta_bic,
                 effect: share.effect.into(),
             })

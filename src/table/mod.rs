@@ -97,7 +97,7 @@ pub use intake::{Intake, IntakeRow};
 pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
 pub use network::{Network, NetworkRow};
 pub use observability::{Beside, Observability, ObservabilityRow};
-pub use parameters::{ParameterRow, Parameters};
+pub use parameters::{Corrected, ParameterRow, Parameters};
 pub use prediction::{Prediction, PredictionRow};
 pub use recording::Recording;
 pub use rejected::{Rejected, RejectedRow};

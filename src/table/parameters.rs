@@ -30,7 +30,7 @@ crate::table::rows! { "parameters",
 
 use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
-use crate::estimate::{CONFLICT, Fate, Fitted, Model, Opinion};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{self, Gauging, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -40,8 +40,25 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Pairs more correlated than this are worth a word: neither is known well alone.
 const CORRELATED: f64 = 0.9;
 
-/// The remark of parameters that correct what stood in `sim_x`, `sim_y`, `sim_z`.
-const BESIDE: &str = "corrects the outside simulation, not the robot file's model";
+/// What parameters correct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Corrected {
+    RobotFile,
+    /// What stood in `sim_x`, `sim_y`, `sim_z`.
+    OutsideSimulation,
+}
+
+impl Corrected {
+    /// The first sentence of the remarks that say so.
+    const OUTSIDE: &str = "corrects the outside simulation, not the robot file's model";
+
+    fn of(row: &ParameterRow) -> Self {
+        match row.remark.as_deref().and_then(|remark| remark.split("; ").next()) {
+            Some(Self::OUTSIDE) => Self::OutsideSimulation,
+            _ => Self::RobotFile,
+        }
+    }
+}
 
 /// Data that know a parameter this many times worse than its prior add nothing to it: half a per cent of the sigma.
 const SILENT: f64 = 10.0;
@@ -65,7 +82,7 @@ impl Parameters {
             for k in range.clone() {
                 let spec = &specs[k];
                 let before = earlier.and_then(|table| table.0.iter().find(|row| row.name == spec.name));
-                if let (Fate::Kept, Some(before)) = (&fitted.fates[k], before) {
+                if let (ParameterStatus::Kept, Some(before)) = (&fitted.statuses[k], before) {
                     let status = if before.status == "free" { "earlier".to_string() } else { before.status.clone() };
                     rows.push(ParameterRow { status, ..before.clone() });
                     continue;
@@ -75,28 +92,30 @@ impl Parameters {
                     let list: Vec<&str> = with.iter().take(4).map(|(j, _)| specs[*j].name.as_str()).collect();
                     if list.is_empty() { "several others".to_string() } else { list.join(", ") }
                 };
-                let (status, sigma, remark) = match &fitted.fates[k] {
-                    Fate::Free(sigma) => {
+                let (status, sigma, remark) = match &fitted.statuses[k] {
+                    ParameterStatus::Free(sigma) => {
                         let closest = fitted.covariance.as_ref().and_then(|covariance| covariance.closest(k));
                         let pair = closest.filter(|(_, correlation)| correlation.abs() > CORRELATED);
                         let pair = pair.map(|(other, c)| format!("moves with {} (correlation {c:+.2})", specs[other].name));
-                        let opinion = fitted.opinions.get(&k).and_then(|opinion| told(opinion, spec.unit));
-                        let remarks: Vec<String> = opinion.into_iter().chain(pair).collect();
+                        let of_prior = fitted.prior_checks.get(&k).and_then(|check| against_prior(check, spec.unit));
+                        let remarks: Vec<String> = of_prior.into_iter().chain(pair).collect();
                         ("free", Some(spec.unit.from_si(*sigma)), (!remarks.is_empty()).then(|| remarks.join("; ")))
                     }
-                    Fate::Bound(wanted) => {
+                    ParameterStatus::Bound(wanted) => {
                         let end = if *wanted > model.x[k] { "upper" } else { "lower" };
                         let wanted = spec.unit.from_si(*wanted);
                         ("bound", None, Some(format!("stopped by its {end} bound; the data would have it at {wanted:.4e}")))
                     }
-                    Fate::Kept if held.contains(&k) => ("held", None, Some("held at nominal by the pipeline".to_string())),
-                    Fate::Kept => ("held", None, None),
-                    Fate::Redundant(with) => (
+                    ParameterStatus::Kept if held.contains(&k) => {
+                        ("held", None, Some("held at nominal by the pipeline".to_string()))
+                    }
+                    ParameterStatus::Kept => ("held", None, None),
+                    ParameterStatus::Redundant(with) => (
                         "redundant",
                         None,
                         Some(format!("the measured points cannot tell it from {}; kept at nominal", names(with))),
                     ),
-                    Fate::Unseen => (
+                    ParameterStatus::Unseen => (
                         "unseen",
                         None,
                         Some("no plausible value of it would move the measured points beyond their noise".to_string()),
@@ -133,17 +152,21 @@ impl Parameters {
         self
     }
 
-    /// The same, marked as a correction of an outside simulation.
-    pub fn beside(mut self) -> Self {
-        for row in &mut self.0 {
-            row.remark = Some(row.remark.take().map_or_else(|| BESIDE.into(), |remark| format!("{BESIDE}; {remark}")));
+    /// The same, with what they correct in their remarks.
+    pub fn correcting(mut self, corrected: Corrected) -> Self {
+        if corrected == Corrected::OutsideSimulation {
+            let outside = Corrected::OUTSIDE;
+            for row in &mut self.0 {
+                row.remark = Some(row.remark.take().map_or_else(|| outside.into(), |remark| format!("{outside}; {remark}")));
+            }
         }
         self
     }
 
-    /// Whether these correct an outside simulation, and say nothing of the robot file's model.
-    pub fn is_beside(&self) -> bool {
-        self.0.iter().any(|row| row.remark.as_ref().is_some_and(|remark| remark.starts_with(BESIDE)))
+    /// What these correct: of an outside simulation they say nothing of the robot file's model.
+    pub fn corrected(&self) -> Corrected {
+        let outside = self.0.iter().map(Corrected::of).find(|corrected| *corrected == Corrected::OutsideSimulation);
+        outside.unwrap_or(Corrected::RobotFile)
     }
 
     /// The effects of the whole arm in this model, in the registry's order.
@@ -261,17 +284,17 @@ impl Parameters {
 }
 
 /// What a prior did to a parameter, where that is worth a word.
-fn told(opinion: &Opinion, unit: Unit) -> Option<String> {
-    match opinion.without {
-        Some((without, sigma)) if opinion.conflict > CONFLICT => {
+fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
+    match check.without {
+        Some((without, sigma)) if check.conflict > CONFLICT => {
             let [mean, own, without, sigma] =
-                [opinion.prior.mean, opinion.prior.sigma, without, sigma].map(|value| unit.from_si(value));
-            let apart = opinion.conflict;
+                [check.prior.mean, check.prior.sigma, without, sigma].map(|value| unit.from_si(value));
+            let apart = check.conflict;
             Some(format!(
                 "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
             ))
         }
-        Some((_, sigma)) if sigma < SILENT * opinion.prior.sigma => None,
+        Some((_, sigma)) if sigma < SILENT * check.prior.sigma => None,
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
 }

@@ -6,7 +6,7 @@
 
 use super::{Frame, Prediction};
 use crate::error::Result;
-use crate::estimate::rows_alike;
+use crate::estimate::autocorrelation_time;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
@@ -137,7 +137,7 @@ fn worse(one: &Errors, other: &Errors) -> Option<(f64, f64, usize)> {
     let off: Vec<f64> = pairs.iter().map(|(own_square, square)| own_square - square - (own - theirs)).collect();
     let variance = off.iter().map(|value| value * value).sum::<f64>() / (count - 1.0);
     // Points along a path are not as many opinions as there are points.
-    let error = (variance * rows_alike(&off, 1) / count).sqrt();
+    let error = (variance * autocorrelation_time(&off, 1) / count).sqrt();
     let is_worse = own.sqrt() > theirs.sqrt() * (1.0 + WORSE) && own - theirs > CLEARLY * error;
     is_worse.then(|| (own.sqrt(), theirs.sqrt(), pairs.len()))
 }

@@ -42,12 +42,12 @@ crate::table::rows! { "verdict",
     }
 }
 
-use crate::diagnose::{Diagnosis, Errors};
+use crate::diagnose::{Diagnosis, ErrorLengths};
 
 impl Verdict {
     /// The verdict of the stage `step`.
     pub fn of(step: &str, diagnosis: &Diagnosis) -> Self {
-        let mm = |errors: Option<Errors>, of: fn(Errors) -> f64| errors.map(|errors| of(errors) * 1e3);
+        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| errors.map(|errors| of(errors) * 1e3);
         Self(vec![VerdictRow {
             step: step.into(),
             verdict: diagnosis.verdict.name().into(),

@@ -9,11 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const REGISTRIES: [(&str, &str); 1] = [("effect/form.rs", "effect/")];
 
 /// Circles that are known, each by files that no others may join; whoever breaks one takes it from here.
-const KNOWN: [&[&str]; 3] = [
-    // A finding and the words about it; split when the diagnosis gets rooms.
-    &["diagnose/finding.rs", "diagnose/rivals.rs", "diagnose/statement.rs", "diagnose/unseen.rs", "diagnose/verdict.rs"],
-    // The pool keeps what the state asks of it.
-    &["diagnose/pool.rs", "diagnose/state.rs"],
+const KNOWN: [&[&str]; 1] = [
     // Columns of the layout and of what it is made of.
     &["stage/ingest/layout.rs", "stage/ingest/orientation.rs", "stage/ingest/slot.rs"],
 ];

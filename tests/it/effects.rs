@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{Effect, EffectStack, Load, ParameterSpec, Setting, identified};
-use calib::robot::{Burden, Measurements, Posture, RobotModel};
+use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -118,7 +118,7 @@ fn the_order_of_effects_is_irrelevant() {
 fn gravity_torque_of_a_horizontal_arm_is_weight_times_lever() {
     let robot = RobotModel::new(fixture::offset_wrist());
     let mut posture = Posture::new(6);
-    posture.hang(&robot, 10.0, &Burden::new(6));
+    posture.gravity_torques(&robot, 10.0, &LoadCorrection::new(6));
     let torque = &posture.torque;
     // Joint 2 turns about -y through x = 0; bodies 2..6 and the payload hang at their x.
     let bodies = [(12.7, -0.306), (4.3, -0.89815), (2.0, -1.1843), (2.0, -1.1843), (0.4, -1.1843), (10.0, -1.1343)];

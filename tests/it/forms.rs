@@ -2,10 +2,10 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, Number, Place, Setting, Survey, Told, cause, hypotheses, people,
-    whole,
+    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Setting, Summary, Survey, cause,
+    hypotheses, people, whole,
 };
-use calib::robot::{Burden, Measurements, Posture, RobotModel};
+use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
@@ -51,8 +51,8 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     let stack = EffectStack::new(robot, Pose::identity(), vec![whole("joint_compliance", &setting()).expect("a cause")]);
     let mut scratch = stack.scratch(robot);
     for row in 0..data.rows() {
-        let sight = stack.sight(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
-        posture.clone_from(&sight.posture);
+        let motion = stack.point_motion(robot, data, row, &vec![0.0; stack.specs().len()], &mut scratch);
+        posture.clone_from(&motion.posture);
         out.extend_from_slice(&posture.torque);
     }
     out
@@ -199,15 +199,16 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
         let variables: Vec<String> = form.variables().iter().map(ToString::to_string).collect();
         assert!(!variables.is_empty() && variables.iter().all(|name| !name.is_empty()), "{form:?}");
         places.insert(form.place());
-        let numbers: Vec<Number> = specs
+        let numbers: Vec<ParameterEstimate> = specs
             .iter()
-            .map(|spec| Number { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
+            .map(|spec| ParameterEstimate { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
             .collect();
-        let told = Told { place: form.place(), forms: std::slice::from_ref(form), numbers: &numbers, clock: Clock::Seconds };
+        let summary =
+            Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock: Clock::Seconds };
         let coefficients = vec![0.0; specs.len()];
         for name in [form.name(), form.called(&coefficients, survey)] {
             let cause = cause(name).unwrap_or_else(|| panic!("{name} has no cause"));
-            let sentence = cause.sentence(&told);
+            let sentence = cause.sentence(&summary);
             assert_ne!(sentence, format!("{name} at {}", form.place()), "{form:?} has no sentence of its own");
             assert!(sentence.len() > 20, "{sentence}");
         }
@@ -238,9 +239,9 @@ fn every_cause_is_listed_once_and_described() {
 fn a_burden_is_that_of_the_forms_alone() {
     over_all(|survey, hypothesis| {
         let form = &hypothesis.form;
-        let mut burden = Burden::new(survey.joints());
-        form.burden(survey.data.q(7), 10.0, &plausible(form, survey.robot), &mut burden);
-        let none = Burden::new(survey.joints());
-        assert_eq!(format!("{burden:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
+        let mut load_correction = LoadCorrection::new(survey.joints());
+        form.load_correction(survey.data.q(7), 10.0, &plausible(form, survey.robot), &mut load_correction);
+        let none = LoadCorrection::new(survey.joints());
+        assert_eq!(format!("{load_correction:?}") != format!("{none:?}"), form.is_of_torque_model(), "{form:?}");
     });
 }

@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::effect::Load;
-use calib::estimate::{Fate, FitOptions, Fitted, Known, Model, Prior, fit, gauge};
+use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Distances, Gauging, Measurements, Named, RobotModel, Target, Turns};
 use calib::spatial::{Pose, Twist};
@@ -130,7 +130,7 @@ fn nothing(_: &Model) -> BTreeMap<usize, Known> {
 }
 
 fn free(fitted: &Fitted) -> usize {
-    fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count()
+    fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count()
 }
 
 /// Mean square of what predictions miss the truth by over what their sigma says.
@@ -175,11 +175,11 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
     let candidates: Vec<usize> = (0..specs.len()).collect();
     let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
     let zero = specs.iter().position(|spec| spec.name == "joint_offset.j6").expect("a parameter");
-    let Fate::Free(sigma) = fitted.fates[zero] else { panic!("{:?}", fitted.fates[zero]) };
+    let ParameterStatus::Free(sigma) = fitted.statuses[zero] else { panic!("{:?}", fitted.statuses[zero]) };
     assert!(sigma < 1e-4, "{sigma:e} rad");
     // What a turn of the last joint cannot be told from without the targets' places stays where it is.
     let (_, blind) = cell.fit(&data, nothing);
-    let offset = |fitted: &Fitted, k: usize| matches!(fitted.fates[k], Fate::Free(_));
+    let offset = |fitted: &Fitted, k: usize| matches!(fitted.statuses[k], ParameterStatus::Free(_));
     assert!(offset(&fitted, zero) && free(&fitted) > free(&blind));
 }
 
@@ -195,8 +195,12 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         let name = &cell.description.name;
         assert_eq!(free(&fitted), axes + 6, "{name}");
         // The median of 80 scatters by a tenth.
-        assert!(fitted.unmodelled < 0.6 * SIGMA, "{name}: {:e} m", fitted.unmodelled);
-        assert!(fitted.unmodelled_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN), "{name}: {:?} rad", fitted.unmodelled_turn);
+        assert!(fitted.excess_sigma < 0.6 * SIGMA, "{name}: {:e} m", fitted.excess_sigma);
+        assert!(
+            fitted.excess_sigma_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
+            "{name}: {:?} rad",
+            fitted.excess_sigma_turn
+        );
         let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.turn).collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
         assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
@@ -231,7 +235,7 @@ fn an_anchor_beside_a_tracker_is_placed_where_it_is() {
         let (name, axis) = (spec.name.split('.').nth(1).unwrap_or_default(), spec.name.chars().last().unwrap_or_default());
         let axis = ['x', 'y', 'z'].iter().position(|known| *known == axis).expect("an axis");
         let truth = anchors.iter().find(|(known, _)| *known == name).expect("an anchor").1[axis];
-        let Fate::Free(sigma) = fitted.fates[k] else { panic!("{}: {:?}", spec.name, fitted.fates[k]) };
+        let ParameterStatus::Free(sigma) = fitted.statuses[k] else { panic!("{}: {:?}", spec.name, fitted.statuses[k]) };
         let pull = (model.standing(k).1 - truth) / sigma;
         assert!(pull.abs() < 3.5, "{}: {pull:.1} sigma off", spec.name);
     }

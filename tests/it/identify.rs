@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{EffectStack, Load, Setting, whole};
-use calib::estimate::{Fate, FitOptions, Fitted, Model, Stop, align, fit};
+use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -113,7 +113,7 @@ fn position_data_see_four_parameters_a_revolute_joint_two_a_prismatic_one_and_th
         let (data, _) = recording(&description, &GEOMETRY, 120, 1);
         let rows: Vec<usize> = (0..120).collect();
         let (_, fitted) = identify(&data, &description, &GEOMETRY, &rows);
-        let free = fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count();
+        let free = fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count();
         assert_eq!(free, expected, "{}", description.name);
         let gap = fitted.singular_all[expected - 1] / fitted.singular_all[expected].max(1e-300);
         assert!(gap > 1e6, "{}: the singular values fall by {gap:.1e} behind the rank", description.name);
@@ -131,10 +131,10 @@ fn geometry_ratios_coupling_and_compliance_come_back_and_held_out_points_reach_t
         let held_out = rms(&model, &data, (0..400).filter(|row| !rows.contains(row)));
         let floor = SIGMA * 3f64.sqrt();
         assert!((0.85..1.15).contains(&(held_out / floor)), "{}: held-out {held_out:.2e}, noise {floor:.2e}", description.name);
-        assert!(fitted.unmodelled < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.unmodelled);
+        assert!(fitted.excess_sigma < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.excess_sigma);
         for (k, spec) in model.stack.specs().iter().enumerate() {
             let gauge = GEOMETRY.iter().any(|name| spec.name.starts_with(name));
-            if let (false, Fate::Free(sigma)) = (gauge, &fitted.fates[k]) {
+            if let (false, ParameterStatus::Free(sigma)) = (gauge, &fitted.statuses[k]) {
                 let off = (model.x[k] - truth.x[k]) / sigma;
                 assert!(off.abs() < 4.5, "{} {}: {off:.1} sigma off", description.name, spec.name);
             }
@@ -153,7 +153,7 @@ fn scatter_of_ratios_over_robots_is_what_sigma_says() {
         let rows: Vec<usize> = (0..80).collect();
         let (model, fitted) = identify(&data, &description, &effects, &rows);
         for (k, spec) in model.stack.specs().iter().enumerate() {
-            if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.fates[k]) {
+            if let (true, ParameterStatus::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.statuses[k]) {
                 squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
                 count += 1.0;
             }
@@ -189,7 +189,7 @@ fn a_point_on_the_last_axis_leaves_the_last_ratio_unseen() {
     let rows: Vec<usize> = (0..100).collect();
     let (model, fitted) = identify(&data, &description, &effects, &rows);
     let k = model.stack.specs().iter().position(|spec| spec.name == "reduction_ratio.j6").expect("joint 6");
-    assert_eq!(fitted.fates[k], Fate::Unseen);
+    assert_eq!(fitted.statuses[k], ParameterStatus::Unseen);
     assert_eq!(model.x[k], 0.0);
 }
 
@@ -198,20 +198,23 @@ fn scores(description: &RobotDescription, effects: &[&str], robots: usize, rows:
     let all: Vec<usize> = (0..rows).collect();
     let (data, _) = recording(description, &[], rows, 0);
     let (model, fitted) = identify(&data, description, effects, &all);
-    let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
+    let free: Vec<usize> =
+        (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
     let names = free.iter().map(|k| model.stack.specs()[*k].name.clone()).collect();
     let mut scores = vec![Vec::new(); free.len()];
     for seed in 100..100 + robots {
         let (data, truth) = recording_where(description, effects, rows, seed, |k| free.contains(&k));
         let (model, fitted) = identify(&data, description, effects, &all);
         for (score, k) in scores.iter_mut().zip(&free) {
-            let Fate::Free(sigma) = fitted.fates[*k] else { panic!("{}: the rank changed", model.stack.specs()[*k].name) };
+            let ParameterStatus::Free(sigma) = fitted.statuses[*k] else {
+                panic!("{}: the rank changed", model.stack.specs()[*k].name)
+            };
             // The base is estimated about its own start: its pose is compared, not its corrections.
             if !model.stack.specs()[*k].name.starts_with("base_frame") {
                 score.push((model.x[*k] - truth.x[*k]) / sigma);
             }
         }
-        assert_eq!(fitted.fates.iter().filter(|fate| matches!(fate, Fate::Free(_))).count(), free.len());
+        assert_eq!(fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count(), free.len());
     }
     (names, scores)
 }

@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
 use crate::sr210d::experiment;
-use calib::estimate::{Bounds, CONFLICT, Fate, FitOptions, Fitted, Known, Model, Prior, align, fit};
+use calib::estimate::{Bounds, CONFLICT, FitOptions, Fitted, Known, Model, ParameterStatus, Prior, align, fit};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{ParameterRow, Parameters};
@@ -67,7 +67,7 @@ fn a_parameter_at_its_bound_leaves_the_others_as_if_it_were_held_there() {
     let known = if bound > 0.0 { between(-bound, bound) } else { between(bound, -bound) };
     let (bounded, fitted) = case.fit(&[(k, known)], &[]);
     assert_eq!(bounded[k], bound);
-    let Fate::Bound(wanted) = fitted.fates[k] else { panic!("{:?}", fitted.fates[k]) };
+    let ParameterStatus::Bound(wanted) = fitted.statuses[k] else { panic!("{:?}", fitted.statuses[k]) };
     assert!((wanted / free[k] - 1.0).abs() < 0.05, "the data would have {wanted:e}, let go they give {:e}", free[k]);
     let (held, _) = case.fit(&[], &[(k, bound)]);
     // The noise is estimated by two fits: a fiftieth of it may differ.
@@ -85,7 +85,7 @@ fn bounds_that_do_not_bite_change_nothing_and_a_start_on_a_bound_is_left() {
     assert_eq!(fitted.course.len(), plain.course.len());
     let known = if free[k] > 0.0 { between(0.0, 0.01) } else { between(-0.01, 0.0) };
     let (released, fitted) = case.fit(&[(k, known)], &[]);
-    assert!(matches!(fitted.fates[k], Fate::Free(_)), "{:?}", fitted.fates[k]);
+    assert!(matches!(fitted.statuses[k], ParameterStatus::Free(_)), "{:?}", fitted.statuses[k]);
     close(&free, &released, 1e-8);
 }
 
@@ -97,7 +97,8 @@ fn several_bounds_at_once_end_where_no_allowed_step_lowers_the_cost() {
     let tight: Vec<(usize, Known)> = ratios.iter().map(|k| (*k, between(-0.3 * free[*k].abs(), 0.3 * free[*k].abs()))).collect();
     let (bounded, fitted) = case.fit(&tight, &[]);
     let cost = |fitted: &Fitted| fitted.course.last().map_or(f64::NAN, |iteration| iteration.rms);
-    let stopped: Vec<usize> = ratios.iter().copied().filter(|k| matches!(fitted.fates[*k], Fate::Bound(_))).collect();
+    let stopped: Vec<usize> =
+        ratios.iter().copied().filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Bound(_))).collect();
     assert!(stopped.len() >= 4, "{} of 6 stopped", stopped.len());
     // Each moved inwards and held there, with the other bounds kept: worse every time.
     for k in &stopped {
@@ -112,18 +113,18 @@ fn a_prior_and_the_data_meet_where_their_sigmas_say_and_the_data_alone_can_be_to
     let mut case = case(44);
     let k = case.position("reduction_ratio.j4");
     let (free, plain) = case.fit(&[], &[]);
-    let Fate::Free(sigma) = plain.fates[k] else { panic!("not free") };
+    let ParameterStatus::Free(sigma) = plain.statuses[k] else { panic!("not free") };
     let (mean, own) = (free[k] + 3.0 * sigma, 0.7 * sigma);
     let (both, fitted) = case.fit(&[(k, about(mean, own))], &[]);
     let weight = |sigma: f64| sigma.powi(-2);
     let expected = (free[k] * weight(sigma) + mean * weight(own)) / (weight(sigma) + weight(own));
     assert!((both[k] - expected).abs() < 0.02 * sigma, "{:e} for {expected:e}", both[k]);
-    let Fate::Free(narrow) = fitted.fates[k] else { panic!("not free") };
+    let ParameterStatus::Free(narrow) = fitted.statuses[k] else { panic!("not free") };
     assert!((narrow / (weight(sigma) + weight(own)).powf(-0.5) - 1.0).abs() < 0.02);
-    let opinion = fitted.opinions[&k];
-    let (without, spread) = opinion.without.expect("the data see it");
+    let prior_check = fitted.prior_checks[&k];
+    let (without, spread) = prior_check.without.expect("the data see it");
     assert!((without - free[k]).abs() < 0.05 * sigma && (spread / sigma - 1.0).abs() < 0.03);
-    assert!((opinion.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05, "{}", opinion.conflict);
+    assert!((prior_check.conflict - 3.0 / f64::hypot(1.0, 0.7)).abs() < 0.05, "{}", prior_check.conflict);
 }
 
 #[test]
@@ -132,9 +133,9 @@ fn a_prior_against_the_data_is_called_a_conflict_and_one_that_agrees_is_not() {
     let k = case.position("reduction_ratio.j5");
     let right = case.truth.x[k];
     let (_, agrees) = case.fit(&[(k, about(right, 2e-5))], &[]);
-    assert!(agrees.opinions[&k].conflict < CONFLICT);
+    assert!(agrees.prior_checks[&k].conflict < CONFLICT);
     let (_, contradicts) = case.fit(&[(k, about(right + 5e-4, 5e-5))], &[]);
-    assert!(contradicts.opinions[&k].conflict > CONFLICT);
+    assert!(contradicts.prior_checks[&k].conflict > CONFLICT);
 }
 
 #[test]
@@ -143,12 +144,12 @@ fn what_only_a_prior_tells_keeps_its_mean_and_its_sigma() {
     // The base may turn instead: the data cannot tell the zero of joint 1.
     let k = case.position("joint_offset.j1");
     let (_, plain) = case.fit(&[], &[]);
-    assert!(matches!(plain.fates[k], Fate::Redundant(_)));
+    assert!(matches!(plain.statuses[k], ParameterStatus::Redundant(_)));
     let (x, fitted) = case.fit(&[(k, about(2e-3, 1e-4))], &[]);
-    let Fate::Free(sigma) = fitted.fates[k] else { panic!("{:?}", fitted.fates[k]) };
+    let ParameterStatus::Free(sigma) = fitted.statuses[k] else { panic!("{:?}", fitted.statuses[k]) };
     assert!((x[k] - 2e-3).abs() < 1e-8, "{:e}", x[k]);
     assert!((sigma / 1e-4 - 1.0).abs() < 1e-3);
-    assert_eq!(fitted.opinions[&k].without, None);
+    assert_eq!(fitted.prior_checks[&k].without, None);
 }
 
 fn stage(settings: serde_json::Value) -> Identify {

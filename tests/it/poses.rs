@@ -3,7 +3,7 @@
 use crate::fixture;
 use calib::effect::{EffectStack, Load, Setting, identified, whole};
 use calib::estimate::choose::{Aim, Proposal, Score, Site, Wish, median, propose};
-use calib::estimate::{Fate, FitOptions, Model, fit};
+use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
@@ -47,7 +47,7 @@ fn proposed(robot: &RobotDescription, site: &Site, effects: &[&str], aim: Aim) -
 /// The ratio of O1 to the median random set's; for each seen parameter that of sigma.
 fn gains(proposal: &Proposal) -> (f64, Vec<f64>) {
     let usual = |value: &dyn Fn(&Score) -> f64| median(proposal.random.iter().map(value).collect());
-    let sigmas = (0..proposal.sight.free().len()).map(|k| proposal.score.sigma[k] / usual(&|score| score.sigma[k]));
+    let sigmas = (0..proposal.jacobian.free().len()).map(|k| proposal.score.sigma[k] / usual(&|score| score.sigma[k]));
     (proposal.score.o1 / usual(&|score| score.o1), sigmas.collect())
 }
 
@@ -98,7 +98,11 @@ fn scatter(robot: &RobotDescription, poses: &Measurements, free: &[usize], scale
         let mut fitted = model(robot, &effects);
         let outcome = fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
         for (k, parameter) in free.iter().enumerate() {
-            assert!(matches!(outcome.fates[*parameter], Fate::Free(_)), "{}", fitted.stack.specs()[*parameter].name);
+            assert!(
+                matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),
+                "{}",
+                fitted.stack.specs()[*parameter].name
+            );
             squares[k] += ((fitted.x[*parameter] - truth.x[*parameter]) / scale[k]).powi(2);
         }
     }
@@ -111,7 +115,7 @@ fn simulated_fits_scatter_as_predicted_and_less_than_with_random_poses() {
     let effects = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "joint_compliance"];
     let site = site(&robot);
     let proposal = proposed(&robot, &site, &effects, Aim::Information);
-    let free = proposal.sight.free();
+    let free = proposal.jacobian.free();
     let rms = |values: &[f64]| (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt();
     let scattered = scatter(&robot, &proposal.poses, free, &proposal.score.sigma, 16);
     let ours = rms(&scattered);

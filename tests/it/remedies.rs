@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
-use calib::estimate::{Fate, FitOptions, Fitted, Model, Remedy, align, fit, remedies};
+use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Remedy, align, fit, remedies};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 
@@ -20,7 +20,7 @@ fn remedy(description: &RobotDescription, data: &Measurements, effects: &[&str],
     let (model, fitted) = identify(description, data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let k = model.stack.specs().iter().position(|spec| spec.name == name).expect("a parameter");
-    assert!(!matches!(fitted.fates[k], Fate::Free(_)), "{name} is seen");
+    assert!(!matches!(fitted.statuses[k], ParameterStatus::Free(_)), "{name} is seen");
     remedies(&model, data, &rows, &fitted).remove(&k).expect("hidden parameters have one")
 }
 

@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, normal, recording};
 use crate::sr210d::experiment;
-use calib::estimate::{Fate, FitOptions, Fitted, Model, Poses, align, fit, spread};
+use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Poses, align, fit, spread};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Stage};
 use calib::table::{Observability, Parameters, Split};
@@ -115,7 +115,7 @@ fn scatter(robots: usize, rows: usize, know: bool) -> (f64, f64) {
         let (model, fitted) = identify(&data, &effects);
         assert_eq!(fitted.clusters, if rows > 1 { 60 } else { 0 });
         for (k, spec) in model.stack.specs().iter().enumerate() {
-            if let (true, Fate::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.fates[k]) {
+            if let (true, ParameterStatus::Free(sigma)) = (spec.name.starts_with("reduction_ratio"), &fitted.statuses[k]) {
                 squares += ((model.x[k] - truth.x[k]) / sigma).powi(2);
                 sigmas += sigma;
                 count += 1.0;

@@ -34,8 +34,8 @@ fn refinement_never_leaves_the_bounds_of_a_shape() {
     };
     let rows: Vec<usize> = (0..ROWS).collect();
     let torque: Vec<f64> = (0..ROWS * n).map(|k| 600.0 * (fixture::spread(k, 2) - 0.5)).collect();
-    let yielding = vec![0.0; n];
-    let survey = Survey::new(&robot, &data, &rows, &torque, &yielding);
+    let compliance = vec![0.0; n];
+    let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
     // 590 s were recorded, no joint carries more than 300 Nm.
     let bounds = [
         ("constant", 0.02 * 590.0, 10.0 * 590.0),

@@ -6,7 +6,7 @@ use super::{PosesArguments, output, site, wish};
 use crate::cli::diagnose::diagnosis;
 use crate::cli::surroundings::open_store;
 use crate::cli::{emit, emit_json};
-use crate::diagnose::{Standing, contest};
+use crate::diagnose::{DiagnosedModel, contest};
 use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Site, Told, median, tell};
@@ -62,7 +62,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
     let rows = as_fitted(&mut data, &written(&store, &stage)?, &predicted);
     let estimated = |name: &String| parameters.0.iter().any(|row| row.name == *name && row.status == "free");
     let free: Vec<usize> = (0..model.x.len()).filter(|k| estimated(&model.stack.specs()[*k].name)).collect();
-    let standing = Standing { model: &model, data: &data, rows: &rows, free: &free };
+    let diagnosed = DiagnosedModel { model: &model, data: &data, rows: &rows, free: &free };
     let recorded = ranges(&data, &rows);
     let mut site = site(arguments, &robot, &place, Some(&recorded))?;
     if arguments.payload.is_empty() {
@@ -73,7 +73,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
     let circumstances = circumstances(&data, &rows);
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && (&row.effect, &row.place) == (&rival.0, &rival.1));
     let mut tried = None;
-    let told = match contest(&standing, &forms, (&rival.0, &rival.1)) {
+    let told = match contest(&diagnosed, &forms, (&rival.0, &rival.1)) {
         Ok((contest, form)) => {
             rival = (form.name().to_string(), form.place().to_string());
             // A free curve is known where points were fitted, and nowhere else.

@@ -12,7 +12,7 @@ fn sets(work: &Work) -> Vec<(String, Score)> {
     let usual = Score {
         points: work.proposal.score.points,
         o1: middle(&|score| score.o1),
-        sigma: (0..work.proposal.sight.free().len()).map(|k| middle(&|score| score.sigma[k])).collect(),
+        sigma: (0..work.proposal.jacobian.free().len()).map(|k| middle(&|score| score.sigma[k])).collect(),
         median: middle(&|score| score.median),
         p95: middle(&|score| score.p95),
         max: middle(&|score| score.max),
@@ -33,7 +33,7 @@ pub(super) fn text(work: &Work) -> String {
     let mut text = format!(
         "{} for {} of {} that position data can tell ({})\n",
         counted(proposal.poses.rows(), "pose"),
-        proposal.sight.free().len(),
+        proposal.jacobian.free().len(),
         counted(asked, "parameter"),
         work.effects.join(", ")
     );
@@ -112,7 +112,7 @@ pub(super) fn document(work: &Work) -> serde_json::Value {
             "position_sigma_max_mm": score.max * 1e3,
         })
     };
-    let parameters = proposal.sight.free().iter().enumerate().map(|(k, parameter)| {
+    let parameters = proposal.jacobian.free().iter().enumerate().map(|(k, parameter)| {
         let (name, unit) = &work.parameters[*parameter];
         let sigma = |index: usize| sets.get(index).map(|(_, score)| unit.from_si(score.sigma[k]));
         json!({ "name": name, "unit": unit.symbol(), "sigma": sigma(0), "sigma_random": sigma(1), "sigma_recorded": sigma(2) })

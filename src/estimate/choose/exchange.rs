@@ -3,7 +3,7 @@
 //! Each term is a weighted log determinant over its own seen parameters, in coordinates in which the random candidates are
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
-use super::sight::{Sight, factor, product};
+use super::point_jacobian::{PointJacobian, factor, product};
 use crate::estimate::factor::Factor;
 use crate::estimate::model::Model;
 use crate::estimate::triangle::axpy;
@@ -22,7 +22,7 @@ const WORTH: f64 = 1e-6;
 /// A weighted log determinant.
 pub(super) struct Term {
     weight: f64,
-    sight: Sight,
+    jacobian: PointJacobian,
     /// Upper triangular: makes the random candidates round, or what is known before.
     round: Mat<f64>,
     /// Information in every direction before the first pose, in these coordinates.
@@ -36,22 +36,22 @@ pub(super) struct Criterion {
 
 impl Term {
     /// `None` where the candidates do not tell the parameters.
-    pub fn new(weight: f64, sight: Sight, model: &Model, drawn: &Measurements) -> Option<Self> {
+    pub fn new(weight: f64, jacobian: PointJacobian, model: &Model, drawn: &Measurements) -> Option<Self> {
         let scale = (drawn.rows() as f64).sqrt();
-        let inverse = factor(&sight.rows(model, drawn)).inverse()?;
+        let inverse = factor(&jacobian.rows(model, drawn)).inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j) * scale);
-        Some(Self { weight, sight, round, ridge: RIDGE })
+        Some(Self { weight, jacobian, round, ridge: RIDGE })
     }
 
     /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
-    pub fn beside(weight: f64, sight: Sight, known: &Factor) -> Option<Self> {
+    pub fn beside(weight: f64, jacobian: PointJacobian, known: &Factor) -> Option<Self> {
         let inverse = known.inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
-        Some(Self { weight, sight, round, ridge: 1.0 })
+        Some(Self { weight, jacobian, round, ridge: 1.0 })
     }
 
     fn state(&self, model: &Model, pool: &Measurements) -> State {
-        let rows = product(self.sight.rows(model, pool).as_ref(), self.round.as_ref());
+        let rows = product(self.jacobian.rows(model, pool).as_ref(), self.round.as_ref());
         let (p, spread) = (self.round.ncols(), vec![[0.0; 6]; pool.rows()]);
         State { weight: self.weight, p, ridge: self.ridge, rows, cover: Mat::zeros(0, 0), spread }
     }

@@ -4,13 +4,13 @@
 //! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
 //! fitted, ln |M| - ln |M without the effect|. Only seen parameters count, so redundant ones change nothing.
 
-mod drive;
 mod exchange;
-mod sight;
+mod point_jacobian;
 mod site;
 mod tell;
+mod visit_order;
 
-pub use sight::{Score, Sight};
+pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
 
@@ -18,10 +18,10 @@ use super::model::Model;
 use crate::robot::{Measurements, Named};
 use crate::statistics::nearest;
 use exchange::{Criterion, Term};
+use point_jacobian::gather;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use sight::gather;
 
 /// What the poses are for.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ pub struct Proposal {
     /// Least share, over the joints, of an error by direction of approach that no seen parameter imitates.
     pub approach_seen: f64,
     /// Parameters that poses can tell, last the effects to separate.
-    pub sight: Sight,
+    pub jacobian: PointJacobian,
     pub score: Score,
     /// The same for random sets of as many poses.
     pub random: Vec<Score>,
@@ -100,10 +100,11 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
             vec![(2.0, [&rest[..], &b, &a].concat()), (-1.0, [&rest[..], &b].concat()), (-1.0, [&rest[..], &a].concat())]
         }
     };
-    let sights: Vec<(f64, Sight)> = orders.iter().map(|(weight, order)| (*weight, Sight::of(&model, &drawn, order))).collect();
-    let Some((_, whole)) = sights.first() else { return Err("nothing to choose for".into()) };
-    check(wish, &sights, whole)?;
-    let terms = sights.iter().map(|(weight, sight)| Term::new(*weight, sight.clone(), &model, &drawn));
+    let jacobians: Vec<(f64, PointJacobian)> =
+        orders.iter().map(|(weight, order)| (*weight, PointJacobian::of(&model, &drawn, order))).collect();
+    let Some((_, whole)) = jacobians.first() else { return Err("nothing to choose for".into()) };
+    check(wish, &jacobians, whole)?;
+    let terms = jacobians.iter().map(|(weight, jacobian)| Term::new(*weight, jacobian.clone(), &model, &drawn));
     let criterion = Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidates do not tell the parameters apart")? };
 
     let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
@@ -114,10 +115,10 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
         let start: Vec<usize> = (0..wish.count).collect();
         poses = subset(&pool, &criterion.exchange(&model, &pool, &start, wish.count));
     }
-    let mut poses = subset(&poses, &drive::order(&poses, &site.ranges));
+    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
     poses.position = model.predict(&poses);
     let whole = whole.clone();
-    let (direction, approach_seen) = drive::approach(&model, &whole, &poses, wish.seed);
+    let (direction, approach_seen) = visit_order::approach(&model, &whole, &poses, wish.seed);
 
     let sets = random_sets(&drawn, wish.count, wish.seed);
     let (rows, around) = (whole.rows(&model, &drawn), whole.rows(&model, &workspace));
@@ -127,7 +128,7 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
         Aim::Information => Vec::new(),
         Aim::Separation(names) => separations(&model, names, &drawn, &poses, &sets)?,
     };
-    Ok(Proposal { poses, direction, approach_seen, sight: whole, score, random, separation, workspace })
+    Ok(Proposal { poses, direction, approach_seen, jacobian: whole, score, random, separation, workspace })
 }
 
 /// Positions in the stack of an effect's parameters.
@@ -136,7 +137,7 @@ fn parameters(model: &Model, name: &str) -> Result<Vec<usize>, String> {
     found.map(|(_, range)| range.collect()).ok_or_else(|| format!("`{name}` is not among the effects of this model"))
 }
 
-fn check(wish: &Wish, sights: &[(f64, Sight)], whole: &Sight) -> Result<(), String> {
+fn check(wish: &Wish, jacobians: &[(f64, PointJacobian)], whole: &PointJacobian) -> Result<(), String> {
     let parameters = whole.free().len();
     if parameters == 0 {
         return Err("no parameter of these effects shows at the allowed poses".into());
@@ -149,7 +150,7 @@ fn check(wish: &Wish, sights: &[(f64, Sight)], whole: &Sight) -> Result<(), Stri
         ));
     }
     if let Aim::Separation([a, b]) = &wish.aim {
-        for ((_, without), (effect, rival)) in sights.iter().skip(1).zip([(a, b), (b, a)]) {
+        for ((_, without), (effect, rival)) in jacobians.iter().skip(1).zip([(a, b), (b, a)]) {
             if without.free().len() == parameters {
                 return Err(format!(
                     "no allowed pose tells `{effect}` from `{rival}` and the other effects: more payloads, wider limits or fewer effects may"
@@ -171,11 +172,12 @@ fn separations(
     for (effect, rival) in [(a, b), (b, a)] {
         let (own, other) = (parameters(model, effect)?, parameters(model, rival)?);
         let rest: Vec<usize> = (0..model.stack.specs().len()).filter(|k| !own.contains(k) && !other.contains(k)).collect();
-        let sight = Sight::of(model, drawn, &[&rest[..], &other, &own].concat());
-        let told: Vec<usize> = sight.free().iter().copied().filter(|k| own.contains(k)).collect();
-        let (log, sigma) = sight.remainder(&sight.rows(model, poses), told.len());
-        let rows = sight.rows(model, drawn);
-        let random: Vec<(f64, Vec<f64>)> = sets.par_iter().map(|set| sight.remainder(&gather(&rows, set), told.len())).collect();
+        let jacobian = PointJacobian::of(model, drawn, &[&rest[..], &other, &own].concat());
+        let told: Vec<usize> = jacobian.free().iter().copied().filter(|k| own.contains(k)).collect();
+        let (log, sigma) = jacobian.remainder(&jacobian.rows(model, poses), told.len());
+        let rows = jacobian.rows(model, drawn);
+        let random: Vec<(f64, Vec<f64>)> =
+            sets.par_iter().map(|set| jacobian.remainder(&gather(&rows, set), told.len())).collect();
         let usual = median(random.iter().map(|(log, _)| *log).collect());
         let sigma = told
             .iter()

@@ -5,9 +5,9 @@
 //! ln(1 + L) as large as possible.
 
 use super::exchange::{Criterion, Term};
-use super::sight::{Sight, factor, gather};
+use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::{Circumstances, Site};
-use super::{STEPS, Wish, drive, median, random_sets, subset};
+use super::{STEPS, Wish, median, random_sets, subset, visit_order};
 use crate::estimate::factor::Factor;
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
@@ -63,9 +63,9 @@ const NOTHING: f64 = 1e-6;
 
 /// One explanation as the truth, the other fitted.
 struct View {
-    sight: Sight,
+    jacobian: PointJacobian,
     /// The same without the true one's column.
-    rest: Sight,
+    rest: PointJacobian,
     known: Factor,
 }
 
@@ -75,11 +75,11 @@ impl View {
         let more = other.parameters.iter().filter(|k| !contest.nuisances.contains(k));
         let free: Vec<usize> = contest.nuisances.iter().chain(more).copied().collect();
         let sized = side.parameters.iter().copied().zip(side.sizes.iter().copied()).collect();
-        let sight = Sight::given(&contest.model, free.clone(), sized);
-        let seen = gather(&sight.rows(&contest.model, data), rows);
+        let jacobian = PointJacobian::given(&contest.model, free.clone(), sized);
+        let seen = gather(&jacobian.rows(&contest.model, data), rows);
         // One prior sigma of every parameter, and one of L, keep what no row tells apart from being nothing.
         let known = factor(&stacked(&Mat::identity(seen.ncols(), seen.ncols()), &seen));
-        Self { sight, rest: Sight::given(&contest.model, free, Vec::new()), known }
+        Self { jacobian, rest: PointJacobian::given(&contest.model, free, Vec::new()), known }
     }
 
     /// L of the recorded rows and these.
@@ -94,7 +94,7 @@ impl View {
     fn terms(&self) -> Option<[Term; 2]> {
         let all: Vec<usize> = (0..self.known.parameters() - 1).collect();
         let rest = self.known.select(&all);
-        Some([Term::beside(1.0, self.sight.clone(), &self.known)?, Term::beside(-1.0, self.rest.clone(), &rest)?])
+        Some([Term::beside(1.0, self.jacobian.clone(), &self.known)?, Term::beside(-1.0, self.rest.clone(), &rest)?])
     }
 }
 
@@ -114,11 +114,11 @@ pub fn tell(
     }
     circumstances.complete(&mut drawn, &mut draw);
     let views = [0, 1].map(|truth| View::of(contest, truth, data, rows));
-    let all: Vec<Mat<f64>> = views.iter().map(|view| view.sight.rows(model, &drawn)).collect();
+    let all: Vec<Mat<f64>> = views.iter().map(|view| view.jacobian.rows(model, &drawn)).collect();
     let before = [0, 1].map(|truth| views[truth].separation(&Mat::zeros(0, all[truth].ncols())));
     let alike = [0, 1].map(|truth| {
         let whole = |rows: &Mat<f64>| rows.col(rows.ncols() - 1).squared_norm_l2();
-        let seen = gather(&views[truth].sight.rows(model, data), rows);
+        let seen = gather(&views[truth].jacobian.rows(model, data), rows);
         before[truth] < TOLD && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
     });
     if alike == [true; 2] {
@@ -135,12 +135,12 @@ pub fn tell(
         let start: Vec<usize> = (0..wish.count).collect();
         poses = subset(&pool, &criterion.exchange(model, &pool, &start, wish.count));
     }
-    let mut poses = subset(&poses, &drive::order(&poses, &site.ranges));
-    let separations = |poses: &Measurements| [0, 1].map(|k: usize| views[k].separation(&views[k].sight.rows(model, poses)));
+    let mut poses = subset(&poses, &visit_order::order(&poses, &site.ranges));
+    let separations = |poses: &Measurements| [0, 1].map(|k: usize| views[k].separation(&views[k].jacobian.rows(model, poses)));
     let mut after = separations(&poses);
     // Where the side of approach says nothing of the two, it is chosen so that it may say something of others.
-    let seen = Sight::of(model, &drawn, &contest.nuisances);
-    let (direction, approach_seen) = drive::approach(model, &seen, &poses, wish.seed);
+    let seen = PointJacobian::of(model, &drawn, &contest.nuisances);
+    let (direction, approach_seen) = visit_order::approach(model, &seen, &poses, wish.seed);
     let turned = Measurements { direction: Some(direction), ..poses.clone() };
     let other = separations(&turned);
     if (0..2).all(|k| other[k] >= after[k] * (1.0 - NOTHING)) {

@@ -10,7 +10,7 @@ mod tail;
 
 pub use kind::Kind;
 
-use super::fit::{Fate, FitOptions, Fitted, fit};
+use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
@@ -145,8 +145,9 @@ fn screen(
     held: &BTreeSet<usize>,
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
-    let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
-    let problem = Problem { data, rows: kept, unmodelled: fitted.beyond() };
+    let free: Vec<usize> =
+        (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
+    let problem = Problem { data, rows: kept, unmodelled: fitted.excess() };
     let mut standings = leave_one_out(&problem, model, &free);
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);

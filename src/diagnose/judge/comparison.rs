@@ -1,0 +1,20 @@
+//! What models with other causes are compared by.
+
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::{FitState, Fitter};
+use crate::effect::Survey;
+
+/// The pool in which causes are, and the fitter that tries them.
+pub(crate) struct ModelComparison<'a, 'b> {
+    pub pool: &'b CachedHypotheses<'a>,
+    pub survey: &'b Survey<'a>,
+    pub fitter: &'b Fitter<'b>,
+}
+
+impl ModelComparison<'_, '_> {
+    /// The fit without some of the causes, by their positions.
+    pub(super) fn without(&self, now: &FitState, members: &[usize]) -> FitState {
+        let all = now.causes.iter().enumerate();
+        self.fitter.fit(&now.model, all.filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone()).collect())
+    }
+}

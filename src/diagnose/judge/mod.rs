@@ -1,0 +1,29 @@
+//! Held-out rows and the fit of the whole model judge what a search found: it saw a linear picture of the rows to fit.
+
+mod comparison;
+mod exchange;
+mod held_out;
+mod withdraw;
+
+pub(crate) use comparison::ModelComparison;
+pub(crate) use held_out::HoldoutGain;
+
+use super::round::FitState;
+
+/// What stands of the causes that were found.
+pub(crate) struct Judged {
+    pub state: FitState,
+    /// The causes' positions in the pool, in their order.
+    pub set: Vec<usize>,
+    pub gains: Vec<HoldoutGain>,
+    /// What was found and taken back, a sentence each.
+    pub withdrawn: Vec<String>,
+}
+
+/// Exchanges causes that do not carry over to held-out rows, and takes back those that cannot stand; `set` holds the causes' positions in
+/// the pool, in their order.
+pub(crate) fn judge(state: FitState, mut set: Vec<usize>, comparison: &ModelComparison) -> Judged {
+    let (state, mut gains) = exchange::exchange(state, &mut set, comparison);
+    let (state, withdrawn) = withdraw::withdraw(state, &mut set, &mut gains, comparison);
+    Judged { state, set, gains, withdrawn }
+}

@@ -1,0 +1,202 @@
+//! Findings that the last fit leaves without size, or that make held-out rows worse, are taken back, and the model is fitted
+//! without them: the search judges a linear picture of each, the fit the whole model.
+
+use super::comparison::ModelComparison;
+use super::held_out::{HeldOutErrors, HoldoutGain};
+use crate::diagnose::round::FitState;
+use crate::diagnose::words::{FindingGroups, groups};
+use crate::effect::Effect;
+use crate::estimate::ParameterStatus;
+
+/// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool
+/// in their order, `gains` what held-out rows say of them.
+pub(super) fn withdraw(
+    mut now: FitState,
+    set: &mut Vec<usize>,
+    gains: &mut Vec<HoldoutGain>,
+    comparison: &ModelComparison,
+) -> (FitState, Vec<String>) {
+    let mut said = Vec::new();
+    if now.screening.apart.is_some() {
+        return (now, said);
+    }
+    while let Some((gone, sentence, state)) = empty(&now, set, comparison).or_else(|| harmful(&now, set, gains, comparison)) {
+        let kept = |i: &usize| !gone.contains(i);
+        *set = (0..set.len()).filter(kept).map(|i| set[i]).collect();
+        said.push(sentence);
+        now = state;
+    }
+    (now, said)
+}
+
+/// The finding that was not estimated, else the weakest of those that are smaller than their own uncertainty.
+fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<(Vec<usize>, String, FitState)> {
+    let strength = |members: &[usize]| -> Option<f64> {
+        let own = members.iter().flat_map(|i| now.ranges[*i].clone());
+        let free: Vec<usize> = own.filter(|k| matches!(now.fitted.statuses[*k], ParameterStatus::Free(_))).collect();
+        if free.is_empty() {
+            return Some(0.0);
+        }
+        let values: Vec<f64> = free.iter().map(|k| now.model.x[*k]).collect();
+        let square = now.fitted.covariance.as_ref()?.distance(&free, &values)?;
+        Some(square / free.len() as f64)
+    };
+    let groups = groups(now, set, comparison.pool, comparison.survey);
+    let weak = groups.into_iter().filter_map(|(key, members)| Some((strength(&members)?, key, members)));
+    let (size, (effect, place), members) = weak.filter(|(size, ..)| *size < 1.0).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let why = if size == 0.0 {
+        "these data do not tell it from the rest of the model"
+    } else {
+        "in the whole model it is smaller than its own uncertainty"
+    };
+    let state = comparison.without(now, &members);
+    Some((members, format!("{effect} at {place}: {why}"), state))
+}
+
+/// The finding without which held-out rows are better beyond their scatter, of those that do no good there or were not asked alone.
+fn harmful(
+    now: &FitState,
+    set: &[usize],
+    gains: &mut Vec<HoldoutGain>,
+    comparison: &ModelComparison,
+) -> Option<(Vec<usize>, String, FitState)> {
+    let seen = HeldOutErrors::of(now, comparison.fitter)?;
+    let groups: FindingGroups = groups(now, set, comparison.pool, comparison.survey);
+    for ((effect, place), members) in groups {
+        let names: Vec<&'static str> = members.iter().map(|i| comparison.pool.hypotheses[set[*i]].form.name()).collect();
+        let same = names.iter().all(|name| *name == names[0]);
+        let known = gains.iter_mut().find(|known| same && known.effect == names[0] && known.place == place);
+        if known.as_ref().is_some_and(|known| known.gain >= 0.0) {
+            continue;
+        }
+        let state = comparison.without(now, &members);
+        let bare = HeldOutErrors::of(&state, comparison.fitter)?;
+        if bare.is_beyond_doubt_better_than(&seen) {
+            return Some((members, format!("{effect} at {place}: held-out points are better without it"), state));
+        }
+        match known {
+            Some(known) => known.gain = bare.rms() - seen.rms(),
+            None if same => gains.push(HoldoutGain { effect: names[0], place, gain: bare.rms() - seen.rms() }),
+            None => (),
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
+    use crate::diagnose::round::{EstimatedCause, Fitter};
+    use crate::diagnose::types::Question;
+    use crate::diagnose::whitened::WhitenedProblem;
+    use crate::effect::{EffectStack, Form, GearCyclic, Survey, hypotheses};
+    use crate::estimate::Model;
+    use crate::robot::import::{Text, read_calib};
+    use crate::robot::{Measurements, RobotModel};
+    use crate::spatial::Pose;
+    use nalgebra::Vector3;
+
+    const ROBOT: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+    - {axis: [0, 1, 0], point: [0, 0, 900]}
+    - {axis: [1, 0, 0], point: [500, 0, 900]}
+    - {axis: [0, 1, 0], point: [700, 0, 900]}
+    - {axis: [1, 0, 0], point: [700, 0, 900]}
+tool: {point: [830, 140, 930]}
+joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
+";
+    const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+    const ROWS: usize = 200;
+    const FITTED: usize = 140;
+
+    /// Numbers in [0, 1) without a pattern that a model could follow.
+    fn scattered(k: usize) -> f64 {
+        (k as f64 * 0.618_033_988_749_895 + (k as f64 * 0.317).sin() * 41.7).rem_euclid(1.0)
+    }
+
+    /// Poses of which gears make points: order 2 of joint 2 by 60 arcsec everywhere, order 3 of joint 4 in fitted rows by `passing`.
+    fn recorded(robot: &RobotModel, passing: f64) -> Measurements {
+        let forms = [GearCyclic::term(1, 2, false), GearCyclic::term(3, 3, false)];
+        let effects = forms.into_iter().map(|gear| Box::new(Form::from(gear)) as _).collect();
+        let mut truth = Model::nominal(robot.clone(), EffectStack::new(robot, Pose::identity(), effects));
+        let mut data = Measurements {
+            joints: 6,
+            q: (0..6 * ROWS).map(|k| 3.0 * scattered(k + 7) - 1.5).collect(),
+            position: vec![Vector3::zeros(); ROWS],
+            sigma: vec![Vector3::repeat(2e-5); ROWS],
+            payload: (0..ROWS).map(|row| if row % 7 < 3 { 10.0 } else { 0.0 }).collect(),
+            ..Measurements::default()
+        };
+        let predicted = |x: [f64; 4], truth: &mut Model| {
+            truth.x = x.map(|size| size * ARCSEC).to_vec();
+            truth.predict(&data)
+        };
+        let (seen, held) = (predicted([60.0, 0.0, passing, 0.0], &mut truth), predicted([60.0, 0.0, 0.0, 0.0], &mut truth));
+        let noise = |row: usize| Vector3::from_fn(|axis, _| 7e-5 * (scattered(3 * row + axis + 5000) - 0.5));
+        data.position = (0..ROWS).map(|row| if row < FITTED { seen[row] } else { held[row] } + noise(row)).collect();
+        data
+    }
+
+    /// What stays of the chosen causes, and what is said of the others.
+    fn left(passing: f64, keys: &[&str]) -> (Vec<String>, Vec<String>) {
+        let text = Text { label: "robot.yaml", text: ROBOT };
+        let robot = RobotModel::new(read_calib(text, None).expect("a robot").robot);
+        let data = recorded(&robot, passing);
+        let rows: Vec<usize> = (0..ROWS).collect();
+        let (fit, validate) = rows.split_at(FITTED);
+        let question = Question { robot: &robot, data: &data, fit, validate, set: &[0; ROWS], seed: 1 };
+        let (fitter, now) = Fitter::start(&question);
+        let problem = WhitenedProblem::new(&now.model, &data, fit.to_vec());
+        // So that a payload is proposed at all.
+        let (torque, compliance) = (problem.torques(), vec![1e-6; 6]);
+        let survey = Survey::new(&robot, &data, fit, &torque, &compliance);
+        let (jacobian, all) = (problem.jacobian(fitter.free()), hypotheses(&survey));
+        let pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &problem.residual, 1.0, all));
+        let at = |key: &&str| pool.keys.iter().position(|other| other == key).unwrap_or_else(|| panic!("{key}: {:?}", pool.keys));
+        let mut set: Vec<usize> = keys.iter().map(at).collect();
+        let causes: Vec<EstimatedCause> = (set.iter())
+            .map(|k| {
+                let form = pool.hypotheses[*k].form.clone();
+                EstimatedCause { coefficients: vec![0.0; form.parameters(&robot).len()], form, priors: Vec::new() }
+            })
+            .collect();
+        let comparison = ModelComparison { pool: &pool, survey: &survey, fitter: &fitter };
+        let (last, said) = withdraw(fitter.fit(&now.model, causes), &mut set, &mut Vec::new(), &comparison);
+        let kept: Vec<String> = set.iter().map(|k| pool.keys[*k].clone()).collect();
+        let in_model: Vec<String> = last.model.stack.effects().filter_map(|(effect, _)| effect.form()).map(Form::key).collect();
+        assert_eq!(kept, in_model);
+        (kept, said)
+    }
+
+    const TRUE: &str = "gear_cyclic@joint 2#order2";
+    const PASSING: &str = "gear_cyclic@joint 4#order3";
+    const PAYLOAD: &str = "payload_error@tool#";
+
+    #[test]
+    fn what_the_data_do_not_tell_from_the_rest_is_taken_back() {
+        // Without a joint that yields a payload moves nothing.
+        let (kept, said) = left(0.0, &[TRUE, PAYLOAD]);
+        assert_eq!(kept, [TRUE]);
+        assert_eq!(said, ["payload_error at tool: these data do not tell it from the rest of the model"]);
+    }
+
+    #[test]
+    fn what_makes_held_out_rows_worse_is_taken_back() {
+        let (kept, said) = left(90.0, &[TRUE, PASSING]);
+        assert_eq!(
+            (kept, said),
+            (vec![TRUE.to_string()], vec!["gear_cyclic at joint 4: held-out points are better without it".to_string()])
+        );
+    }
+
+    #[test]
+    fn what_is_there_stays() {
+        assert_eq!(left(0.0, &[TRUE]), (vec![TRUE.to_string()], Vec::new()));
+    }
+}

@@ -1,0 +1,62 @@
+//! What a model leaves of the rows, against their noise.
+
+use super::types::Question;
+use crate::estimate::{Screening, Weight};
+use crate::robot::Measurements;
+use nalgebra::Vector3;
+
+/// Sizes of what is left.
+pub(crate) struct Misfit {
+    /// Held-out rows that belong; where there are none, those that were fitted.
+    pub rows: Vec<usize>,
+    pub held_out: bool,
+    /// Length of the noise of `rows`, and of the instrument's alone, rms, m.
+    pub noise_floor: f64,
+    pub instrument: f64,
+    /// Rms length of what is left at fitted rows, m, and reduced chi-square there.
+    pub leftover_rms: f64,
+    pub chi_square: f64,
+    /// Whether held-out rows are off by more than what was fitted and the noise allow.
+    pub not_carried: bool,
+}
+
+/// A residual this much larger than the noise is not explained.
+pub(crate) const TOO_LOUD: f64 = 2.5;
+
+impl Misfit {
+    /// Of a model that predicts these points, with so many parameters estimated.
+    pub fn of(
+        question: &Question,
+        data: &Measurements,
+        screening: &Screening,
+        predicted: &[Vector3<f64>],
+        parameters: usize,
+    ) -> Self {
+        let aside: Vec<usize> = screening.suspects.iter().filter(|s| !s.used()).map(|s| s.row).collect();
+        let judges: Vec<usize> = question.validate.iter().copied().filter(|row| !aside.contains(row)).collect();
+        let held_out = !judges.is_empty();
+        let kept = &screening.kept;
+        let rms = |rows: &[usize], length: &dyn Fn(usize) -> f64| {
+            (rows.iter().map(|row| length(*row).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt()
+        };
+        let whitened = |rows: &[usize]| -> f64 {
+            rows.iter()
+                .map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared())
+                .sum()
+        };
+        let freedom = (3 * kept.len()).saturating_sub(parameters).max(1) as f64;
+        // Points that were not fitted also see the errors of what was.
+        let inflation = 1.0 + parameters as f64 / freedom;
+        let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
+        let rows = if held_out { judges } else { kept.clone() };
+        Self {
+            held_out,
+            noise_floor: rms(&rows, &|row| data.noise(row)),
+            instrument: rms(&rows, &|row| data.sigma[row].norm()),
+            leftover_rms: rms(kept, &|row| (data.position[row] - predicted[row]).norm()),
+            chi_square: whitened(kept) / freedom,
+            not_carried,
+            rows,
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The pool with what was computed of its sets: a search meets most of them more than once.
+
+use super::conditional::Conditional;
+use super::hypotheses::HypothesisSet;
+use super::solve::{Solution, solve};
+use crate::effect::{Form, Hypothesis};
+use faer::Mat;
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Hypotheses, the criterion of sets of them, and the problem with sets of them estimated.
+pub(crate) struct CachedHypotheses<'a> {
+    pool: HypothesisSet<'a>,
+    products: Mutex<Products>,
+    scores: Mutex<HashMap<Vec<usize>, f64>>,
+    conditionals: Mutex<HashMap<Vec<usize>, Arc<Conditional>>>,
+}
+
+/// Products of the columns of pairs of hypotheses: sets share most of their pairs.
+type Products = HashMap<(usize, usize), Arc<Mat<f64>>>;
+
+impl<'a> From<HypothesisSet<'a>> for CachedHypotheses<'a> {
+    fn from(pool: HypothesisSet<'a>) -> Self {
+        Self { pool, products: Mutex::default(), scores: Mutex::default(), conditionals: Mutex::default() }
+    }
+}
+
+impl<'a> Deref for CachedHypotheses<'a> {
+    type Target = HypothesisSet<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.pool
+    }
+}
+
+impl CachedHypotheses<'_> {
+    /// Takes more hypotheses; returns the position of the first.
+    pub fn add(&mut self, hypotheses: Vec<Hypothesis>) -> usize {
+        // What each of the others would gain knows nothing of the new ones.
+        lock(&self.conditionals).clear();
+        self.pool.add(hypotheses)
+    }
+
+    fn products(&self, a: usize, b: usize) -> Arc<Mat<f64>> {
+        if let Some(products) = lock(&self.products).get(&(a, b)) {
+            return products.clone();
+        }
+        let products = Arc::new(self.pool.products(a, b));
+        lock(&self.products).insert((a, b), products.clone());
+        products
+    }
+
+    /// Estimates a set of hypotheses together, beside the base model.
+    pub fn solve(&self, set: &[usize]) -> Solution {
+        solve(&self.pool, set, self.gram_of(set, |a, b| self.products(a, b)))
+    }
+
+    /// Coefficients of every member of a set.
+    pub fn coefficients(&self, set: &[usize]) -> Vec<Vec<f64>> {
+        let mut all = self.solve(set).coefficients.into_iter();
+        set.iter().map(|k| all.by_ref().take(self.first[k + 1] - self.first[*k]).collect()).collect()
+    }
+
+    /// The members of a set with their coefficients.
+    pub fn estimated(&self, set: &[usize]) -> Vec<(Form, Vec<f64>)> {
+        set.iter().map(|k| self.hypotheses[*k].form.clone()).zip(self.coefficients(set)).collect()
+    }
+
+    /// The problem with the hypotheses of a set estimated beside the base model.
+    pub fn given(&self, set: &[usize]) -> Arc<Conditional> {
+        if let Some(conditional) = lock(&self.conditionals).get(set) {
+            return conditional.clone();
+        }
+        let conditional = Arc::new(Conditional::of(&self.pool, set));
+        lock(&self.conditionals).insert(set.to_vec(), conditional.clone());
+        conditional
+    }
+
+    /// Drops remembered conditional problems but those of `keep`.
+    pub fn forget(&self, keep: &[Vec<usize>]) {
+        lock(&self.conditionals).retain(|set, _| set.is_empty() || keep.contains(set));
+    }
+
+    /// The criterion of a set; infinite where its members make no sense together.
+    pub fn bic(&self, set: &[usize]) -> f64 {
+        if let Some(score) = lock(&self.scores).get(set) {
+            return *score;
+        }
+        let score = if self.is_sound(set) { self.criterion(set, &self.solve(set)) } else { f64::INFINITY };
+        lock(&self.scores).insert(set.to_vec(), score);
+        score
+    }
+}
+
+/// Remembered results stay right whoever panicked.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

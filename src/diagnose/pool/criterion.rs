@@ -1,0 +1,42 @@
+//! The criterion by which sets of hypotheses are compared: Bayesian information, the prior, and what physics forbids.
+
+use super::hypotheses::HypothesisSet;
+use super::solve::Solution;
+use crate::effect::{Effect, Hypothesis};
+
+/// Explanations whose criterion is this close fit equally well (Kass and Raftery, 1995).
+pub(crate) const EQUIVALENT: f64 = 6.0;
+
+/// -2 ln of the odds of a sign or size that physics forbids.
+const IMPLAUSIBLE: f64 = 40.0;
+
+/// Fall of the criterion by `rank` more parameters that lower the squared residual by `gain`.
+pub(super) fn fall(n: f64, square: f64, gain: f64, rank: usize, prior_penalty: f64) -> f64 {
+    n * (square / (square - gain).max(1e-300)).ln() - n.ln() * rank as f64 - prior_penalty
+}
+
+impl HypothesisSet<'_> {
+    /// Whether all members of a set make sense together.
+    pub(super) fn is_sound(&self, set: &[usize]) -> bool {
+        let yields = |k: &usize| matches!(self.hypotheses[*k].form.name(), "joint_compliance" | "joint_hardening");
+        !set.iter().any(|k| self.of_torque_model[*k]) || set.iter().any(yields)
+    }
+
+    /// Bayesian information criterion of a set with the prior's penalties; implausible signs and sizes are penalised too.
+    pub(super) fn criterion(&self, set: &[usize], solution: &Solution) -> f64 {
+        let n = self.effective_rows;
+        let rest = (self.square - solution.gain).max(1e-300);
+        let penalties: f64 = set.iter().map(|k| self.prior_penalty[*k]).sum();
+        n * (rest / n).ln() + n.ln() * solution.rank as f64 + penalties + self.sign_penalty(set, solution)
+    }
+
+    /// Penalty for every coefficient that has the wrong sign or is too large, by more than two standard errors.
+    fn sign_penalty(&self, set: &[usize], solution: &Solution) -> f64 {
+        let columns = set.iter().flat_map(|k| (self.first[*k]..self.first[*k + 1]).map(move |_| *k));
+        let wrong = columns.zip(solution.coefficients.iter().zip(&solution.errors)).filter(|(k, (value, error))| {
+            let Hypothesis { positive, largest, .. } = &self.hypotheses[*k];
+            (*positive && **value < -2.0 * **error) || value.abs() - 2.0 * **error > *largest
+        });
+        IMPLAUSIBLE * wrong.count() as f64
+    }
+}

@@ -1,0 +1,88 @@
+//! Dense linear algebra on columns that are stored one after another.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+/// What is left of a squared column of unit length below this is rounding and second order, not sight.
+pub(super) const INVISIBLE: f64 = 1e-6;
+
+/// An orthonormal basis of the columns of `matrix`, which are scaled to unit length first.
+pub(crate) fn orthonormal(matrix: &Mat<f64>) -> Mat<f64> {
+    let norm = |j: usize| matrix.col(j).norm_l2().max(1e-300);
+    let scale: Vec<f64> = (0..matrix.ncols()).map(norm).collect();
+    let scaled = Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] / scale[j]);
+    scaled.qr().compute_thin_Q()
+}
+
+/// Removes from columns (one after another) what lies in the span of an orthonormal basis.
+pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
+    let rows = basis.nrows();
+    let count = columns.len() / rows.max(1);
+    if basis.ncols() == 0 || count == 0 {
+        return;
+    }
+    let mut share = Mat::zeros(basis.ncols(), count);
+    let mut columns = MatMut::from_column_major_slice_mut(columns, rows, count);
+    matmul(share.as_mut(), Accum::Replace, basis.transpose(), columns.as_ref(), 1.0, Par::Seq);
+    matmul(columns.as_mut(), Accum::Add, basis, share.as_ref(), -1.0, Par::Seq);
+}
+
+/// Gram matrix of some columns, row by row.
+pub(super) fn gram(columns: &[&[f64]]) -> Vec<f64> {
+    let q = columns.len();
+    let mut gram = vec![0.0; q * q];
+    for i in 0..q {
+        for j in 0..=i {
+            gram[i * q + j] = dot(columns[i], columns[j]);
+            gram[j * q + i] = gram[i * q + j];
+        }
+    }
+    gram
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Four sums: the compiler may not reorder one.
+    let (mut sums, chunks) = ([0.0; 4], a.len() / 4);
+    for k in 0..chunks {
+        for lane in 0..4 {
+            sums[lane] += a[4 * k + lane] * b[4 * k + lane];
+        }
+    }
+    let tail: f64 = (4 * chunks..a.len()).map(|k| a[k] * b[k]).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + tail
+}
+
+/// A column of a matrix, which are stored one after another.
+pub(super) fn column(matrix: &Mat<f64>, k: usize) -> &[f64] {
+    matrix.col(k).try_as_col_major().map_or(&[], |column| column.as_slice())
+}
+
+/// Columns that are made orthonormal at once.
+const BLOCK: usize = 16;
+
+/// Orthonormal basis of columns of `rows` entries and about unit length; what is below [`INVISIBLE`] is left out.
+pub(super) fn span(columns: &[&[f64]], rows: usize) -> Mat<f64> {
+    let mut basis: Vec<f64> = Vec::with_capacity(columns.len() * rows);
+    for block in columns.chunks(BLOCK) {
+        let mut rest: Vec<f64> = block.iter().copied().flatten().copied().collect();
+        // Twice is enough (Giraud, Langou and Rozloznik, 2005).
+        for _ in 0..2 {
+            project(MatRef::from_column_major_slice(&basis, rows, basis.len() / rows), &mut rest);
+        }
+        let first = basis.len();
+        for column in rest.chunks_mut(rows) {
+            for _ in 0..2 {
+                for direction in basis[first..].chunks(rows) {
+                    let along = dot(column, direction);
+                    column.iter_mut().zip(direction).for_each(|(value, b)| *value -= along * b);
+                }
+            }
+            let size = dot(column, column);
+            if size > INVISIBLE {
+                let root = size.sqrt();
+                basis.extend(column.iter().map(|value| value / root));
+            }
+        }
+    }
+    MatRef::from_column_major_slice(&basis, rows, basis.len() / rows).to_owned()
+}

@@ -1,0 +1,19 @@
+//! The pool of hypotheses over one residual: their columns beside the base model, sets of them estimated, and what others would add.
+//!
+//! Sets are ascending lists of positions in the pool.
+
+mod cached;
+mod cholesky;
+mod conditional;
+mod criterion;
+mod hypotheses;
+mod linear;
+mod solve;
+
+pub(crate) use cached::CachedHypotheses;
+pub(crate) use cholesky::gain;
+pub(crate) use conditional::Conditional;
+pub(crate) use criterion::EQUIVALENT;
+pub(crate) use hypotheses::HypothesisSet;
+pub(crate) use linear::{dot, project};
+pub(crate) use solve::Solution;

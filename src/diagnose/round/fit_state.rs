@@ -1,0 +1,175 @@
+//! The model between rounds, and how it is fitted anew with other causes.
+
+use super::base_model::base_model;
+use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
+use crate::diagnose::types::{Question, Repeatability};
+use crate::diagnose::whitened::WhitenedProblem;
+use crate::effect::{BaseFrame, Effect, EffectStack, Form, Load, ParameterSpec, Setting, Term, whole};
+use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
+use crate::robot::{Measurements, RobotModel};
+use nalgebra::Matrix3;
+use std::ops::Range;
+
+/// A model with causes, fitted.
+pub(crate) struct FitState {
+    pub model: Model,
+    pub fitted: Fitted,
+    pub screening: Screening,
+    pub causes: Vec<EstimatedCause>,
+    /// Where in the model's parameters those of each cause are.
+    pub ranges: Vec<Range<usize>>,
+}
+
+/// A cause with its coefficients, and what is known of them beforehand.
+#[derive(Clone)]
+pub(crate) struct EstimatedCause {
+    pub form: Form,
+    pub coefficients: Vec<f64>,
+    pub priors: Vec<Prior>,
+}
+
+/// The scale of a curve's coefficients in medians of their size: twice that of normal ones.
+const TYPICAL: f64 = 2.0 * 1.4826;
+/// Cosines of a curve of less than two periods over its range are all but geometry, which alone carries on beyond the range: they are
+/// held down to this share.
+const SLOW: usize = 3;
+const GEOMETRY: f64 = 0.2;
+
+impl EstimatedCause {
+    /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or
+    /// between sparse points: most of them are of one size (empirical Bayes), and none is larger than is plausible.
+    pub fn shrunk(form: Form, robot: &RobotModel, coefficients: Vec<f64>) -> Self {
+        if !form.term().is_some_and(Term::is_own_curve) {
+            return Self { form, coefficients, priors: Vec::new() };
+        }
+        let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
+        let middle = sizes.len() / 2;
+        let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        let share = |k: usize| if k < SLOW { GEOMETRY } else { 1.0 };
+        let sigma =
+            |k: usize, spec: ParameterSpec| (share(k) * spec.prior_sigma.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
+        let specs = form.parameters(robot).into_iter().enumerate();
+        let priors = specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect();
+        Self { form, coefficients, priors }
+    }
+
+    /// Causes with their coefficients; what belongs to the torque model also with what the motor currents say of it.
+    pub fn all(problem: &WhitenedProblem, causes: Vec<(Form, Vec<f64>)>) -> Vec<Self> {
+        let of_torque_model: Vec<&Form> = causes.iter().map(|(form, _)| form).filter(|form| form.is_of_torque_model()).collect();
+        let mut by_currents = problem.priors_by_currents(&of_torque_model).into_iter();
+        let one = |(form, coefficients): (Form, Vec<f64>)| {
+            if !form.is_of_torque_model() {
+                return Self::shrunk(form, problem.robot, coefficients);
+            }
+            let priors = by_currents.by_ref().take(coefficients.len()).collect();
+            Self { form, coefficients, priors }
+        };
+        causes.into_iter().map(one).collect()
+    }
+}
+
+/// What fits stay the same in: the recording with its noise, and what of the base model is estimated.
+pub(crate) struct Fitter<'a> {
+    pub question: &'a Question<'a>,
+    /// The recording; its spread is what the joints' repeatability makes of each row.
+    pub data: Measurements,
+    /// Base parameters to estimate, all of them if `None`.
+    free: Option<Vec<usize>>,
+    pub repeatability: Repeatability,
+    /// Covariance of every row's point per squared joint deviation.
+    spread: Vec<Matrix3<f64>>,
+    /// Whether the repeatability is that of a residual.
+    asked: bool,
+}
+
+/// A repeatability that changes by less than this share is settled.
+const SETTLED: f64 = 0.25;
+
+impl<'a> Fitter<'a> {
+    /// The base model fitted, with the noise that repeats show.
+    pub fn start(question: &'a Question<'a>) -> (Self, FitState) {
+        let mut fitter = Self {
+            question,
+            data: question.data.clone(),
+            free: None,
+            repeatability: Repeatability { sigma: 0.0, repeats: 0 },
+            spread: Vec::new(),
+            asked: false,
+        };
+        let base = base_model(question.robot, &fitter.data, question.fit);
+        let mut now = fitter.fit(&base, Vec::new());
+        let statuses = &now.fitted.statuses;
+        fitter.free = Some((0..statuses.len()).filter(|k| matches!(statuses[*k], ParameterStatus::Free(_))).collect());
+        fitter.spread = spreads(&now.model, &fitter.data);
+        fitter.repeatability = from_repeats(&fitter.data, &now.screening.kept, &fitter.spread);
+        if fitter.repeatability.sigma > 0.0 {
+            fitter.data.spread = Some(scaled(&fitter.spread, fitter.repeatability.sigma));
+            now = fitter.fit(&base, Vec::new());
+        }
+        (fitter, now)
+    }
+
+    /// Base parameters that are estimated.
+    pub fn free(&self) -> &[usize] {
+        self.free.as_deref().unwrap_or_default()
+    }
+
+    /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
+    /// repeats are too few to tell.
+    pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
+        if self.asked || self.repeatability.repeats >= REPEATS {
+            return None;
+        }
+        let FitState { model, fitted, screening, .. } = settled;
+        let (now, other) = (self.repeatability.sigma, by_residual(model, fitted, &screening.kept, &self.data, &self.spread));
+        ((other - now).abs() > SETTLED * other.max(now)).then_some(other)
+    }
+
+    /// Takes the noise that a residual showed.
+    pub fn learn(&mut self, sigma: f64) {
+        self.asked = true;
+        self.repeatability.sigma = sigma;
+        self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
+    }
+
+    /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
+    pub fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
+        let (mut model, ranges) = with_causes(from, &causes);
+        let first = ranges.first().map_or(model.x.len(), |range| range.start);
+        let all: Vec<usize> = (0..first).collect();
+        let base = self.free.as_ref().unwrap_or(&all);
+        let candidates: Vec<usize> = base.iter().copied().chain(first..model.x.len()).collect();
+        let options = FitOptions { rows: self.question.fit, candidates: &candidates };
+        let (fitted, screening) = fit_screened(&mut model, &self.data, &options, self.question.set);
+        let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
+            coefficients: model.x[range.clone()].to_vec(),
+            ..cause
+        };
+        let causes = causes.into_iter().zip(&ranges).map(estimated).collect();
+        FitState { model, fitted, screening, causes, ranges }
+    }
+}
+
+/// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.
+fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Vec<Range<usize>>) {
+    // The base starts where it was found, so that its correction is too small to matter to what else moves it.
+    let setting = Setting { base: from.base(), load: Load::GravityTorque };
+    let base = || from.stack.effects().filter(|(effect, _)| effect.form().is_none());
+    let again = base().filter_map(|(effect, _)| whole(effect.name(), &setting));
+    let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);
+    let stack = EffectStack::new(&from.robot, setting.base, again.chain(own).collect());
+    let mut model = Model::nominal(from.robot.clone(), stack);
+    let stack = model.stack.clone();
+    for ((effect, range), (_, found)) in stack.effects().zip(base()).filter(|((effect, _), _)| effect.name() != BaseFrame::NAME) {
+        debug_assert!(effect.form().is_none());
+        model.x[range].copy_from_slice(&from.x[found]);
+    }
+    let ranges: Vec<Range<usize>> =
+        stack.effects().filter(|(effect, _)| effect.form().is_some()).map(|(_, range)| range).collect();
+    for (cause, range) in causes.iter().zip(&ranges) {
+        model.x[range.clone()].copy_from_slice(&cause.coefficients);
+        let priors = range.clone().zip(&cause.priors);
+        model.known.extend(priors.map(|(k, prior)| (k, Known { prior: Some(*prior), bounds: None })));
+    }
+    (model, ranges)
+}

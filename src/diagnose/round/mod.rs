@@ -1,0 +1,16 @@
+//! A round: the recording is looked at around the present model, which is then fitted anew with the causes that were found.
+
+mod base_model;
+mod fit_state;
+mod noise;
+mod progress;
+mod reversed_joints;
+mod stretches;
+mod view;
+
+pub use base_model::BASE;
+pub(crate) use fit_state::{EstimatedCause, FitState, Fitter};
+pub(crate) use noise::REPEATS;
+pub(crate) use progress::{Progress, Step};
+pub(crate) use reversed_joints::REVERSED;
+pub(crate) use view::{View, compliance};

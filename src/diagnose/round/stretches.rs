@@ -1,0 +1,48 @@
+//! Rows that say something of their own: which of them a search looks at, how many count as one, and where one pose ends.
+
+use crate::diagnose::whitened::WhitenedProblem;
+use crate::estimate::autocorrelation_time;
+use crate::robot::Measurements;
+
+/// Rows beyond this tell the search nothing new about which cause it is, and cost it time.
+const SEARCHED: usize = 800;
+/// Rows that count as fewer than this are independent; with fewer stretches than this signs by stretch say nothing.
+const ALONE: f64 = 1.2;
+const STRETCHES: usize = 40;
+
+/// Rows that the search looks at: all but the recording's first, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
+/// that keeps no step with any design of the recording; the model is fitted to all.
+pub(super) fn thinned(rows: &[usize]) -> Vec<usize> {
+    let rows = rows.strip_prefix(&[0]).unwrap_or(rows);
+    if rows.len() <= SEARCHED {
+        return rows.to_vec();
+    }
+    // Multiples of the golden ratio fill the unit interval evenly (Kuipers and Niederreiter, 1974).
+    let share = SEARCHED as f64 / rows.len() as f64;
+    let taken = |i: &usize| (*i as f64 * 0.618_033_988_749_895).fract() < share;
+    (0..rows.len()).filter(taken).map(|i| rows[i]).collect()
+}
+
+/// How many rows of a moving arm count as one, by what is left; of standing points each is one.
+pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
+    let rows = &problem.rows;
+    let time = if problem.data.in_motion(rows) { autocorrelation_time(problem.of_points(), 3) } else { 1.0 };
+    if time < ALONE { 1.0 } else { time.min(rows.len() as f64 / STRETCHES as f64).max(1.0) }
+}
+
+/// Poses of rows, numbered in order: repeats share one. Of a moving arm stretches beyond which what is left is forgotten.
+pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f64) -> Vec<usize> {
+    if autocorrelation_time > 1.0 {
+        let stretch = ((2.0 * autocorrelation_time).ceil() as usize).min(rows.len() / STRETCHES).max(1);
+        return (0..rows.len()).map(|i| i / stretch).collect();
+    }
+    let mut out = Vec::with_capacity(rows.len());
+    let mut number = 0;
+    for (i, row) in rows.iter().enumerate() {
+        if i > 0 && !data.same_pose(rows[i - 1], *row) {
+            number += 1;
+        }
+        out.push(number);
+    }
+    out
+}

@@ -1,0 +1,61 @@
+//! The recording around the present model, as a round looks at it.
+
+use super::fit_state::{EstimatedCause, FitState, Fitter};
+use super::stretches::{bounded_autocorrelation_time, poses, thinned};
+use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
+use crate::diagnose::whitened::WhitenedProblem;
+use crate::effect::{Survey, hypotheses};
+use crate::estimate::Model;
+
+/// What is left of the rows that a search looks at, and what moves it.
+pub(crate) struct View<'a> {
+    pub problem: WhitenedProblem<'a>,
+    /// Pose of each row.
+    pub pose: Vec<usize>,
+    autocorrelation_time: f64,
+    torque: Vec<f64>,
+    compliance: Vec<f64>,
+}
+
+impl<'a> View<'a> {
+    pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
+        let compliance = compliance(&now.model);
+        let mut problem = WhitenedProblem::new(&now.model, &fitter.data, thinned(&now.screening.kept));
+        if compliance.iter().any(|compliance| *compliance > 0.0) {
+            problem = problem.with_currents();
+        }
+        let autocorrelation_time = bounded_autocorrelation_time(&problem);
+        let pose = poses(&fitter.data, &problem.rows, autocorrelation_time);
+        Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }
+    }
+
+    pub fn survey(&self) -> Survey<'_> {
+        let WhitenedProblem { robot, data, rows, .. } = &self.problem;
+        Survey::new(robot, data, rows, &self.torque, &self.compliance)
+    }
+
+    /// The pool of all causes around the present model: the residual is that without them.
+    pub fn pool(&self, now: &FitState, fitter: &Fitter, survey: &Survey) -> CachedHypotheses<'_> {
+        let problem = &self.problem;
+        let jacobian = problem.jacobian(fitter.free());
+        let mut residual = problem.residual.clone();
+        for EstimatedCause { form, coefficients, .. } in &now.causes {
+            let columns = problem.columns(form);
+            for (column, coefficient) in columns.chunks(problem.residual_rows()).zip(coefficients) {
+                residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+            }
+        }
+        HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses(survey)).into()
+    }
+}
+
+/// How far each joint yields in a model, rad/Nm.
+pub(crate) fn compliance(model: &Model) -> Vec<f64> {
+    let mut out = vec![0.0; model.robot.joints()];
+    for (effect, range) in model.stack.effects() {
+        if let Some((joint, compliance)) = effect.form().and_then(|form| form.compliance(&model.x[range])) {
+            out[joint] += compliance.max(0.0);
+        }
+    }
+    out
+}

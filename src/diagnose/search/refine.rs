@@ -1,0 +1,85 @@
+//! Shapes of hypotheses refined: on the grid on which they are proposed the right one may look poor.
+
+use super::{CauseSearch, with};
+use crate::diagnose::pool::{dot, gain, project};
+use crate::effect::{Effect, Form, Hypothesis};
+use faer::Mat;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+
+/// Levels of refinement, and how many may bring nothing.
+const LEVELS: i32 = 10;
+const IDLE: usize = 3;
+/// Families of shapes that are refined before candidates are compared.
+const FAMILIES: usize = 5;
+
+impl CauseSearch<'_, '_> {
+    /// The set with the best form of every effect that has a shape to refine: on a coarse grid the right one may look poor.
+    pub(super) fn shaped(&self, set: &[usize]) -> Vec<Vec<usize>> {
+        let given = self.pool.given(set);
+        let scored = given.falls.iter().map(|(_, h)| *h).filter(|h| self.can_refine(*h));
+        let mut seen = BTreeSet::new();
+        let kind = |h: usize| {
+            let form = &self.pool.hypotheses[h].form;
+            // Bumps, hinges and warm-ups of the unknown are shapes of their own.
+            if form.cause().is_nameless() { form.variant() } else { form.name().to_string() }
+        };
+        let firsts: Vec<usize> = scored.filter(|h| seen.insert(kind(*h))).take(FAMILIES).collect();
+        firsts.into_iter().map(|h| with(set, h)).collect()
+    }
+
+    fn can_refine(&self, h: usize) -> bool {
+        !self.refined.contains(&h) && !self.pool.hypotheses[h].form.near(self.survey, 0).is_empty()
+    }
+
+    /// Variable projection over the shapes of a set's members, of those not refined yet with `new`.
+    pub(super) fn refine(&mut self, mut set: Vec<usize>, new: bool) -> Vec<usize> {
+        for h in set.clone() {
+            if self.pool.hypotheses[h].form.near(self.survey, 0).is_empty() || (new && self.refined.contains(&h)) {
+                continue;
+            }
+            let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
+            let beside = self.pool.span(&rest);
+            let mut residual = self.pool.residual.clone();
+            project(beside.as_ref(), &mut residual);
+            let mut form = self.pool.hypotheses[h].form.clone();
+            let mut most = self.gain(&form, &beside, &residual);
+            let mut idle = 0;
+            for level in 0..LEVELS {
+                let near = form.near(self.survey, level).into_par_iter();
+                let near: Vec<(f64, Form)> = near.map(|form| (self.gain(&form, &beside, &residual), form)).collect();
+                match near.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                    Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
+                    _ => idle += 1,
+                }
+                if idle >= IDLE {
+                    break;
+                }
+            }
+            let fine = if form == self.pool.hypotheses[h].form {
+                h
+            } else {
+                self.position(Hypothesis { form, ..self.pool.hypotheses[h].clone() })
+            };
+            self.refined.insert(fine);
+            let better = with(&rest, fine);
+            if self.pool.bic(&better) < self.pool.bic(&set) - 1e-6 {
+                set = better;
+            }
+        }
+        set
+    }
+
+    /// By how much a form would lower the squared `residual` beside what the columns of `beside` span.
+    fn gain(&self, form: &Form, beside: &Mat<f64>, residual: &[f64]) -> f64 {
+        let rows = self.pool.residual_rows;
+        let mut columns = self.pool.problem.columns(form);
+        for column in columns.chunks_mut(rows) {
+            let norm = dot(column, column).sqrt().max(1e-300);
+            column.iter_mut().for_each(|value| *value /= norm);
+        }
+        project(self.pool.base.as_ref(), &mut columns);
+        project(beside.as_ref(), &mut columns);
+        gain(&columns, rows, residual)
+    }
+}

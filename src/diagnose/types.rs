@@ -1,0 +1,197 @@
+//! What a diagnosis is asked, and what it answers.
+
+use crate::effect::{Form, ParameterEstimate, Place};
+use crate::estimate::{Fitted, Model, Screening};
+use crate::robot::{Measurements, RobotModel};
+use nalgebra::Vector3;
+
+/// What is to be diagnosed.
+pub struct Question<'a> {
+    pub robot: &'a RobotModel,
+    pub data: &'a Measurements,
+    /// Rows to fit, ascending.
+    pub fit: &'a [usize],
+    /// Rows that judge, ascending; empty if none are held out.
+    pub validate: &'a [usize],
+    /// The number of the set that each row belongs to.
+    pub set: &'a [usize],
+    pub seed: u64,
+}
+
+/// One joint repeatability (rad) and what it rests on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Repeatability {
+    pub sigma: f64,
+    /// Immediate repeats of a pose; none where it was taken from the residual.
+    pub repeats: usize,
+}
+
+/// How well a finding stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evidence {
+    pub f_statistic: f64,
+    pub p_value: f64,
+    /// How much worse the criterion is without it.
+    pub delta_bic: f64,
+    /// Fall of the held-out rms error, m; `None` where no rows are held out, or several effects make up the finding.
+    pub heldout_gain: Option<f64>,
+    /// Rms of the whole effect over the recording, m.
+    pub effect_rms: f64,
+    /// Fall of the whitened squared residual.
+    pub gain: f64,
+}
+
+/// Another explanation that these data cannot tell apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RivalCause {
+    pub effect: &'static str,
+    pub place: Place,
+    pub delta_bic: f64,
+}
+
+/// A cause of what the base model leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    pub effect: &'static str,
+    pub place: Place,
+    pub statement: String,
+    pub parameters: Vec<ParameterEstimate>,
+    /// None for faults of single rows.
+    pub evidence: Option<Evidence>,
+    pub rivals: Vec<RivalCause>,
+    /// Joint (from 0) and range (rad) over which it holds, for joint errors.
+    pub valid: Option<(usize, [f64; 2])>,
+    pub forms: Vec<Form>,
+}
+
+/// Effects that are faults of the recording, not of the robot.
+const FAULTS: [&str; 3] = ["outlier", "mislabelled_point", "joint_log_lag"];
+
+impl Finding {
+    pub fn is_physics(&self) -> bool {
+        !FAULTS.contains(&self.effect)
+    }
+
+    /// Whether nothing but a shape stands behind it.
+    pub fn has_no_law(&self) -> bool {
+        !self.forms.is_empty() && self.forms.iter().all(|form| form.cause().is_nameless())
+    }
+}
+
+/// The best of all hypotheses at a place, or of a variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExplainedShare {
+    /// `place` or `variable`.
+    pub by: &'static str,
+    /// E.g. `joint 3`, `link 2-4`; `q3`, `load of joint 2`, `time` (`row` where none was recorded).
+    pub name: String,
+    /// Of the squared residual that the base model leaves, in standard deviations.
+    pub share: f64,
+    /// How many parameters it takes, which alone explain as many residual rows of noise.
+    pub parameters: usize,
+    /// Fall of the criterion: positive where it is more than chance.
+    pub delta_bic: f64,
+    /// The effect that does it.
+    pub effect: &'static str,
+}
+
+/// What a sine and a cosine of an order explain of the residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectrumLine {
+    /// From 0.
+    pub joint: usize,
+    /// Whether the order is per turn of the motor.
+    pub motor: bool,
+    pub order: u32,
+    pub share: f64,
+}
+
+/// Where a residual sits.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Located {
+    /// Places, then variables; largest shares first.
+    pub shares: Vec<ExplainedShare>,
+    /// By joint, motor and order.
+    pub spectrum: Vec<SpectrumLine>,
+}
+
+/// What the data say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Explained,
+    NothingMissing,
+    Unexplained,
+    /// Too few rows were fitted.
+    NotAsked,
+}
+
+impl Verdict {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Explained => "explained",
+            Self::NothingMissing => "nothing_missing",
+            Self::Unexplained => "unexplained",
+            Self::NotAsked => "not_asked",
+        }
+    }
+}
+
+/// Lengths of position errors, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorLengths {
+    pub mean: f64,
+    pub rms: f64,
+    pub max: f64,
+}
+
+impl ErrorLengths {
+    /// Of some rows; `None` of no rows.
+    pub(crate) fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
+        let lengths: Vec<f64> = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect();
+        let count = lengths.len() as f64;
+        (count > 0.0).then(|| Self {
+            mean: lengths.iter().sum::<f64>() / count,
+            rms: (lengths.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
+            max: lengths.iter().copied().fold(0.0, f64::max),
+        })
+    }
+}
+
+/// The outcome of a diagnosis.
+pub struct Diagnosis {
+    pub verdict: Verdict,
+    /// Length of the noise of a row, rms, m.
+    pub noise_floor: f64,
+    /// Of held-out rows (of the fitted ones where none are held out), suspects apart.
+    pub before: Option<ErrorLengths>,
+    pub after: Option<ErrorLengths>,
+    /// Whether the errors are of held-out rows.
+    pub held_out: bool,
+    /// Strongest first.
+    pub findings: Vec<Finding>,
+    /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
+    pub withdrawn: Vec<String>,
+    /// Whether the recording has a clock; else times in the model count rows from 0.
+    pub clock: bool,
+    pub screening: Screening,
+    /// What these data cannot show, a sentence each.
+    pub not_observable: Vec<String>,
+    /// What is left looks like, where it is not noise.
+    pub signature: Option<String>,
+    /// What to measure next, a sentence each.
+    pub next_measurements: Vec<String>,
+    /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise, where that was asked.
+    pub leftover_rms: f64,
+    pub chi_square: f64,
+    pub gate_first: Option<f64>,
+    pub gate_last: Option<f64>,
+    pub repeatability: Repeatability,
+    /// Where the residual sits before and after the findings.
+    pub located_before: Located,
+    pub located_after: Located,
+    /// The corrected model and its fit.
+    pub model: Model,
+    pub fitted: Fitted,
+    /// Rows that were fitted.
+    pub kept: Vec<usize>,
+}

@@ -1,0 +1,100 @@
+//! The verdict: findings with their evidence, before and after on held-out rows, and what is left.
+
+use super::findings::findings;
+use super::last_round::LastRound;
+use super::statement::{next, not_observable};
+use super::unseen::by_speed;
+use crate::diagnose::locate::locate;
+use crate::diagnose::misfit::{Misfit, TOO_LOUD};
+use crate::diagnose::round::{Fitter, REPEATS};
+use crate::diagnose::search::SIGNIFICANT;
+use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Repeatability, Verdict};
+use crate::effect::Unknown;
+use nalgebra::Vector3;
+
+/// With structure left, a residual this much larger than the noise is not explained.
+const LOUD: f64 = 1.25;
+/// Without repeats a residual is not called noise where it is this many times the instrument's.
+const NOT_NOISE: f64 = 4.0;
+
+/// A weak unnamed finding of less than this share of the strongest one's gain is its rest.
+const REST: f64 = 0.03;
+/// A criterion that is worse by more than this without it makes it a finding all the same.
+const WEAK: f64 = 60.0;
+
+/// Draws the conclusions of the last round; `before` is what the base model predicts.
+pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]) -> Diagnosis {
+    let (data, state) = (&fitter.data, &last.judged.state);
+    let predicted = state.model.predict(data);
+    let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
+    let (rest, findings) = without_small_rests(findings(&last));
+    let something_left =
+        (last.last <= SIGNIFICANT && misfit.chi_square > LOUD) || misfit.chi_square > TOO_LOUD || misfit.not_carried;
+    let verdict = verdict(&findings, &misfit, something_left, fitter.repeatability);
+    let signature = signature(&rest, &last, something_left, misfit.not_carried);
+    let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
+    not_observable.extend(by_speed(&last));
+    let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
+    let state = last.judged.state;
+    Diagnosis {
+        verdict,
+        noise_floor: misfit.noise_floor,
+        before: ErrorLengths::of(data, before, &misfit.rows),
+        after: ErrorLengths::of(data, &predicted, &misfit.rows),
+        held_out: misfit.held_out,
+        next_measurements: next(&findings),
+        findings,
+        withdrawn: last.judged.withdrawn,
+        clock: data.has_clock(),
+        not_observable,
+        signature,
+        leftover_rms: misfit.leftover_rms,
+        chi_square: misfit.chi_square,
+        gate_first: Some(last.first),
+        gate_last: Some(last.last),
+        repeatability: fitter.repeatability,
+        located_before: last.located,
+        located_after,
+        kept: state.screening.kept.clone(),
+        screening: state.screening,
+        model: state.model,
+        fitted: state.fitted,
+    }
+}
+
+/// Small rests apart, then the others: what has no name beside strong findings is what their shapes leave, no cause of its own.
+fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
+    let strongest = findings.iter().filter_map(|finding| finding.evidence).map(|e| e.gain).fold(0.0, f64::max);
+    let small = |finding: &Finding| {
+        finding.has_no_law() && finding.evidence.is_some_and(|e| e.gain < REST * strongest && e.delta_bic < WEAK)
+    };
+    findings.into_iter().partition(small)
+}
+
+fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: Repeatability) -> Verdict {
+    let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
+    let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
+    let only_unknown = physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME);
+    if blind || something_left || only_unknown {
+        Verdict::Unexplained
+    } else if findings.is_empty() {
+        Verdict::NothingMissing
+    } else {
+        Verdict::Explained
+    }
+}
+
+/// What is left looks like, where it is not noise.
+fn signature(rest: &[Finding], last: &LastRound, something_left: bool, not_carried: bool) -> Option<String> {
+    let statements: Vec<&str> = rest.iter().map(|finding| finding.statement.as_str()).collect();
+    let mut signature = (!rest.is_empty()).then(|| statements.join(" "));
+    if something_left && signature.is_none() {
+        signature = last.best();
+    }
+    if not_carried {
+        let text = "held-out points are off by more than the fitted ones and the noise allow: something differs there \
+                    (another time, another region) that the fitted points do not show";
+        signature = Some(signature.map_or(text.into(), |signature| format!("{signature}; {text}")));
+    }
+    signature
+}

@@ -1,0 +1,80 @@
+//! Findings that are no physics of the arm: rows that no model can follow, logs that are apart, joints that count the other way.
+
+use crate::diagnose::round::{FitState, REVERSED};
+use crate::diagnose::types::Finding;
+use crate::effect::{JointLogLag, ParameterEstimate, ParameterSpec, Place, ReductionRatio};
+use crate::error::counted;
+use crate::estimate::{Kind, ParameterStatus, Screening, Suspect};
+
+/// Joints and points of all rows that are so many rows apart.
+pub(super) fn rows_apart(offset: i64) -> Finding {
+    let rows = counted(offset.unsigned_abs() as usize, "row");
+    let how = if offset < 0 { "before" } else { "behind" };
+    let text =
+        format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
+    of_the_recording(JointLogLag::NAME, text)
+}
+
+/// Joints that turn the other way than the robot file says.
+pub(super) fn reversals(last: &FitState) -> Vec<Finding> {
+    let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.statuses);
+    let reversed =
+        specs.filter(|((spec, x), _)| spec.name.starts_with(ReductionRatio::NAME) && (*x - REVERSED).abs() < REVERSED_WITHIN);
+    let one = |((spec, x), status): ((&ParameterSpec, &f64), &ParameterStatus)| {
+        let sigma = if let ParameterStatus::Free(sigma) = status { Some(*sigma) } else { None };
+        let place = spec.place;
+        let statement =
+            format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
+        let parameters = vec![ParameterEstimate { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
+        Finding { place, parameters, ..of_the_recording(ReductionRatio::NAME, statement) }
+    };
+    reversed.map(one).collect()
+}
+
+/// A reversed joint's ratio is -1 to this.
+const REVERSED_WITHIN: f64 = 0.1;
+
+/// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
+pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
+    // What has no other explanation than that it is far out must be farther than this noise reaches.
+    let far = |s: &Suspect| s.kind != Kind::Outlier || s.statistic > screening.reach;
+    let of = |kinds: fn(Kind) -> bool| -> Vec<usize> {
+        let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
+        own.filter(|s| far(s)).map(|s| s.row + 1).collect()
+    };
+    let list = |rows: &[usize]| {
+        let named: Vec<String> = rows.iter().take(20).map(usize::to_string).collect();
+        let more = rows.len().saturating_sub(20);
+        let noun = if rows.len() == 1 { "row" } else { "rows" };
+        format!("{noun} {}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
+    };
+    let mut out = Vec::new();
+    let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
+    if !swapped.is_empty() {
+        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped))));
+    }
+    let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
+    if !shifted.is_empty() {
+        let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
+        out.push(of_the_recording("joint_log_lag", text));
+    }
+    let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
+    if !wrong.is_empty() {
+        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong))));
+    }
+    out
+}
+
+/// A fault of the recording.
+fn of_the_recording(effect: &'static str, statement: String) -> Finding {
+    Finding {
+        effect,
+        place: Place::Recording,
+        statement,
+        parameters: Vec::new(),
+        evidence: None,
+        rivals: Vec::new(),
+        valid: None,
+        forms: Vec::new(),
+    }
+}

@@ -1,0 +1,135 @@
+//! Findings: what the chosen causes are called, how large they are, what else would explain them.
+
+use super::faults::{faults, reversals, rows_apart};
+use super::groups::{FindingKey, groups};
+use super::last_round::LastRound;
+use super::rivals::{exact, rivals};
+use super::statement::sentence;
+use crate::diagnose::judge::HoldoutGain;
+use crate::diagnose::pool::{HypothesisSet, Solution};
+use crate::diagnose::round::FitState;
+use crate::diagnose::types::{Evidence, Finding};
+use crate::effect::{Basis, Clock, Effect, Form, ParameterEstimate, Place, Summary, Variable, people};
+use crate::estimate::{ParameterStatus, tail};
+
+/// The causes of the last round as findings, strongest first.
+pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
+    let state = &last.judged.state;
+    if let Some(offset) = state.screening.apart {
+        return vec![rows_apart(offset)];
+    }
+    let set = last.set();
+    let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
+    let groups = groups(state, &last.judged.set, last.pool, last.survey);
+    let mut out: Vec<Finding> = groups.into_iter().map(|(key, members)| finding(last, &whole, key, &members)).collect();
+    let data = last.survey.data;
+    let by_the_way_there = |form: &Form| match form.variables().first() {
+        Some(Variable::LastMove) => true,
+        Some(of) => of.follows_the_way() && data.direction.is_none(),
+        None => false,
+    };
+    // Nobody knows from where the arm came to the first row.
+    let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
+    out.extend(faults(&state.screening, unknown));
+    out.extend(reversals(state));
+    let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
+    out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    out
+}
+
+/// All causes together.
+struct Whole {
+    set: Vec<usize>,
+    solution: Solution,
+    bic: f64,
+}
+
+/// The finding that some of the causes make up.
+fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members: &[usize]) -> Finding {
+    let (pool, state) = (last.pool, &last.judged.state);
+    let own: Vec<usize> = members.iter().map(|i| last.judged.set[*i]).collect();
+    let mut rest: Vec<usize> = whole.set.iter().copied().filter(|k| !own.contains(k)).collect();
+    if !pool.bic(&rest).is_finite() {
+        // Without the last joint that yields, the torque model moves nothing.
+        rest.retain(|k| !pool.of_torque_model[*k]);
+    }
+    let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
+    let mut rivals = rivals(pool, &rest, &own, whole.bic, (effect, place));
+    exact(effect, &forms, &mut rivals);
+    rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
+    let effect_rms = size(pool, members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
+    let without = pool.solve(&rest);
+    let gain = whole.solution.gain - without.gain;
+    let rank = whole.solution.rank.saturating_sub(without.rank).max(1);
+    let freedom = pool.residual_rows.saturating_sub(pool.rank() + whole.solution.rank).max(1) as f64;
+    let f_statistic =
+        gain / rank as f64 / ((pool.square - whole.solution.gain) / freedom) * pool.effective_rows / pool.residual_rows as f64;
+    let evidence = Evidence {
+        f_statistic,
+        p_value: tail(f_statistic, rank as f64, freedom),
+        delta_bic: pool.bic(&rest) - whole.bic,
+        heldout_gain: heldout_gain(&forms, place, &last.judged.gains),
+        effect_rms,
+        gain,
+    };
+    let parameters = parameters(state, effect, members);
+    let clock = Clock::of(last.survey.data);
+    let statement = sentence(effect, &Summary { place, forms: &forms, parameters: &parameters, clock }, effect_rms);
+    let valid = valid(&forms, last);
+    Finding { effect, place, statement, parameters, evidence: Some(evidence), rivals, valid, forms }
+}
+
+/// The fitted parameters of some causes, as people read them.
+fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
+    let one = |k: usize| {
+        let spec = &state.model.stack.specs()[k];
+        let sigma = match state.fitted.statuses[k] {
+            ParameterStatus::Free(sigma) => Some(sigma),
+            _ => None,
+        };
+        let (unit, symbol) = people(spec.unit);
+        let name = spec.name.strip_prefix(effect).unwrap_or(&spec.name).trim_start_matches('.');
+        ParameterEstimate {
+            name: name.to_string(),
+            value: unit.from_si(state.model.x[k]),
+            unit: symbol,
+            sigma: sigma.map(|sigma| unit.from_si(sigma)),
+        }
+    };
+    members.iter().flat_map(|i| state.ranges[*i].clone()).map(one).collect()
+}
+
+/// Joint and range over which the errors of a joint hold.
+fn valid(forms: &[Form], last: &LastRound) -> Option<(usize, [f64; 2])> {
+    let Place::Joint(joint) = forms[0].place() else { return None };
+    let table = forms.iter().find_map(|form| match form.term()?.basis() {
+        Basis::Fading { low, high, .. } => Some([low, high]),
+        _ => None,
+    });
+    Some((joint, table.unwrap_or(last.survey.range[joint])))
+}
+
+/// What held-out rows say of forms of one effect at a place.
+fn heldout_gain(forms: &[Form], place: Place, gains: &[HoldoutGain]) -> Option<f64> {
+    let name = forms.first()?.name();
+    let own = gains.iter().find(|own| own.effect == name && own.place == place);
+    own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|own| own.gain)
+}
+
+/// Rms length (m) of the whole effect over the fitted rows, the absorbed part included, of hypotheses with their fitted coefficients.
+fn size<'a>(pool: &HypothesisSet, own: impl Iterator<Item = (usize, &'a [f64])>) -> f64 {
+    // In standard deviations of the rows; the mean noise turns it into a length.
+    let mut sum = vec![0.0; pool.residual_rows];
+    for (k, coefficients) in own {
+        let columns = pool.problem.columns(&pool.hypotheses[k].form);
+        for (column, coefficient) in columns.chunks(pool.residual_rows).zip(coefficients) {
+            sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
+        }
+    }
+    let rows = &pool.problem.rows;
+    let squares = rows.iter().enumerate().map(|(i, row)| {
+        let whitened: f64 = (0..3).map(|axis| sum[3 * i + axis].powi(2)).sum();
+        whitened * pool.problem.data.noise(*row).powi(2) / 3.0
+    });
+    (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+}

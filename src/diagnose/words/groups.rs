@@ -1,0 +1,115 @@
+//! Which causes make up one finding: what one part of the arm does by one law, with the rest that its true shape leaves.
+
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::FitState;
+use crate::effect::{
+    AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, Unknown,
+    Variable, cause,
+};
+use std::collections::BTreeMap;
+
+/// The effect that chosen causes are called, and their place.
+pub(crate) type FindingKey = (&'static str, Place);
+/// Positions among the chosen causes.
+pub(crate) type FindingGroups = BTreeMap<FindingKey, Vec<usize>>;
+
+/// The chosen causes, whose positions in the pool are `set`, by finding.
+pub(crate) fn groups(last: &FitState, set: &[usize], pool: &CachedHypotheses, survey: &Survey) -> FindingGroups {
+    let mut groups = FindingGroups::new();
+    for (i, k) in set.iter().enumerate() {
+        let form = &pool.hypotheses[*k].form;
+        let values = &last.model.x[last.ranges[i].clone()];
+        groups.entry((form.called(values, survey), form.place())).or_default().push(i);
+    }
+    refine(pool, &mut groups, set);
+    both_angles(pool, &mut groups, set);
+    wobbles(pool, &mut groups, set);
+    // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
+    let hard: Vec<Place> = groups.keys().filter(|key| key.0 == JointHardening::NAME).map(|key| key.1).collect();
+    for place in hard {
+        if let Some(more) = groups.remove(&(JointCompliance::NAME, place)) {
+            groups.entry((JointHardening::NAME, place)).or_default().extend(more);
+        }
+    }
+    groups
+}
+
+/// A small rest at the joint of a strong finding is no cause of its own but the finer shape of the finding: it joins its group.
+fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
+    let mut sorted = set.to_vec();
+    sorted.sort_unstable();
+    let whole = pool.solve(&sorted).gain;
+    let finer = |name| cause(name).map_or(&[] as &[&str], |cause| cause.finer());
+    let gain = |members: &[usize]| {
+        let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
+        let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
+        whole - pool.solve(&rest).gain
+    };
+    let gains: BTreeMap<FindingKey, f64> = groups.iter().map(|(key, members)| (*key, gain(members))).collect();
+    for (small, own) in &gains {
+        let main = gains
+            .iter()
+            .filter(|(main, gain)| {
+                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer(main.0).contains(&small.0);
+                // Both follow the side of the last move.
+                joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < TRACE * **gain)
+            })
+            .max_by(|a, b| a.1.total_cmp(b.1));
+        if let Some((main, _)) = main.filter(|(main, _)| groups.contains_key(*main)) {
+            let members = groups.remove(small).unwrap_or_default();
+            groups.entry(*main).or_default().extend(members);
+        }
+    }
+}
+
+/// What goes in proportion with an angle, or once or twice a turn with it, is a part of a joint's function of that angle and another.
+fn both_angles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
+    let form = |i: &usize| &pool.hypotheses[set[*i]].form;
+    let main = groups.iter().find_map(|(key, members)| {
+        let angles = members.iter().find_map(|i| form(i).term()?.two_angles())?;
+        let Place::Joint(joint) = form(&members[0]).place() else { return None };
+        Some((*key, joint, angles))
+    });
+    let Some((main, joint, angles)) = main else { return };
+    let is_part = |i: &usize| match (form(i).place(), form(i).term().map(Term::basis)) {
+        (Place::Coupled(by, moved), _) => moved == joint && angles.contains(&by),
+        (at, Some(Basis::Wave { order, .. })) if form(i).is(&GearCyclic) => {
+            at == Place::Joint(joint) && angles.contains(&joint) && order <= SLOW
+        }
+        _ => false,
+    };
+    let parts: Vec<_> = groups.iter().filter(|(_, members)| members.iter().all(is_part)).map(|(key, _)| *key).collect();
+    for part in parts {
+        let members = groups.remove(&part).unwrap_or_default();
+        groups.entry(main).or_default().extend(members);
+    }
+}
+
+/// Orders that a smooth function of an angle may have, too.
+const SLOW: u32 = 2;
+
+/// What a neighbour seems to do with the angle of a joint whose axis wobbles is a part of that wobble.
+fn wobbles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
+    // Of a joint that follows a sine of another joint's angle, that other joint.
+    let by = |i: &usize| {
+        let term = pool.hypotheses[set[*i]].form.term()?;
+        match (term.basis(), term.of_one()) {
+            (Basis::Wave { .. }, Some((joint, Variable::Angle { joint: by }))) if by != joint => {
+                Some((AxisWobble::NAME, Place::Joint(by)))
+            }
+            _ => None,
+        }
+    };
+    let unknown: Vec<FindingKey> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
+    for key in unknown {
+        let wobble = groups[&key].iter().map(by).reduce(|a, b| if a == b { a } else { None }).flatten();
+        if let Some(wobble) = wobble.filter(|wobble| groups.contains_key(wobble)) {
+            let members = groups.remove(&key).unwrap_or_default();
+            groups.entry(wobble).or_default().extend(members);
+        }
+    }
+}
+
+/// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
+const REFINEMENT: f64 = 0.1;
+const TRACE: f64 = 0.05;

@@ -1,0 +1,34 @@
+//! What the last round looked at, and what stands of what it found.
+
+use crate::diagnose::judge::Judged;
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::types::Located;
+use crate::effect::{Effect, Survey};
+
+/// The last round, judged.
+pub(crate) struct LastRound<'a, 'b> {
+    pub pool: &'b CachedHypotheses<'a>,
+    pub survey: &'b Survey<'a>,
+    pub judged: Judged,
+    /// The gate's probability at the start and at the end.
+    pub first: f64,
+    pub last: f64,
+    /// Where the residual of the base model sits.
+    pub located: Located,
+}
+
+impl LastRound<'_, '_> {
+    /// The causes as a set of the pool, which is ascending.
+    pub fn set(&self) -> Vec<usize> {
+        let mut set = self.judged.set.clone();
+        set.sort_unstable();
+        set
+    }
+
+    /// What the best hypothesis beside the chosen ones would be.
+    pub fn best(&self) -> Option<String> {
+        let (_, best) = *self.pool.given(&self.set()).falls.first()?;
+        let form = &self.pool.hypotheses[best].form;
+        Some(format!("most like {} at {}", form.name(), form.place()))
+    }
+}

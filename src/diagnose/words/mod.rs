@@ -1,0 +1,36 @@
+//! What a diagnosis says: findings with their evidence and rivals, the verdict, and the words for all of it.
+
+mod conclude;
+mod faults;
+mod findings;
+mod groups;
+mod last_round;
+mod rivals;
+mod statement;
+mod unseen;
+
+pub(crate) use conclude::conclude;
+pub(crate) use groups::{FindingGroups, groups};
+pub(crate) use last_round::LastRound;
+pub use statement::other_means;
+
+use super::pool::CachedHypotheses;
+use super::round::{FitState, Fitter};
+use crate::effect::Form;
+use crate::error::counted;
+
+/// The base model in a line.
+pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
+    format!(
+        "{}, {} of the base model estimated",
+        counted(now.screening.kept.len(), "row"),
+        counted(fitter.free().len(), "number")
+    )
+}
+
+/// A round in a line, which leaves what is noise with a probability of `rest`.
+pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl Iterator<Item = &'f Form>, rest: f64) -> String {
+    let keys: Vec<String> = forms.map(|form| format!("; {}", form.key())).collect();
+    let (tried, causes) = (pool.hypotheses.len(), counted(keys.len(), "cause"));
+    format!("round {round}: {tried} hypotheses, {causes}{} (p = {rest:.3} that the rest is noise)", keys.concat())
+}

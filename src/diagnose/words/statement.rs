@@ -1,0 +1,91 @@
+//! Findings in a sentence that a mechanic understands, and what the recording cannot show.
+
+use crate::diagnose::types::Finding;
+use crate::effect::{Clock, Summary, Survey, cause, figure};
+
+/// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
+pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
+    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
+}
+
+/// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
+const STILL: f64 = 1e-3;
+
+/// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
+pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
+    let mut out = Vec::new();
+    for (joint, reach) in reach.iter().enumerate() {
+        let name = joint + 1;
+        if *reach < STILL {
+            out.push(format!("joint {name}: the measured point lies on its axis; put a second target off the axis"));
+        } else if survey.travel(joint) < 0.02 {
+            out.push(format!("joint {name}: it hardly moves; vary it over its range"));
+        } else if !survey.both_directions(joint) {
+            out.push(format!(
+                "joint {name}, backlash: it was approached from one side only; approach half of the poses from the other"
+            ));
+        }
+    }
+    if !survey.payload_changes() {
+        let payload =
+            if survey.heavy_payload() > 0.0 { "every row carries the same payload" } else { "no row carries a payload" };
+        out.push(format!("payload_error: {payload}; measure with two payloads in alternating blocks"));
+    }
+    out.extend(masses(survey));
+    let clock = Clock::of(survey.data);
+    if clock == Clock::Rows {
+        out.push("time: none was recorded; the order of the rows stands for it".into());
+    }
+    if survey.data.temperature.is_none() {
+        let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
+        out.push(format!("temperature: none was recorded; growth is told from drift by {by} alone"));
+    }
+    if survey.data.current.is_none() {
+        out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
+    }
+    if survey.data.direction.is_none() {
+        out.push("direction of approach: taken from the order of the rows".into());
+    }
+    out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+    out
+}
+
+/// Links whose weight the robot file does not give.
+fn masses(survey: &Survey) -> Option<String> {
+    let all = &survey.robot.description().joints;
+    let bare = (1..).zip(all).filter(|(_, joint)| joint.mass.is_none() || joint.centre.is_none());
+    let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
+    match bare.len() {
+        0 => None,
+        none if none == all.len() => Some("gravity effects: the robot file gives no link masses".into()),
+        some => {
+            let (own, all) = (all.len() - some, all.len());
+            let bare = bare.join(", ");
+            Some(format!(
+                "gravity effects: the robot file gives mass and centre of {own} of {all} links; {bare} counted as weightless"
+            ))
+        }
+    }
+}
+
+/// Where nothing else is needed.
+const POSES: &str = "more poses, chosen to tell them apart (`calib poses --run`)";
+
+/// What would tell findings from their rivals, a sentence each.
+pub(super) fn next(findings: &[Finding]) -> Vec<String> {
+    let mut out = Vec::new();
+    for finding in findings {
+        for rival in finding.rivals.iter().take(2) {
+            let how = other_means(finding.effect, rival.effect).unwrap_or(POSES);
+            out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
+        }
+    }
+    out
+}
+
+/// What is not a pose and may tell two effects apart, where there is such a thing.
+pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
+    let measures = [a, b].into_iter().filter_map(|name| cause(name)?.measure());
+    measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
+}

@@ -1,0 +1,72 @@
+//! What a cause is given to put its finding into words.
+
+use super::{Clock, Form, Place, Term, Variable, figure};
+use crate::units::Unit;
+
+/// A coefficient of a finding in the unit in which people read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterEstimate {
+    pub name: String,
+    pub value: f64,
+    pub unit: &'static str,
+    pub sigma: Option<f64>,
+}
+
+/// The unit in which people read a number of this unit.
+pub fn people(unit: Unit) -> (Unit, &'static str) {
+    match unit {
+        Unit::Radian => (Unit::Arcsecond, "arcsec"),
+        Unit::Second => (Unit::Millisecond, "ms"),
+        Unit::RadianPerRadianPerSecond => (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)"),
+        other => (other, other.symbol()),
+    }
+}
+
+/// A finding: its place, its forms and their fitted numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Summary<'a> {
+    pub place: Place,
+    pub forms: &'a [Form],
+    pub parameters: &'a [ParameterEstimate],
+    /// What counts time in the recording.
+    pub clock: Clock,
+}
+
+impl<'a> Summary<'a> {
+    /// The first form of a type.
+    pub(super) fn form<T: super::Placed>(&self) -> Option<&'a T> {
+        self.forms.iter().find_map(Form::as_a)
+    }
+
+    /// The terms under a cause's name.
+    pub(super) fn terms(&self, name: &'static str) -> impl Iterator<Item = &'a Term> {
+        self.forms.iter().filter(move |form| form.cause().name() == name).filter_map(|form| form.term())
+    }
+
+    /// The first number with its unit.
+    pub(super) fn value(&self) -> String {
+        self.parameters.first().map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit))
+    }
+
+    /// The size of the first number with its unit.
+    pub(super) fn size(&self) -> String {
+        self.parameters.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit))
+    }
+
+    /// When the first term of a cause changes, if it does.
+    pub(super) fn when(&self, name: &'static str) -> String {
+        let change = self.terms(name).find_map(|term| match (term.law().first.of, term.basis()) {
+            (Variable::Time, super::Basis::After { at }) => Some(at),
+            _ => None,
+        });
+        change.map_or_else(String::new, |time| self.clock.since(time))
+    }
+}
+
+/// The amplitude of a sine and a cosine.
+pub(super) fn amplitude(pair: Option<&[ParameterEstimate]>) -> String {
+    match pair {
+        Some([a, b]) => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
+        _ => String::new(),
+    }
+}
