@@ -5,7 +5,7 @@
 //! on the full model, and everything is looked at again from there, until nothing changes.
 //!
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
-//! in the end `judge` asks held-out rows, and `words` are found for what stands.
+//! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
 
 mod judge;
 mod locate;

@@ -25,6 +25,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
         before: errors,
         after: errors,
         held_out: misfit.held_out,
+        folds: None,
         findings: Vec::new(),
         withdrawn: Vec::new(),
         clock: data.has_clock(),

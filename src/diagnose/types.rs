@@ -1,7 +1,7 @@
 //! What a diagnosis is asked, and what it answers.
 
 use crate::effect::{Form, ParameterEstimate, Place};
-use crate::estimate::{Fitted, Model, Screening};
+use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ pub struct Question<'a> {
     pub data: &'a Measurements,
     /// Rows to fit, ascending.
     pub fit: &'a [usize],
-    /// Rows that judge, ascending; empty if none are held out.
+    /// Rows that are predicted in the end and choose nothing, ascending; empty if none are held out.
     pub validate: &'a [usize],
     /// The number of the set that each row belongs to.
     pub set: &'a [usize],
@@ -33,7 +33,8 @@ pub struct Evidence {
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
-    /// Fall of the held-out rms error, m; `None` where no rows are held out, or several effects make up the finding.
+    /// Fall of the rms error of fitted rows under fits that did not see their pose, m; `None` where poses are too few, or several effects
+    /// make up the finding.
     pub heldout_gain: Option<f64>,
     /// Rms of the whole effect over the recording, m.
     pub effect_rms: f64,
@@ -167,6 +168,8 @@ pub struct Diagnosis {
     pub after: Option<ErrorLengths>,
     /// Whether the errors are of held-out rows.
     pub held_out: bool,
+    /// Errors of the fitted rows (`kept`) under fits without their poses.
+    pub folds: Option<Folds>,
     /// Strongest first.
     pub findings: Vec<Finding>,
     /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.

@@ -47,28 +47,72 @@ pub fn cross_validate(
     count: usize,
     seed: u64,
 ) -> Option<Folds> {
-    let candidates: Vec<usize> = (0..fitted.statuses.len())
-        .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
-        .collect();
     let parts = parts(data, rows);
-    let mut order: Vec<&Vec<usize>> = parts.iter().collect();
-    let left = (rows.len() * (count.max(1) - 1)) / count.max(1);
-    if count < 2 || order.len() < 2 * count || 3 * left <= candidates.len() {
-        return None;
-    }
+    let whole = Whole { model, data, rows, fitted };
+    let order = whole.divisible(&parts, count)?;
     let blocks = deal(&order, rows.len(), count);
-    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-    let random = deal(&order, rows.len(), count);
+    let random = at_random(order, rows.len(), count, seed);
     let folds: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
-    let problem = Problem { data, rows, unmodelled: fitted.excess() };
-    let near = Near::of(&problem, model, fitted);
-    let one = |part: &&Vec<usize>| {
-        let close = near.as_ref().and_then(|near| near.without(&problem, model, part));
-        close.unwrap_or_else(|| without(model, data, rows, &candidates, part))
-    };
-    let errors: Vec<Vec<f64>> = folds.par_iter().map(one).collect();
+    let errors = whole.without_each(&folds);
     let (one, other) = errors.split_at(count);
     Some(Folds { count, random: gather(data, rows, &random, one), blocks: gather(data, rows, &blocks, other) })
+}
+
+/// [`Folds::random`] alone.
+pub(crate) fn random_folds(
+    model: &Model,
+    data: &Measurements,
+    rows: &[usize],
+    fitted: &Fitted,
+    count: usize,
+    seed: u64,
+) -> Option<Vec<f64>> {
+    let parts = parts(data, rows);
+    let whole = Whole { model, data, rows, fitted };
+    let random = at_random(whole.divisible(&parts, count)?, rows.len(), count, seed);
+    let errors = whole.without_each(&random.iter().collect::<Vec<_>>());
+    Some(gather(data, rows, &random, &errors))
+}
+
+/// Poses dealt in an order that `seed` draws.
+fn at_random(mut order: Vec<&Vec<usize>>, rows: usize, count: usize, seed: u64) -> Vec<Vec<usize>> {
+    order.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+    deal(&order, rows, count)
+}
+
+/// A fit to all of its rows.
+struct Whole<'a> {
+    model: &'a Model,
+    data: &'a Measurements,
+    rows: &'a [usize],
+    fitted: &'a Fitted,
+}
+
+impl Whole<'_> {
+    fn candidates(&self) -> Vec<usize> {
+        let estimated = |k: &usize| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
+        (0..self.fitted.statuses.len()).filter(estimated).collect()
+    }
+
+    /// The parts in their order, where they are enough for so many folds.
+    fn divisible<'p>(&self, parts: &'p [Vec<usize>], count: usize) -> Option<Vec<&'p Vec<usize>>> {
+        let left = (self.rows.len() * (count.max(1) - 1)) / count.max(1);
+        let enough = count >= 2 && parts.len() >= 2 * count && 3 * left > self.candidates().len();
+        enough.then(|| parts.iter().collect())
+    }
+
+    /// Errors (m) of the rows of each fold under a fit to the others.
+    fn without_each(&self, folds: &[&Vec<usize>]) -> Vec<Vec<f64>> {
+        let Self { model, data, rows, fitted } = *self;
+        let candidates = self.candidates();
+        let problem = Problem { data, rows, unmodelled: fitted.excess() };
+        let near = Near::of(&problem, model, fitted);
+        let one = |fold: &&Vec<usize>| {
+            let close = near.as_ref().and_then(|near| near.without(&problem, model, fold));
+            close.unwrap_or_else(|| without(model, data, rows, &candidates, fold))
+        };
+        folds.par_iter().map(one).collect()
+    }
 }
 
 /// Rows that belong together, in the order of recording: those of one pose; of a moving arm, whose neighbouring rows know each other,

@@ -35,6 +35,7 @@ pub use change::{Change, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
+pub(crate) use folds::random_folds;
 pub use folds::{Folds, cross_validate};
 pub use gauge::gauge;
 pub use known::{Bounds, CONFLICT, Known, Prior, PriorCheck};

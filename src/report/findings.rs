@@ -116,7 +116,11 @@ fn finding(row: &FindingRow, tables: &Tables) -> Finding {
         ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
         ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
         ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),
-        ("held-out gain", row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))), "rms of unseen points without it minus with it"),
+        (
+            "gain on unseen poses",
+            row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))),
+            "rms of poses under fits without them, without the finding minus with it",
+        ),
         ("size", row.effect_rms_mm.map(|v| format!("{} mm", mm(v))), "rms of the whole effect at the tool"),
     ];
     let valid = match (row.valid_joint, row.valid_from_rad, row.valid_to_rad) {

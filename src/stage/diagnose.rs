@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Question, Verdict as Said, against_simulation, diagnose};
 use crate::error::{Error, Fault, Result};
-use crate::estimate::{Suspect, cross_validate, gauge};
+use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Diagnose {
-    /// Sets of the split to fit; all others judge.
+    /// Sets of the split to fit; all others are predicted in the end and choose nothing.
     #[serde(default = "fit_set")]
     pub on: Vec<String>,
     /// The tracker's noise.
@@ -29,8 +29,6 @@ fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
-/// Parts of the rows that were fitted, each predicted by a fit without it.
-const FOLDS: usize = 5;
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
 
@@ -110,8 +108,7 @@ impl Stage for Diagnose {
         let parameters = Parameters::of(step, &diagnosis.model, &diagnosis.fitted, &[], None);
         let covariance = diagnosis.fitted.covariance.as_ref();
         let kept = &diagnosis.kept;
-        let folds = cross_validate(&diagnosis.model, &data, kept, &diagnosis.fitted, FOLDS, context.seed);
-        let errors = folds.iter().flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
+        let errors = diagnosis.folds.iter().flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         Ok(DiagnoseWrites {
             verdict: Verdict::of(step, &diagnosis),

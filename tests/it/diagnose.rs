@@ -1,6 +1,7 @@
 //! Diagnosis of recordings with concealed effects: what was hidden is named and placed, and nothing else.
 
 mod said;
+mod scrambled;
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};

@@ -1,12 +1,13 @@
-//! Held-out rows and the fit of the whole model judge what a search found: it saw a linear picture of the rows to fit.
+//! Folds of the rows to fit, and the fit of the whole model, judge what a search found: it saw a linear picture of these rows. Rows
+//! that are held out for validation take no part.
 
 mod comparison;
 mod exchange;
-mod held_out;
+mod fold_errors;
 mod withdraw;
 
 pub(crate) use comparison::ModelComparison;
-pub(crate) use held_out::HoldoutGain;
+pub(crate) use fold_errors::{FOLDS, FoldGain};
 
 use super::round::FitState;
 
@@ -15,12 +16,12 @@ pub(crate) struct Judged {
     pub state: FitState,
     /// The causes' positions in the pool, in their order.
     pub set: Vec<usize>,
-    pub gains: Vec<HoldoutGain>,
+    pub gains: Vec<FoldGain>,
     /// What was found and taken back, a sentence each.
     pub withdrawn: Vec<String>,
 }
 
-/// Exchanges causes that do not carry over to held-out rows, and takes back those that cannot stand; `set` holds the causes' positions in
+/// Exchanges causes that do not carry over to other poses, and takes back those that cannot stand; `set` holds the causes' positions in
 /// the pool, in their order.
 pub(crate) fn judge(state: FitState, mut set: Vec<usize>, comparison: &ModelComparison) -> Judged {
     let (state, mut gains) = exchange::exchange(state, &mut set, comparison);

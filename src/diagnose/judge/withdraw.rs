@@ -1,19 +1,19 @@
-//! Findings that the last fit leaves without size, or that make held-out rows worse, are taken back, and the model is fitted
+//! Findings that the last fit leaves without size, or that gain nothing in folds, are taken back, and the model is fitted
 //! without them: the search judges a linear picture of each, the fit the whole model.
 
 use super::comparison::ModelComparison;
-use super::held_out::{HeldOutErrors, HoldoutGain};
+use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::round::FitState;
 use crate::diagnose::words::{FindingGroups, groups};
 use crate::effect::Effect;
 use crate::estimate::ParameterStatus;
 
 /// The fit without findings that cannot stand, and a sentence for each of these; `set` holds the causes' positions in the pool
-/// in their order, `gains` what held-out rows say of them.
+/// in their order, `gains` what folds say of them.
 pub(super) fn withdraw(
     mut now: FitState,
     set: &mut Vec<usize>,
-    gains: &mut Vec<HoldoutGain>,
+    gains: &mut Vec<FoldGain>,
     comparison: &ModelComparison,
 ) -> (FitState, Vec<String>) {
     let mut said = Vec::new();
@@ -26,7 +26,23 @@ pub(super) fn withdraw(
         said.push(sentence);
         now = state;
     }
+    if let Some(base) = useless(&now, comparison) {
+        set.clear();
+        said.push("all findings together: poses that a fit has not seen are predicted as well or better without them".into());
+        now = base;
+    }
     (now, said)
+}
+
+/// The base model fitted alone, where all causes together gain nothing in folds.
+fn useless(now: &FitState, comparison: &ModelComparison) -> Option<FitState> {
+    if now.causes.is_empty() {
+        return None;
+    }
+    let all: Vec<usize> = (0..now.causes.len()).collect();
+    let base = comparison.without(now, &all);
+    let gain = FoldErrors::of(now, comparison.fitter)?.gain_over(&FoldErrors::of(&base, comparison.fitter)?);
+    (gain <= 0.0).then_some(base)
 }
 
 /// The finding that was not estimated, else the weakest of those that are smaller than their own uncertainty.
@@ -53,34 +69,37 @@ fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<
     Some((members, format!("{effect} at {place}: {why}"), state))
 }
 
-/// The finding without which held-out rows are better beyond their scatter, of those that do no good there or were not asked alone.
+/// The finding that gains least in folds, of those that gain nothing.
 fn harmful(
     now: &FitState,
     set: &[usize],
-    gains: &mut Vec<HoldoutGain>,
+    gains: &mut Vec<FoldGain>,
     comparison: &ModelComparison,
 ) -> Option<(Vec<usize>, String, FitState)> {
-    let seen = HeldOutErrors::of(now, comparison.fitter)?;
+    let seen = FoldErrors::of(now, comparison.fitter)?;
+    let mut worst: Option<(f64, Vec<usize>, String, FitState)> = None;
     let groups: FindingGroups = groups(now, set, comparison.pool, comparison.survey);
     for ((effect, place), members) in groups {
         let names: Vec<&'static str> = members.iter().map(|i| comparison.pool.hypotheses[set[*i]].form.name()).collect();
         let same = names.iter().all(|name| *name == names[0]);
         let known = gains.iter_mut().find(|known| same && known.effect == names[0] && known.place == place);
-        if known.as_ref().is_some_and(|known| known.gain >= 0.0) {
+        if known.as_ref().is_some_and(|known| known.gain > 0.0) {
             continue;
         }
         let state = comparison.without(now, &members);
-        let bare = HeldOutErrors::of(&state, comparison.fitter)?;
-        if bare.is_beyond_doubt_better_than(&seen) {
-            return Some((members, format!("{effect} at {place}: held-out points are better without it"), state));
-        }
+        let gain = seen.gain_over(&FoldErrors::of(&state, comparison.fitter)?);
         match known {
-            Some(known) => known.gain = bare.rms() - seen.rms(),
-            None if same => gains.push(HoldoutGain { effect: names[0], place, gain: bare.rms() - seen.rms() }),
+            Some(known) => known.gain = gain,
+            None if same => gains.push(FoldGain { effect: names[0], place, gain }),
             None => (),
         }
+        if gain <= 0.0 && worst.as_ref().is_none_or(|(least, ..)| gain < *least) {
+            let sentence =
+                format!("{effect} at {place}: poses that a fit has not seen are predicted as well or better without it");
+            worst = Some((gain, members, sentence, state));
+        }
     }
-    None
+    worst.map(|(_, members, sentence, state)| (members, sentence, state))
 }
 
 #[cfg(test)]
@@ -187,12 +206,15 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
     }
 
     #[test]
-    fn what_makes_held_out_rows_worse_is_taken_back() {
-        let (kept, said) = left(90.0, &[TRUE, PASSING]);
-        assert_eq!(
-            (kept, said),
-            (vec![TRUE.to_string()], vec!["gear_cyclic at joint 4: held-out points are better without it".to_string()])
-        );
+    fn what_gains_nothing_is_taken_back() {
+        let (kept, said) = left(0.0, &[TRUE, PASSING]);
+        assert_eq!((kept, said.len()), (vec![TRUE.to_string()], 1), "{said:?}");
+        assert!(said[0].starts_with("gear_cyclic at joint 4: "), "{said:?}");
+    }
+
+    #[test]
+    fn what_held_out_rows_lack_stays_where_the_fitted_rows_have_it() {
+        assert_eq!(left(90.0, &[TRUE, PASSING]), (vec![TRUE.to_string(), PASSING.to_string()], Vec::new()));
     }
 
     #[test]

@@ -4,12 +4,14 @@ use super::findings::findings;
 use super::last_round::LastRound;
 use super::statement::{next, not_observable};
 use super::unseen::by_speed;
+use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::{Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Repeatability, Verdict};
 use crate::effect::Unknown;
+use crate::estimate::cross_validate;
 use nalgebra::Vector3;
 
 /// With structure left, a residual this much larger than the noise is not explained.
@@ -36,12 +38,14 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(by_speed(&last));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
+    let folds = cross_validate(&state.model, data, &state.screening.kept, &state.fitted, FOLDS, fitter.question.seed);
     Diagnosis {
         verdict,
         noise_floor: misfit.noise_floor,
         before: ErrorLengths::of(data, before, &misfit.rows),
         after: ErrorLengths::of(data, &predicted, &misfit.rows),
         held_out: misfit.held_out,
+        folds,
         next_measurements: next(&findings),
         findings,
         withdrawn: last.judged.withdrawn,

@@ -5,7 +5,7 @@ use super::groups::{FindingKey, groups};
 use super::last_round::LastRound;
 use super::rivals::{exact, rivals};
 use super::statement::sentence;
-use crate::diagnose::judge::HoldoutGain;
+use crate::diagnose::judge::FoldGain;
 use crate::diagnose::pool::{HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding};
@@ -109,8 +109,8 @@ fn valid(forms: &[Form], last: &LastRound) -> Option<(usize, [f64; 2])> {
     Some((joint, table.unwrap_or(last.survey.range[joint])))
 }
 
-/// What held-out rows say of forms of one effect at a place.
-fn heldout_gain(forms: &[Form], place: Place, gains: &[HoldoutGain]) -> Option<f64> {
+/// What folds say of forms of one effect at a place.
+fn heldout_gain(forms: &[Form], place: Place, gains: &[FoldGain]) -> Option<f64> {
     let name = forms.first()?.name();
     let own = gains.iter().find(|own| own.effect == name && own.place == place);
     own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|own| own.gain)

@@ -1,0 +1,81 @@
+//! Errors of fitted rows under fits that did not see their pose, and whether they are smaller than those of another model.
+
+use crate::diagnose::round::{FitState, Fitter};
+use crate::effect::Place;
+use crate::estimate::{autocorrelation_time, random_folds};
+use std::collections::BTreeMap;
+
+/// Parts of the rows that were fitted, the same for every model that is compared.
+pub(crate) const FOLDS: usize = 5;
+
+/// Causes of one effect and place, and what the rms (m) of the folds falls by with them.
+#[derive(Debug, Clone)]
+pub(crate) struct FoldGain {
+    pub effect: &'static str,
+    pub place: Place,
+    pub gain: f64,
+}
+
+/// A model that is worse by this share, and by so many standard errors, is worse.
+const WORSE: f64 = 0.03;
+const CLEARLY: f64 = 2.0;
+
+/// Errors of the rows that were fitted.
+pub(super) struct FoldErrors {
+    /// Squared errors, m2, by row.
+    squares: BTreeMap<usize, f64>,
+    /// Whether they lie along a path.
+    moving: bool,
+}
+
+impl FoldErrors {
+    /// `None` where the poses are too few for folds.
+    pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
+        let (data, rows) = (&fitter.data, &now.screening.kept);
+        let errors = random_folds(&now.model, data, rows, &now.fitted, FOLDS, fitter.question.seed)?;
+        let squares = rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
+        Some(Self { squares, moving: data.in_motion(rows) })
+    }
+
+    pub fn rms(&self) -> f64 {
+        (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
+    }
+
+    /// By how much the rms (m) of this is smaller than that of `other`, at the rows that both were fitted to.
+    pub fn gain_over(&self, other: &Self) -> f64 {
+        let [own, theirs] = self.rms_beside(other);
+        theirs - own
+    }
+
+    /// -2 ln of the odds of `other` against this, by these rows.
+    pub fn evidence_against(&self, other: &Self) -> f64 {
+        let [own, theirs] = self.rms_beside(other);
+        2.0 * 3.0 * self.squares.len() as f64 * (theirs / own).ln()
+    }
+
+    /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let [own, theirs] = self.rms_beside(other);
+        own < theirs * (1.0 - WORSE) && self.fall_from(other) > CLEARLY
+    }
+
+    /// The rms (m) of both at the rows that both were fitted to.
+    fn rms_beside(&self, other: &Self) -> [f64; 2] {
+        let both = self.squares.iter().filter_map(|(row, own)| Some((own, other.squares.get(row)?)));
+        let (own, theirs, count) = both.fold((0.0, 0.0, 0), |(a, b, n), (own, theirs)| (a + own, b + theirs, n + 1));
+        [own, theirs].map(|sum| (sum / f64::from(count.max(1))).sqrt())
+    }
+
+    /// By how many standard errors squared errors are smaller than those of `other`.
+    fn fall_from(&self, other: &Self) -> f64 {
+        let falls: Vec<f64> = self.squares.iter().filter_map(|(row, own)| Some(other.squares.get(row)? - own)).collect();
+        let count = falls.len() as f64;
+        let mean = falls.iter().sum::<f64>() / count;
+        let variance = falls.iter().map(|fall| (fall - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        // Rows along a path are not as many opinions as there are rows.
+        let off: Vec<f64> = falls.iter().map(|fall| fall - mean).collect();
+        let count = if self.moving { count / autocorrelation_time(&off, 1) } else { count };
+        let error = (variance / count).sqrt();
+        if error.is_nan() { 0.0 } else { mean / error.max(f64::MIN_POSITIVE) }
+    }
+}

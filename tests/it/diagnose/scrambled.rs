@@ -1,0 +1,54 @@
+//! Held-out rows choose nothing: whatever they say, the same causes are found, with the same numbers.
+
+use crate::desk::{Desk, table};
+use crate::suspects::{Inputs, pipeline};
+use calib::stage::{Diagnose, DiagnoseReads};
+use calib::table::{CovarianceTable, Findings, Frame, Parameters, Prediction, Rivals, Table, Verdict};
+use std::collections::BTreeMap;
+
+/// Moves the measured points of held-out rows from row to row, each 0.3 mm off.
+fn scrambled(inputs: &mut Inputs) {
+    let held: Vec<usize> = (0..inputs.split.0.len()).filter(|row| inputs.split.0[*row].set != "fit").collect();
+    let points: Vec<[f64; 3]> = held.iter().map(|row| inputs.recording.position[*row]).collect();
+    for (k, row) in held.iter().enumerate() {
+        let [x, y, z] = points[(k + 1) % points.len()];
+        inputs.recording.position[*row] = [x + 3e-4, y, z];
+    }
+}
+
+#[test]
+fn every_choice_of_a_diagnosis_is_the_same_whatever_held_out_rows_say() {
+    for (family, seed) in [("gear_cyclic", "41"), ("backlash", "42"), ("joint_hardening", "43")] {
+        let folder = super::concealed(family, seed, "120");
+        let case = folder.path().join("sealed/recordings/c0001").display().to_string();
+        let diagnosed = |change: fn(&mut Inputs)| -> BTreeMap<&'static str, Vec<Frame>> {
+            let (mut inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case)], "diagnose");
+            change(&mut inputs);
+            let reads = DiagnoseReads { recording: inputs.recording, robot: inputs.robot, split: inputs.split };
+            Desk::default().run(&stage, reads).expect("a diagnosis")
+        };
+        let (sound, other) = (diagnosed(|_| ()), diagnosed(scrambled));
+        let after = |tables: &BTreeMap<&'static str, Vec<Frame>>| {
+            let verdict: Verdict = table(tables).remove(0);
+            verdict.0[0].after_rms_mm.expect("held-out rows")
+        };
+        assert!(after(&other) > 2.0 * after(&sound), "{family}: nothing was scrambled");
+        fn same<T: Table + PartialEq + std::fmt::Debug>(
+            a: &BTreeMap<&'static str, Vec<Frame>>,
+            b: &BTreeMap<&'static str, Vec<Frame>>,
+        ) {
+            let [a, b]: [T; 2] = [a, b].map(|tables| table(tables).remove(0));
+            assert_eq!(a, b, "{}", T::KIND);
+        }
+        same::<Findings>(&sound, &other);
+        same::<Parameters>(&sound, &other);
+        same::<CovarianceTable>(&sound, &other);
+        same::<Rivals>(&sound, &other);
+        let folds = |tables| -> Vec<Option<f64>> {
+            let prediction: Prediction = table(tables).remove(0);
+            prediction.0.iter().map(|row| row.fold_error_mm).collect()
+        };
+        assert_eq!(folds(&sound), folds(&other));
+        assert!(folds(&sound).iter().flatten().count() > 60);
+    }
+}
