@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::source::{Kind, Source};
+use super::source::{Column, Kind, Source};
 use super::{Finding, Options, Tolerances};
 use crate::error::{Error, Result, nearest};
 use crate::units::{Quantity, Unit};
@@ -47,21 +47,48 @@ pub(super) fn plan(
 ) -> Result<Vec<Comparison>> {
     known_names(a, b, options)?;
     let ignored = |name: &String| key.contains(name) || options.ignore.contains(name);
-    let mut used_b: BTreeSet<usize> = BTreeSet::new();
-    let mut used_a: BTreeSet<usize> = BTreeSet::new();
+    let mut pairs = Pairs { a, b, options, used_a: BTreeSet::new(), used_b: BTreeSet::new(), findings };
     let mut comparisons = Vec::new();
     for (names, vector) in groups(a, options) {
-        let at = |source: &Source| names.iter().map(|name| source.position(name)).collect::<Option<Vec<usize>>>();
-        let (Some(at_a), Some(at_b)) = (at(a), at(b)) else { continue };
-        if names.iter().any(ignored) {
-            continue;
+        if !names.iter().any(ignored) {
+            comparisons.extend(pairs.rotation(&names, vector));
         }
-        used_a.extend(&at_a);
-        used_b.extend(&at_b);
-        let factor = angle_unit(a, at_a[0]).map_or(1.0, |unit| unit.to_si(1.0));
+    }
+    for (at_a, column) in a.columns.iter().enumerate() {
+        if !pairs.used_a.contains(&at_a) && !ignored(&column.name) {
+            comparisons.extend(pairs.column(at_a));
+        }
+    }
+    for (at_b, column) in b.columns.iter().enumerate() {
+        if !pairs.used_b.contains(&at_b) && !ignored(&column.name) {
+            pairs.findings.push(Finding::new("column", &column.name, "only in B"));
+        }
+    }
+    comparisons.sort_by_key(|comparison| comparison.a[0]);
+    Ok(comparisons)
+}
+
+/// Columns that have found their partner so far.
+struct Pairs<'p> {
+    a: &'p Source,
+    b: &'p Source,
+    options: &'p Options,
+    used_a: BTreeSet<usize>,
+    used_b: BTreeSet<usize>,
+    findings: &'p mut Vec<Finding>,
+}
+
+impl Pairs<'_> {
+    /// Columns that are one rotation: a rotation vector, or a quaternion. None where one of the files lacks some of them.
+    fn rotation(&mut self, names: &[String], vector: bool) -> Option<Comparison> {
+        let at = |source: &Source| names.iter().map(|name| source.position(name)).collect::<Option<Vec<usize>>>();
+        let (at_a, at_b) = (at(self.a)?, at(self.b)?);
+        self.used_a.extend(&at_a);
+        self.used_b.extend(&at_b);
+        let factor = angle_unit(self.a, at_a[0]).map_or(1.0, |unit| unit.to_si(1.0));
         let how = if vector { How::RotationVector(factor) } else { How::Quaternion };
-        let (atol, rtol) = tolerance(a, &names[0], options, Unit::Radian);
-        comparisons.push(Comparison {
+        let (atol, rtol) = tolerance(self.a, &names[0], self.options, Unit::Radian);
+        Some(Comparison {
             name: names.join(","),
             a: at_a,
             b: at_b,
@@ -71,68 +98,34 @@ pub(super) fn plan(
             atol,
             rtol,
             sigma: None,
-        });
+        })
     }
-    for (at_a, column) in a.columns.iter().enumerate() {
-        if used_a.contains(&at_a) || ignored(&column.name) {
-            continue;
-        }
-        let Some(at_b) = counterpart(a, b, at_a, &used_b) else {
-            findings.push(Finding::new("column", &column.name, "only in A"));
-            continue;
+
+    /// A column of A with its counterpart in B. None where there is none, or one of another quantity.
+    fn column(&mut self, at_a: usize) -> Option<Comparison> {
+        let (a, b) = (self.a, self.b);
+        let column = &a.columns[at_a];
+        let Some(at_b) = counterpart(a, b, at_a, &self.used_b) else {
+            self.findings.push(Finding::new("column", &column.name, "only in A"));
+            return None;
         };
-        used_b.insert(at_b);
+        self.used_b.insert(at_b);
         let theirs = &b.columns[at_b];
-        if column.stored != theirs.stored {
-            findings.push(Finding::new(
-                "type",
-                &column.name,
-                format!("{} in A, {} in B", shown(&column.stored), shown(&theirs.stored)),
-            ));
-        }
-        if column.semantic != theirs.semantic && column.semantic.is_some() && theirs.semantic.is_some() {
-            let of = |semantic: &Option<String>| semantic.clone().unwrap_or_default();
-            findings.push(Finding::new(
-                "semantic",
-                &column.name,
-                format!("{} in A, {} in B", of(&column.semantic), of(&theirs.semantic)),
-            ));
-        }
-        let (unit_a, unit_b) = (unit(a, at_a), unit(b, at_b));
-        let mut conversion = (1.0, 0.0);
-        if let (Some(ours), Some(theirs_unit)) = (unit_a, unit_b)
-            && ours != theirs_unit
-        {
-            if ours.quantity() != theirs_unit.quantity() {
-                findings.push(Finding::new(
-                    "unit",
-                    &column.name,
-                    format!("{ours} in A, {theirs_unit} in B: not the same quantity"),
-                ));
-                continue;
-            }
-            let zero = ours.from_si(theirs_unit.to_si(0.0));
-            conversion = (ours.from_si(theirs_unit.to_si(1.0)) - zero, zero);
-            findings.push(Finding::new(
-                "unit",
-                &column.name,
-                format!("{ours} in A, {theirs_unit} in B; values compared in {ours}"),
-            ));
-        } else if column.name != theirs.name {
-            findings.push(Finding::new("column", &column.name, format!("called {} in B", theirs.name)));
-        }
+        self.kinds_apart(column, theirs);
+        let unit_a = unit(a, at_a);
+        let conversion = self.conversion((column, unit_a), (theirs, unit(b, at_b)))?;
         let text = column.kind == Kind::Text || theirs.kind == Kind::Text;
         let how = match (text, turn(a, at_a)) {
             (true, _) => How::Text,
             (false, Some(turn)) => How::Angle(turn),
             (false, None) => How::Number,
         };
-        let (atol, mut rtol) = tolerance(a, &column.name, options, unit_a.unwrap_or(Unit::One));
+        let (atol, mut rtol) = tolerance(a, &column.name, self.options, unit_a.unwrap_or(Unit::One));
         if conversion != (1.0, 0.0) {
             rtol = rtol.max(CONVERTED);
         }
         let symbol = column.unit.clone().or_else(|| unit_a.map(|unit| unit.symbol().to_string())).unwrap_or_default();
-        comparisons.push(Comparison {
+        Some(Comparison {
             name: column.name.clone(),
             a: vec![at_a],
             b: vec![at_b],
@@ -142,15 +135,47 @@ pub(super) fn plan(
             atol,
             rtol,
             sigma: sigma(a, b, &column.name),
-        });
+        })
     }
-    for (at_b, column) in b.columns.iter().enumerate() {
-        if !used_b.contains(&at_b) && !ignored(&column.name) {
-            findings.push(Finding::new("column", &column.name, "only in B"));
+
+    /// Says where two columns are stored, or meant, differently.
+    fn kinds_apart(&mut self, ours: &Column, theirs: &Column) {
+        if ours.stored != theirs.stored {
+            let text = format!("{} in A, {} in B", shown(&ours.stored), shown(&theirs.stored));
+            self.findings.push(Finding::new("type", &ours.name, text));
+        }
+        if let (Some(our_semantic), Some(semantic)) = (&ours.semantic, &theirs.semantic)
+            && our_semantic != semantic
+        {
+            self.findings.push(Finding::new("semantic", &ours.name, format!("{our_semantic} in A, {semantic} in B")));
         }
     }
-    comparisons.sort_by_key(|comparison| comparison.a[0]);
-    Ok(comparisons)
+
+    /// What makes B's values A's: factor and summand. None where they are of different quantities.
+    fn conversion(
+        &mut self,
+        (column, ours): (&Column, Option<Unit>),
+        (other, theirs): (&Column, Option<Unit>),
+    ) -> Option<(f64, f64)> {
+        let mut say = |what: &str, text: String| self.findings.push(Finding::new(what, &column.name, text));
+        match (ours, theirs) {
+            (Some(ours), Some(theirs)) if ours != theirs => {
+                if ours.quantity() != theirs.quantity() {
+                    say("unit", format!("{ours} in A, {theirs} in B: not the same quantity"));
+                    return None;
+                }
+                say("unit", format!("{ours} in A, {theirs} in B; values compared in {ours}"));
+                let zero = ours.from_si(theirs.to_si(0.0));
+                Some((ours.from_si(theirs.to_si(1.0)) - zero, zero))
+            }
+            _ => {
+                if column.name != other.name {
+                    say("column", format!("called {} in B", other.name));
+                }
+                Some((1.0, 0.0))
+            }
+        }
+    }
 }
 
 /// Rounding of a value that was stored in another unit: some units in the last place.

@@ -62,34 +62,25 @@ type Seer<'s> = dyn FnMut(&Cell) -> Result<()> + 's;
 fn numbers(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut Seer) -> Result<()> {
     let Beside { a, b, pairing, rows } = files;
     let size = comparison.a.len();
-    let mut theirs = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
-    let (scale, shift) = comparison.conversion;
-    if comparison.conversion != (1.0, 0.0) {
-        theirs.iter_mut().flat_map(|(values, _)| values).for_each(|value| *value = *value * scale + shift);
-    }
-    // Whole numbers beyond 2^53 differ where their nearest f64 does not.
-    let whole = size == 1 && a.columns[comparison.a[0]].kind == Kind::Int && b.columns[comparison.b[0]].kind == Kind::Int;
-    let their_whole = if whole { b.integers(comparison.b[0])? } else { Vec::new() };
-    let their_sigma = comparison.sigma.map(|(_, column)| b.numbers(column)).transpose()?;
+    let theirs = Theirs::read(a, b, comparison)?;
     let mut wanted = comparison.a.clone();
     wanted.extend(comparison.sigma.map(|(column, _)| column));
     let mut start = 0;
     let mut ours: Vec<Vec<f64>> = vec![Vec::new(); wanted.len()];
     let mut beside: Vec<Vec<f64>> = vec![Vec::new(); size];
-    let no_null_there = theirs.iter().all(|(_, nulls)| nulls.is_empty());
+    let no_null_there = theirs.columns.iter().all(|(_, nulls)| nulls.is_empty());
     for batch in a.stream(&wanted)? {
         let batch = batch?;
         for (values, array) in ours.iter_mut().zip(&batch) {
             values.clear();
             push_numbers(array, values);
         }
-        for (values, (theirs, _)) in beside.iter_mut().zip(&theirs) {
+        for (values, (theirs, _)) in beside.iter_mut().zip(&theirs.columns) {
             pairing.beside(theirs, start, batch[0].len(), values);
         }
-        let plain = size == 1 && !whole && no_null_there && batch[0].null_count() == 0;
+        let plain = size == 1 && theirs.integers.is_none() && no_null_there && batch[0].null_count() == 0;
         for at in 0..batch[0].len() {
-            let row = start + at;
-            let partner = pairing.partner(row);
+            let partner = pairing.partner(start + at);
             if partner == NONE {
                 continue;
             }
@@ -97,62 +88,115 @@ fn numbers(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut
                 tally.pairs += 1;
                 continue;
             }
-            let partner = partner as usize;
-            let null_a = batch[..size].iter().any(|array| array.is_null(at));
-            let null_b = theirs.iter().any(|(_, nulls)| nulls.get(partner).copied().unwrap_or(false));
-            let difference = match (null_a, null_b) {
-                (true, true) => continue,
-                (false, false) if size == 1 => {
-                    let (left, right) = (ours[0][at], beside[0][at]);
-                    tally.pairs += 1;
-                    let apart = if whole { apart(&batch[0], at, their_whole[partner]) } else { 0.0 };
-                    if (left == right && apart == 0.0) || (left.is_nan() && right.is_nan()) {
-                        continue;
-                    }
-                    if whole && comparison.conversion == (1.0, 0.0) { apart } else { one(comparison.how, right - left) }
-                }
-                (false, false) => {
-                    tally.pairs += 1;
-                    let left: Vec<f64> = ours[..size].iter().map(|values| values[at]).collect();
-                    let right: Vec<f64> = beside.iter().map(|values| values[at]).collect();
-                    if left == right {
-                        continue;
-                    }
-                    rotation(comparison.how, &left, &right)
-                }
-                _ => f64::NAN,
-            };
-            let (left, right) = (ours[0][at], beside[0][at]);
-            let value = |null: bool, value: f64| if null { Value::Null } else { Value::Number(value) };
-            let sigma = their_sigma.as_ref().and_then(|(values, nulls)| {
-                let (l, r) = (ours[size][at], values[partner]);
-                let null = batch[size].is_null(at) || nulls.get(partner).copied().unwrap_or(false);
-                let both = ((l * l + r * r) / 2.0).sqrt();
-                (!null && both > 0.0).then_some(both)
-            });
-            let largest = if size == 1 { left.abs().max(right.abs()) } else { 0.0 };
-            let allowed = comparison.atol + comparison.rtol * largest;
-            // A rotation whose quaternion has another sign is the same rotation.
-            if difference == 0.0 {
-                continue;
+            let pair = Pair { batch: &batch, ours: &ours, beside: &beside, at, partner: partner as usize };
+            if let Some(cell) = theirs.cell(comparison, &pair, start + at, tally) {
+                judge(&cell, rows, tally);
+                sees(&cell)?;
             }
-            let finite = difference.is_finite();
-            let sigmas = sigma.filter(|_| finite).map(|sigma| difference.abs() / sigma);
-            let cell = Cell {
-                row: row as u32,
-                changed: !(finite && difference.abs() <= allowed),
-                a: value(null_a, left),
-                b: value(null_b, right),
-                difference: finite.then_some(difference),
-                sigmas,
-                score: score(difference, allowed, sigmas, largest),
-            };
-            judge(&cell, rows, tally);
-            sees(&cell)?;
         }
         start += batch[0].len();
     }
     Ok(())
+}
+
+/// B's columns of a comparison, in A's unit, each with its nulls (empty where there are none).
+struct Theirs {
+    columns: Vec<(Vec<f64>, Vec<bool>)>,
+    /// Where both are whole numbers: beyond 2^53 these differ where their nearest f64 does not.
+    integers: Option<Vec<i64>>,
+    sigma: Option<(Vec<f64>, Vec<bool>)>,
+}
+
+/// A row of A and its partner.
+struct Pair<'p> {
+    /// Of A: the columns, and their numbers, with the column of sigmas last where there is one.
+    batch: &'p [ArrayRef],
+    ours: &'p [Vec<f64>],
+    /// B's numbers, in the order of A.
+    beside: &'p [Vec<f64>],
+    /// In the batch.
+    at: usize,
+    /// In B.
+    partner: usize,
+}
+
+fn is_null(nulls: &[bool], row: usize) -> bool {
+    nulls.get(row).copied().unwrap_or(false)
+}
+
+impl Theirs {
+    fn read(a: &Source, b: &Source, comparison: &Comparison) -> Result<Self> {
+        let mut columns = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
+        let (scale, shift) = comparison.conversion;
+        if comparison.conversion != (1.0, 0.0) {
+            columns.iter_mut().flat_map(|(values, _)| values).for_each(|value| *value = *value * scale + shift);
+        }
+        let whole = comparison.a.len() == 1
+            && a.columns[comparison.a[0]].kind == Kind::Int
+            && b.columns[comparison.b[0]].kind == Kind::Int;
+        let integers = whole.then(|| b.integers(comparison.b[0])).transpose()?;
+        let sigma = comparison.sigma.map(|(_, column)| b.numbers(column)).transpose()?;
+        Ok(Self { columns, integers, sigma })
+    }
+
+    /// What a pair shows; none where both are the same.
+    fn cell(&self, comparison: &Comparison, pair: &Pair, row: usize, tally: &mut Tally) -> Option<Cell> {
+        let size = comparison.a.len();
+        let null_a = pair.batch[..size].iter().any(|array| array.is_null(pair.at));
+        let null_b = self.columns.iter().any(|(_, nulls)| is_null(nulls, pair.partner));
+        let difference = match (null_a, null_b) {
+            (true, true) => return None,
+            (false, false) => {
+                tally.pairs += 1;
+                self.difference(comparison, pair)?
+            }
+            _ => f64::NAN,
+        };
+        let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
+        let value = |null: bool, value: f64| if null { Value::Null } else { Value::Number(value) };
+        let largest = if size == 1 { left.abs().max(right.abs()) } else { 0.0 };
+        let allowed = comparison.atol + comparison.rtol * largest;
+        let finite = difference.is_finite();
+        let sigmas = self.sigma(size, pair).filter(|_| finite).map(|sigma| difference.abs() / sigma);
+        Some(Cell {
+            row: row as u32,
+            changed: !(finite && difference.abs() <= allowed),
+            a: value(null_a, left),
+            b: value(null_b, right),
+            difference: finite.then_some(difference),
+            sigmas,
+            score: score(difference, allowed, sigmas, largest),
+        })
+    }
+
+    /// Theirs minus ours; none where both are the same, as rotations are whose quaternions differ in sign.
+    fn difference(&self, comparison: &Comparison, pair: &Pair) -> Option<f64> {
+        let difference = if comparison.a.len() == 1 {
+            let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
+            let whole = self.integers.as_ref().map(|theirs| apart(&pair.batch[0], pair.at, theirs[pair.partner]));
+            if (left == right && whole.unwrap_or(0.0) == 0.0) || (left.is_nan() && right.is_nan()) {
+                return None;
+            }
+            whole.filter(|_| comparison.conversion == (1.0, 0.0)).unwrap_or_else(|| one(comparison.how, right - left))
+        } else {
+            let left: Vec<f64> = pair.ours[..comparison.a.len()].iter().map(|values| values[pair.at]).collect();
+            let right: Vec<f64> = pair.beside.iter().map(|values| values[pair.at]).collect();
+            if left == right {
+                return None;
+            }
+            rotation(comparison.how, &left, &right)
+        };
+        (difference != 0.0).then_some(difference)
+    }
+
+    /// The sigma of both, where both have one above zero.
+    fn sigma(&self, size: usize, pair: &Pair) -> Option<f64> {
+        let (values, nulls) = self.sigma.as_ref()?;
+        let (ours, theirs) = (pair.ours[size][pair.at], values[pair.partner]);
+        let null = pair.batch[size].is_null(pair.at) || is_null(nulls, pair.partner);
+        let both = ((ours * ours + theirs * theirs) / 2.0).sqrt();
+        (!null && both > 0.0).then_some(both)
+    }
 }
 
 /// What a difference is worth: sigmas where they are known, else times the tolerance, else relative to what is representable.

@@ -27,12 +27,7 @@ pub(super) fn curves(
     prediction: &Prediction,
 ) -> Result<Curves> {
     let specs = model.stack.specs();
-    let mut sigma = BTreeMap::new();
-    for row in &parameters.0 {
-        if let (Some(value), Some(unit)) = (row.sigma, Unit::parse(&row.unit)) {
-            sigma.insert(row.name.as_str(), unit.to_si(value));
-        }
-    }
+    let sigma = sigmas(parameters);
     let shown: Vec<usize> = (0..data.rows().min(prediction.0.len())).filter(|row| !prediction.0[*row].suspect).collect();
     let whole = model.predict(data);
     let mut out = Vec::new();
@@ -100,6 +95,12 @@ pub(super) fn curves(
         }
     }
     Ok(Curves(out))
+}
+
+/// One standard deviation (SI) of the parameters that have one, by name.
+fn sigmas(parameters: &Parameters) -> BTreeMap<&str, f64> {
+    let known = parameters.0.iter().filter_map(|row| Some((row, row.sigma?, Unit::parse(&row.unit)?)));
+    known.map(|(row, sigma, unit)| (row.name.as_str(), unit.to_si(sigma))).collect()
 }
 
 /// What counts time where the recording has no clock.

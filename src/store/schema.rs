@@ -17,6 +17,7 @@ use crate::units::Unit;
 const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/changes.json"),
     include_str!("../../schemas/corrections.json"),
+    include_str!("../../schemas/covariance.json"),
     include_str!("../../schemas/curves.json"),
     include_str!("../../schemas/document.json"),
     include_str!("../../schemas/finding_numbers.json"),

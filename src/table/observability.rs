@@ -13,7 +13,7 @@ crate::table::rows! { "observability",
     }
 }
 
-use crate::estimate::Fitted;
+use crate::estimate::{Fitted, Repeated};
 
 /// What stands beside a fit in its table.
 #[derive(Debug, Clone, Copy, Default)]
@@ -72,23 +72,7 @@ impl Observability {
             push("joint_repeatability_rad", 0, sigma, "standard deviation of every revolute joint that rows are weighted by");
         }
         if let Some(repeated) = &fitted.repeated {
-            push("repeated_poses", 0, repeated.poses as f64, "fitted poses measured more than once");
-            let floor = if repeated.revisited {
-                "standard deviation per axis of rows about their pose's mean: no model can do better"
-            } else {
-                "standard deviation per axis of rows about their pose's mean, the arm at rest: without the joints' repeatability"
-            };
-            push("repeat_noise_mm", 0, repeated.noise * 1e3, floor);
-            push("repeat_freedom", 0, repeated.freedom as f64, "degrees of freedom of repeat_noise_mm");
-            if let Some((ratio, chance)) = repeated.lack_of_fit {
-                push(
-                    "lack_of_fit_F",
-                    0,
-                    ratio,
-                    "mean square of what is left between poses over that within: 1 for a complete model",
-                );
-                push("lack_of_fit_p", 0, chance, "chance of a larger F under a complete model");
-            }
+            of_repeats(repeated, &mut |quantity, value, meaning| push(quantity, 0, value, meaning));
         }
         if fitted.clusters > 0 {
             push(
@@ -110,5 +94,21 @@ impl Observability {
         }
         rows.sort_by(|a, b| (&a.quantity, a.index).cmp(&(&b.quantity, b.index)));
         Self(rows)
+    }
+}
+
+/// What poses say that were measured more than once: quantity, value, meaning.
+fn of_repeats(repeated: &Repeated, push: &mut dyn FnMut(&str, f64, &str)) {
+    push("repeated_poses", repeated.poses as f64, "fitted poses measured more than once");
+    let floor = if repeated.revisited {
+        "standard deviation per axis of rows about their pose's mean: no model can do better"
+    } else {
+        "standard deviation per axis of rows about their pose's mean, the arm at rest: without the joints' repeatability"
+    };
+    push("repeat_noise_mm", repeated.noise * 1e3, floor);
+    push("repeat_freedom", repeated.freedom as f64, "degrees of freedom of repeat_noise_mm");
+    if let Some((ratio, chance)) = repeated.lack_of_fit {
+        push("lack_of_fit_F", ratio, "mean square of what is left between poses over that within: 1 for a complete model");
+        push("lack_of_fit_p", chance, "chance of a larger F under a complete model");
     }
 }

@@ -101,20 +101,9 @@ impl Case {
         let concealed = size(design, &drafts, &site, &shadow, 1e-3 * noise_mm[0], &mut draw);
         let hidden = hidden(&drafts, &mut draw);
 
-        let mut effects: Vec<Physical> = concealed.iter().flat_map(|one| one.cause.physical.clone()).collect();
-        let friction = if draw.chance(0.5) { 0.02 } else { 0.0 };
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
-        for (joint, peak) in bench.peak.iter().enumerate() {
-            let torque_nm = friction * draw.uniform(0.2, 1.0) * peak;
-            effects.push(Physical::HoldingFriction(HoldingFriction { joint: joint + 1, torque_nm }));
-        }
-        let largest = robot
-            .joints
-            .iter()
-            .zip(&bench.peak)
-            .map(|(joint, peak)| peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0)));
-        let motors = Motors { sign: Vec::new(), noise_a: 0.003 * largest.fold(0.0, f64::max) };
+        let (effects, motors) = acting(&robot, &bench, &concealed, &mut draw);
         let play = vec![play_rad / ARCSEC; robot.joints.len()];
         let poses = Poses::default();
         let experiment = Experiment {
@@ -172,6 +161,23 @@ impl Case {
         let named = causes.into_iter().map(|one| (one.cause.effect, one.cause.place.clone()));
         named.chain(self.tampered.iter().map(|one| (one.effect, "recording".to_string()))).collect()
     }
+}
+
+/// What is concealed, with friction in half of the cases, and the motors that show it.
+fn acting(robot: &RobotDescription, bench: &Bench, concealed: &[Concealed], draw: &mut Noise) -> (Vec<Physical>, Motors) {
+    let mut effects: Vec<Physical> = concealed.iter().flat_map(|one| one.cause.physical.clone()).collect();
+    let friction = if draw.chance(0.5) { 0.02 } else { 0.0 };
+    for (joint, peak) in bench.peak.iter().enumerate() {
+        let torque_nm = friction * draw.uniform(0.2, 1.0) * peak;
+        effects.push(Physical::HoldingFriction(HoldingFriction { joint: joint + 1, torque_nm }));
+    }
+    let largest = robot
+        .joints
+        .iter()
+        .zip(&bench.peak)
+        .map(|(joint, peak)| peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0)));
+    let motors = Motors { sign: Vec::new(), noise_a: 0.003 * largest.fold(0.0, f64::max) };
+    (effects, motors)
 }
 
 /// Manufacturing errors everywhere.
