@@ -8,14 +8,14 @@ const ROUNDS: usize = 6;
 
 /// Rounds so far.
 #[derive(Default)]
-pub(crate) struct Progress {
+pub(crate) struct RoundHistory {
     /// Causes that each round found.
     seen: Vec<Vec<Form>>,
 }
 
 /// What comes after a round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum RoundOutcome {
     /// Something changed: look again from there.
     Again,
     /// The same causes and rows as before.
@@ -24,14 +24,14 @@ pub(crate) enum Step {
     Last,
 }
 
-impl Progress {
+impl RoundHistory {
     /// The number of the round that is under way, from 1.
     pub fn round(&self) -> usize {
         self.seen.len() + 1
     }
 
     /// Takes note of a round that began with one model and ended with another.
-    pub fn step(&mut self, now: &FitState, next: &FitState) -> Step {
+    pub fn step(&mut self, now: &FitState, next: &FitState) -> RoundOutcome {
         let round = self.round();
         let forms: Vec<Form> = next.causes.iter().map(|cause| cause.form.clone()).collect();
         let same = forms.len() == now.causes.len() && forms.iter().all(|form| now.causes.iter().any(|cause| cause.form == *form));
@@ -39,11 +39,11 @@ impl Progress {
         let circles = !same && self.seen.contains(&forms);
         self.seen.push(forms);
         if round >= ROUNDS || circles || now.screening.apart.is_some() {
-            Step::Last
+            RoundOutcome::Last
         } else if same && next.screening.kept == now.screening.kept {
-            Step::Settled
+            RoundOutcome::Settled
         } else {
-            Step::Again
+            RoundOutcome::Again
         }
     }
 }
