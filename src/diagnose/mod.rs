@@ -56,12 +56,12 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let causes = EstimatedCause::all(&view.problem, search.pool.estimated(&found.set));
         tell(words::of_a_round(history.round(), search.pool, causes.iter().map(|cause| &cause.form), found.last));
         let next = fitter.fit(&now.model, causes);
-        let step = history.step(&now, &next);
-        if step == RoundOutcome::Again {
+        let outcome = history.after(&now, &next);
+        if outcome == RoundOutcome::Again {
             now = next;
             continue;
         }
-        let structureless = step == RoundOutcome::Settled && found.last > SIGNIFICANT;
+        let structureless = outcome == RoundOutcome::Settled && found.last > SIGNIFICANT;
         if let Some(sigma) = structureless.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);

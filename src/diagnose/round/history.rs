@@ -13,7 +13,7 @@ pub(crate) struct RoundHistory {
     seen: Vec<Vec<Form>>,
 }
 
-/// What comes after a round.
+/// What a round ends with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RoundOutcome {
     /// Something changed: look again from there.
@@ -30,8 +30,8 @@ impl RoundHistory {
         self.seen.len() + 1
     }
 
-    /// Takes note of a round that began with one model and ended with another.
-    pub fn step(&mut self, now: &FitState, next: &FitState) -> RoundOutcome {
+    /// What comes after a round that began with one model and ended with another.
+    pub fn after(&mut self, now: &FitState, next: &FitState) -> RoundOutcome {
         let round = self.round();
         let forms: Vec<Form> = next.causes.iter().map(|cause| cause.form.clone()).collect();
         let same = forms.len() == now.causes.len() && forms.iter().all(|form| now.causes.iter().any(|cause| cause.form == *form));
