@@ -27,6 +27,7 @@
 //! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
@@ -46,6 +47,7 @@
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
+//! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 
 #![forbid(unsafe_code)]
@@ -88,6 +90,7 @@ pub mod stage;
 pub mod pipeline;
 
 pub mod audit;
+pub mod export;
 pub mod fleet;
 pub mod identified;
 

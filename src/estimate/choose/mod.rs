@@ -8,10 +8,12 @@ mod drive;
 mod exchange;
 mod sight;
 mod site;
+mod spread;
 mod tell;
 
 pub use sight::{Score, Sight};
 pub use site::{Circumstances, Site};
+pub use spread::spread;
 pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
 
 use super::model::Model;

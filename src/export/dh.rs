@@ -1,7 +1,9 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
-use super::{Export, one_line};
+use super::model::one_line;
+use super::{Export, Format};
 use crate::error::Result;
+use crate::estimate::choose::spread;
 use crate::robot::description::JointKind;
 use crate::robot::import::{Text, read_calib};
 use crate::robot::{RobotModel, Row, Rows};
@@ -10,12 +12,46 @@ use nalgebra::{Rotation3, UnitQuaternion};
 /// arcsec: neighbouring axes nearer to parallel than this make a table worth a warning.
 const FLAT_ARCSEC: f64 = 3600.0;
 
+/// Poses at which the table that is read back is compared with the geometry.
+const POSES: usize = 500;
+
+pub(super) struct Dh;
+pub(super) struct Mdh;
+
+impl Format for Dh {
+    fn name(&self) -> &'static str {
+        "dh"
+    }
+
+    fn help(&self) -> &'static str {
+        "calib's robot file with a Denavit-Hartenberg table"
+    }
+
+    fn text(&self, export: &Export) -> Result<String> {
+        text(export, false)
+    }
+}
+
+impl Format for Mdh {
+    fn name(&self) -> &'static str {
+        "mdh"
+    }
+
+    fn help(&self) -> &'static str {
+        "The same with Craig's modified table"
+    }
+
+    fn text(&self, export: &Export) -> Result<String> {
+        text(export, true)
+    }
+}
+
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
-pub(super) fn text(export: &Export, modified: bool) -> Result<String> {
+fn text(export: &Export, modified: bool) -> Result<String> {
     let body = body(export, modified);
     let back = read_calib(Text { label: "exported table", text: &body }, None)?.robot;
     let (now, then) = (RobotModel::new(back), RobotModel::new(export.corrected.clone()));
-    let poses = super::spread(&then);
+    let poses = spread(&then, POSES);
     let apart =
         (0..poses.rows()).map(|row| (now.forward(poses.q(row)).translation - then.forward(poses.q(row)).translation).norm());
     let most = apart.fold(0.0, f64::max) * 1e3;
