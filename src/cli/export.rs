@@ -11,7 +11,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Export the identified model: corrected geometry as URDF, DH or modified DH table, the whole model as JSON, or numbers for the controller.
+/// Export the identified model: its corrected geometry for other programs, all of it as JSON, or numbers for the controller.
 ///
 /// Formats carry rigid geometry; what they cannot carry (ratios, compliance, cyclic errors, a learned correction) is listed with what it does to
 /// the point, in the file and on stderr. `calib compensate` uses all of it.
