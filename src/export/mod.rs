@@ -3,6 +3,7 @@
 mod controller;
 mod dh;
 mod json;
+mod mjcf;
 mod model;
 mod urdf;
 mod xml;
@@ -21,4 +22,4 @@ pub trait Format: Sync {
 }
 
 /// All formats, in the order of the help.
-pub const FORMATS: &[&dyn Format] = &[&urdf::Urdf, &dh::Dh, &dh::Mdh, &json::Json, &controller::Controller];
+pub const FORMATS: &[&dyn Format] = &[&urdf::Urdf, &dh::Dh, &dh::Mdh, &json::Json, &mjcf::Mjcf, &controller::Controller];

@@ -46,7 +46,7 @@ fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
     assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
 }
 
-const ROBOT: &str = "calib_robot: 1
+pub const ROBOT: &str = "calib_robot: 1
 name: small
 units: {length: mm, angle: deg}
 kinematics:
