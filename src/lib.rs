@@ -27,7 +27,8 @@
 //! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
+//! | [`init`] | what a folder of files is, and the pipeline that reads it | raw, stage, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
@@ -93,6 +94,7 @@ pub mod audit;
 pub mod export;
 pub mod fleet;
 pub mod identified;
+pub mod init;
 
 #[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;

@@ -7,6 +7,7 @@ use crate::estimate::choose::spread;
 use crate::robot::description::JointKind;
 use crate::robot::import::{Text, read_calib};
 use crate::robot::{RobotModel, Row, Rows};
+use crate::yaml::quoted;
 use nalgebra::{Rotation3, UnitQuaternion};
 
 /// arcsec: neighbouring axes nearer to parallel than this make a table worth a warning.
@@ -74,7 +75,7 @@ fn body(export: &Export, modified: bool) -> String {
         ));
     }
     out.push_str("calib_robot: 1\n");
-    out.push_str(&format!("name: {}\n", quoted(&robot.name)));
+    out.push_str(&format!("name: {}\n", quoted(&one_line(&robot.name))));
     out.push_str("units: {length: mm, angle: deg}\n");
     out.push_str(&format!("kinematics:\n  {}:\n", if modified { "mdh" } else { "dh" }));
     let kind = |joint: usize| if robot.joints[joint].kind == JointKind::Prismatic { ", kind: prismatic" } else { "" };
@@ -107,7 +108,7 @@ fn body(export: &Export, modified: bool) -> String {
         let ratio = joint.reduction_ratio.map(|ratio| format!(", reduction_ratio: {ratio:?}"));
         let constant = joint.motor_constant.map(|constant| format!(", motor_constant: {constant:?}"));
         let more: String = [limits, ratio, constant].into_iter().flatten().collect();
-        out.push_str(&format!("  - {{name: {}{more}}}\n", quoted(&joint.name)));
+        out.push_str(&format!("  - {{name: {}{more}}}\n", quoted(&one_line(&joint.name))));
     }
     out
 }
@@ -123,9 +124,4 @@ fn mm(metres: f64) -> f64 {
 
 fn deg(radians: f64) -> f64 {
     radians.to_degrees()
-}
-
-/// A YAML text in double quotes; JSON's escapes are YAML's.
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(one_line(text)).to_string()
 }

@@ -94,7 +94,7 @@ pub fn slurm(note: &RunNote, wishes: &Wishes) -> Result<Vec<Script>> {
 
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
 pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> String {
-    let yaml = |text: &str| serde_json::Value::from(text).to_string();
+    let yaml = crate::yaml::quoted;
     let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
     let limit =
         wishes.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();

@@ -135,6 +135,34 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
 }
 
 #[test]
+fn units_of_targets_are_written_as_in_headers_of_recordings() {
+    let row = "10,20,-30,5,40,0\n";
+    let joints = |header: fn(usize) -> String| {
+        let input = (1..=6).map(header).collect::<Vec<_>>().join(",") + "\n" + row;
+        let output = calib(cell(), &["compensate", "latest", "--plain", "--quiet"], &input);
+        assert!(output.status.success(), "{input}{}", text(&output.stderr));
+        text(&output.stdout).lines().nth(1).expect("a row").to_string()
+    };
+    let expected = joints(|n| format!("q{n}_deg"));
+    assert_ne!(expected, row.trim_end());
+    let written: [fn(usize) -> String; 6] = [
+        |n| format!("J{n} [Grad]"),
+        |n| format!("A{n} [\u{b0}]"),
+        |n| format!("q{n} (Degrees)"),
+        |n| format!("A{n} deg"),
+        |n| format!("J{n}/Grad"),
+        |n| format!("joint{n}_GRAD"),
+    ];
+    for header in written {
+        assert_eq!(joints(header), expected, "{}", header(1));
+    }
+    let point = |name: &str| format!("{name} [Millimeter]");
+    let input = ["x", "y", "z"].map(point).join(",") + ",x_c\n900,40,930,7\n";
+    let output = calib(cell(), &["compensate", "latest", "--quiet"], &input);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+#[test]
 fn what_is_known_of_a_target_stands_behind_it() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n119.999,20,-30,5,40,179\n";
     let output = calib(cell(), &["compensate", "pipeline.yaml", "-"], input);

@@ -2,10 +2,10 @@
 
 use super::names::{LENGTHS, Name, joints};
 use super::points::{Way, points};
-use super::quoted;
 use super::sheet::Sheet;
 use super::words;
 use crate::error::Result;
+use crate::yaml::quoted;
 use std::path::Path;
 
 /// No angle in rad is beyond this.

@@ -1,18 +1,17 @@
 //! Robot files to start from: typical arms, every number of which the user replaces.
 
-use clap::ValueEnum;
+use crate::yaml::quoted;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Kind {
-    /// Six joints, the last three axes meet in a point (most industrial arms)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
     Spherical6,
-    /// Six joints, offset wrist (most cobots)
     Offset6,
-    /// Seven joints, alternating axes
     Seven,
-    /// Six joints as a table of DH parameters
     Dh6,
 }
+
+/// All of them, in the order of the help.
+pub const KINDS: [Kind; 4] = [Kind::Spherical6, Kind::Offset6, Kind::Seven, Kind::Dh6];
 
 impl Kind {
     pub fn name(self) -> &'static str {
@@ -24,11 +23,21 @@ impl Kind {
         }
     }
 
+    /// What it is, in one line.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Spherical6 => "Six joints, the last three axes meet in a point (most industrial arms)",
+            Self::Offset6 => "Six joints, offset wrist (most cobots)",
+            Self::Seven => "Seven joints, alternating axes",
+            Self::Dh6 => "Six joints as a table of DH parameters",
+        }
+    }
+
     pub fn joints(self) -> usize {
         if self == Self::Seven { 7 } else { 6 }
     }
 
-    pub fn text(self) -> String {
+    pub(super) fn text(self) -> String {
         let (kinematics, tool) = match self {
             Self::Spherical6 => (SPHERICAL6, "{point: [1854, 50, 1340]}"),
             Self::Offset6 => (OFFSET6, "{point: [-1184.3, -300, 11.6]}"),
@@ -50,7 +59,7 @@ impl Kind {
 pub(super) fn of_urdf(tip: &str) -> String {
     format!(
         "{HEAD}  urdf: {{base: base_link, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{TAIL}",
-        super::quoted(tip)
+        quoted(tip)
     )
 }
 

@@ -1,6 +1,7 @@
 //! What the name of a column says: words, a unit, the number of a joint, an axis of a point.
 
 use super::words;
+use crate::units::{Header, Unit};
 
 /// A column's name taken apart.
 #[derive(Debug, Clone)]
@@ -16,9 +17,9 @@ pub(super) struct Name {
 impl Name {
     pub fn of(text: &str) -> Self {
         let lower = text.trim().to_lowercase();
-        let (stem, unit, ending) = without_unit(&lower);
+        let Header { stem, unit, ending } = Header::of(&lower);
         let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_string).collect();
-        Self { words, unit, ending }
+        Self { words, unit: unit.map(Unit::symbol), ending: ending.map(str::to_string) }
     }
 
     pub fn stem(&self) -> String {
@@ -78,28 +79,6 @@ fn axis(word: &str) -> Option<(usize, &str)> {
         Some((axis, more))
     });
     named.filter(|(_, more)| more.len() < word.len())
-}
-
-type Stem<'a> = (&'a str, Option<&'static str>, Option<String>);
-
-fn without_unit(lower: &str) -> Stem<'_> {
-    for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some((stem, inside)) = lower.strip_suffix(close).and_then(|text| text.rsplit_once(open))
-            && !stem.trim().is_empty()
-            && let Some(unit) = words::unit(inside)
-        {
-            return (stem.trim(), Some(unit), None);
-        }
-    }
-    for separator in ["_", " ", "/", "."] {
-        if let Some((stem, ending)) = lower.rsplit_once(separator)
-            && !stem.trim().is_empty()
-            && let Some(unit) = words::unit(ending)
-        {
-            return (stem.trim().trim_end_matches(" in"), Some(unit), Some(ending.trim().to_string()));
-        }
-    }
-    (lower, None, None)
 }
 
 /// Rows of columns that may be the joints, best first: those of usual names, else the longest of four or more that `angle` takes for angles.

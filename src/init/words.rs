@@ -1,42 +1,5 @@
 //! The words that people use in headers, in small letters: English, German, French, Spanish, Italian.
 
-/// Units by how people write them in a header.
-const UNITS: [(&str, &str); 28] = [
-    ("mm", "mm"),
-    ("millimeter", "mm"),
-    ("m", "m"),
-    ("meter", "m"),
-    ("um", "um"),
-    ("\u{b5}m", "um"),
-    ("\u{3bc}m", "um"),
-    ("in", "in"),
-    ("inch", "in"),
-    ("deg", "deg"),
-    ("degree", "deg"),
-    ("degrees", "deg"),
-    ("degr\u{e9}s", "deg"),
-    ("grad", "deg"),
-    ("grados", "deg"),
-    ("\u{b0}", "deg"),
-    ("\u{ba}", "deg"),
-    ("rad", "rad"),
-    ("kg", "kg"),
-    ("c", "C"),
-    ("\u{b0}c", "C"),
-    ("\u{ba}c", "C"),
-    ("degc", "C"),
-    ("s", "s"),
-    ("sec", "s"),
-    ("ms", "ms"),
-    ("a", "A"),
-    ("nm", "Nm"),
-];
-
-/// The unit that a text in small letters stands for.
-pub(super) fn unit(text: &str) -> Option<&'static str> {
-    UNITS.iter().find(|(written, _)| *written == text.trim()).map(|(_, unit)| *unit)
-}
-
 /// What the joints' columns are usually called; the number of the joint follows.
 pub(super) const JOINTS: [&str; 14] =
     ["q", "a", "j", "joint", "axis", "theta", "achse", "gelenk", "axe", "asse", "eje", "jnt", "joint_angle", "articulaci\u{f3}n"];

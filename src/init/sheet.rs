@@ -1,9 +1,9 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
-use super::words;
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::stage::ingest::encoding;
+use crate::units::{Unit, written};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -134,7 +134,7 @@ impl Sheet {
         let first = begins + usize::from(table.get(begins).is_some_and(|row| is_units(row)) && sheet.header);
         sheet.unit_row = first > begins;
         sheet.units = match table.get(begins).filter(|_| sheet.unit_row) {
-            Some(row) => row.iter().map(|cell| words::unit(bare(&cell.to_lowercase()))).collect(),
+            Some(row) => row.iter().map(|cell| unit(cell)).collect(),
             None => Vec::new(),
         };
         let width = sheet.names.len();
@@ -229,14 +229,14 @@ fn is_names(row: &[String]) -> bool {
     filled(row.to_vec()).len() >= NARROWEST && numeric(row) == 0 && 2 * named > row.len()
 }
 
-/// The unit in a cell without brackets.
-fn bare(cell: &str) -> &str {
-    cell.trim_matches(['[', ']', '(', ')', ' '])
+/// The unit that a cell holds, with brackets or without.
+fn unit(cell: &str) -> Option<&'static str> {
+    written(cell.to_lowercase().trim_matches(['[', ']', '(', ')', ' '])).map(Unit::symbol)
 }
 
 fn is_units(row: &[String]) -> bool {
     let mut said = row.iter().filter(|cell| !cell.is_empty() && *cell != "-").peekable();
-    said.peek().is_some() && said.all(|cell| words::unit(bare(&cell.to_lowercase())).is_some())
+    said.peek().is_some() && said.all(|cell| unit(cell).is_some())
 }
 
 /// The line of names above the first line of numbers as wide as itself.

@@ -3,6 +3,7 @@
 use super::columns::Found;
 use super::sheet::number;
 use super::words;
+use crate::statistics;
 use std::collections::BTreeSet;
 
 /// Names that fewer rows share than this are not the same names.
@@ -203,14 +204,10 @@ fn timing(one: &Found, two: &Found) -> Option<Timing> {
         let around = [at.checked_sub(1), Some(at)].into_iter().flatten().filter_map(|at| many.get(at));
         around.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min)
     };
-    let near = median(few.iter().map(nearest).collect());
-    let step = median(few.windows(2).map(|pair| pair[1] - pair[0]).collect());
+    let median = |mut values: Vec<f64>| statistics::nearest(&mut values, 0.5);
+    let near = median(few.iter().map(nearest).collect())?;
+    let step = median(few.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
     Some(Timing { near, step, overlap: near <= 0.5 * step, apart: second[0] - first[0], rows: [first.len(), second.len()] })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 fn by_time(timing: &Timing, files: [&Found; 2]) -> Joined {

@@ -1,8 +1,9 @@
 //! The text of the pipeline that `init` writes.
 
+use super::Request;
 use super::columns::{Choice, Found, Mapping};
 use super::together::Joined;
-use super::{InitArguments, quoted};
+use crate::yaml::quoted;
 use std::path::Path;
 
 /// How the pipeline's folder names a file.
@@ -13,14 +14,16 @@ fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-pub(super) fn text(arguments: &InitArguments, found: &[Found], joined: &Joined) -> String {
-    let name = arguments.folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+pub(super) fn text(request: &Request, found: &[Found], joined: &Joined) -> String {
+    // A folder that is still to be made has its name already.
+    let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
+    let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let name: String = name.unwrap_or_default().chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).collect();
     let name = if name.is_empty() { "cell".into() } else { name };
     let mut out = format!(
         "# A calibration, step by step. `calib check` tells every fault with its line, `calib run` does what is not already done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
     );
-    let urdf = arguments.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(&arguments.folder, path)));
+    let urdf = request.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
     out.push_str(&format!("  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n", urdf.unwrap_or_default()));
     out.push_str("  # Which column holds what, in which unit. Nothing is guessed when this runs: what stands here counts.\n");
     out.push_str("  - uses: ingest\n    with:\n      files:\n");
@@ -28,11 +31,11 @@ pub(super) fn text(arguments: &InitArguments, found: &[Found], joined: &Joined) 
         out.push_str(EMPTY);
     }
     let missing = missing(found);
-    for (k, (path, file)) in arguments.data.iter().zip(found).enumerate() {
-        out.push_str(&format!("        - file: {}\n", from_folder(&arguments.folder, path)));
+    for (k, (path, file)) in request.data.iter().zip(found).enumerate() {
+        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, path)));
         // Joints come first, in the controller's file; the tracker's is the last.
         let lacks =
-            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: arguments.robot.joints() };
+            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints() };
         out.push_str(&file_text(file, &lacks));
     }
     joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
