@@ -1,8 +1,7 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
-use super::model::one_line;
 use super::{Export, Format};
-use crate::error::Result;
+use crate::error::{Result, one_line};
 use crate::estimate::choose::spread;
 use crate::robot::description::JointKind;
 use crate::robot::import::{Text, read_calib};

@@ -1,10 +1,10 @@
 //! MJCF, MuJoCo's own format: every body's frame parallel to the base at the zero pose and on its joint's axis, so that no angle is
 //! converted and a joint at 0 is the robot at 0. The measured point is a site.
 
-use super::model::{PLACEHOLDER, one_line, placeholder_inertia};
+use super::model::{PLACEHOLDER, placeholder_inertia};
 use super::xml::{self, Xml, empty, numbers, offset};
 use super::{Export, Format};
-use crate::error::Result;
+use crate::error::{Result, one_line};
 use crate::robot::description::{JointDescription, JointKind, RobotDescription};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::io;

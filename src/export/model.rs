@@ -1,6 +1,7 @@
 //! What is exported: the corrected geometry, and how well it stands for the whole model.
 
 use crate::compensate::{LeftOut, distance, left_out, rigid};
+use crate::error::one_line;
 use crate::estimate::choose::spread;
 use crate::identified::Identified;
 use crate::robot::description::RobotDescription;
@@ -56,11 +57,6 @@ impl Export {
         }
         lines
     }
-}
-
-/// A name from a file without line breaks and control characters.
-pub(super) fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// What is to be said of [`placeholder_inertia`].

@@ -1,9 +1,9 @@
 //! URDF: every joint frame parallel to the base at the zero pose and on its axis, so that no angle is converted.
 
-use super::model::{PLACEHOLDER, one_line, placeholder_inertia};
+use super::model::{PLACEHOLDER, placeholder_inertia};
 use super::xml::{self, Xml, empty, numbers, offset};
 use super::{Export, Format};
-use crate::error::Result;
+use crate::error::{Result, one_line};
 use crate::robot::description::{JointDescription, JointKind, RobotDescription};
 use nalgebra::{Matrix3, Rotation3};
 use std::io;

@@ -4,6 +4,7 @@
 
 use super::ledger::RunNote;
 use crate::error::{Error, Fault, Result};
+use crate::shell::quoted;
 use std::path::{Path, PathBuf};
 
 /// Slurm's default `MaxArraySize` is 1001: larger arrays are refused.
@@ -115,9 +116,4 @@ pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> 
         yaml(&wishes.store.to_string_lossy()),
         yaml(claim)
     )
-}
-
-/// A word for a POSIX shell, whatever is in it.
-fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', "'\\''"))
 }

@@ -3,6 +3,7 @@
 use super::Request;
 use super::columns::{Choice, Found, Mapping};
 use super::together::Joined;
+use crate::error::one_line;
 use crate::yaml::quoted;
 use std::path::Path;
 
@@ -113,11 +114,6 @@ fn file_text(file: &Found, lacks: &Lacks) -> String {
 /// Quantities in the order in which they are written.
 const ORDER: [&str; 11] =
     ["point_id", "time", "q", "usage", "target", "current", "direction", "velocity", "x", "payload", "temperature"];
-
-/// A text that ends no comment before its time.
-fn one_line(text: &str) -> String {
-    text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
-}
 
 /// A mapping with what else may stand for it.
 fn mapped(mapping: &Mapping) -> String {

@@ -287,7 +287,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
     let told = |more: &[&str]| text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr);
     let (loud, quiet) = (told(&[]), told(&["-q"]));
-    assert!(loud.contains("model: ") && loud.contains("1 targets; "), "{loud}");
+    assert!(loud.contains("model: ") && loud.contains("1 target; "), "{loud}");
     let warnings: String = loud.lines().filter(|line| line.starts_with("warning: ")).map(|line| format!("{line}\n")).collect();
     assert!(warnings.contains("1 of them leave the joint limits"), "{loud}");
     assert_eq!(quiet, warnings);

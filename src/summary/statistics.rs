@@ -18,7 +18,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
 /// Three tables: points that no model has seen, those that the models were fitted to, and these again
 /// cross-validated. `expected` is the rms of a complete
 /// model under the instrument's noise.
-pub(super) fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+pub fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
     let mut rows = rows(outcome, store)?;
     let withdrawn: Vec<&str> = standing.iter().flat_map(|stands| &stands.withdrawn).map(|gone| gone.step.as_str()).collect();
     for row in rows.iter_mut().filter(|row| withdrawn.contains(&row.step.as_str())) {
@@ -41,7 +41,7 @@ pub(super) fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: 
 
 /// What the model that stands makes of the held-out set with most points, in a line, where it was diagnosed; a line more for every
 /// step that was worse.
-pub(super) fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+pub fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
     let Some(standing) = standing else { return Ok(String::new()) };
     let mut text: String = standing.withdrawn.iter().map(|gone| format!("{gone}\n")).collect();
     if !standing.withdrawn.is_empty() {
@@ -156,7 +156,7 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
     text + "\n"
 }
 
-pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let row = |row: StatisticsRow| {
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
@@ -172,12 +172,12 @@ pub(super) fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_
     Ok(rows(outcome, store)?.into_iter().map(row).collect())
 }
 
-pub(super) fn rejected_rows(outcome: &Outcome) -> u64 {
+pub fn rejected_rows(outcome: &Outcome) -> u64 {
     outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
 }
 
 /// Nothing where nothing was rejected.
-pub(super) fn rejected(outcome: &Outcome) -> String {
+pub fn rejected(outcome: &Outcome) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
         let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
         format!("rejected rows: {}, each with its reason in {path}\n", output.table.rows)

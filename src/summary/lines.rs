@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::fmt::Display;
 
 /// A header, then the rows; null is an empty cell.
-pub(super) fn csv(answer: &Answer) -> Result<String> {
+pub fn csv(answer: &Answer) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(answer.names().map(|name| inert(Cow::Borrowed(name)))).map_err(bug)?;
     for row in 0..answer.rows() {
@@ -30,7 +30,7 @@ fn inert(text: Cow<str>) -> String {
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.
-pub(super) fn json(answer: &Answer) -> Result<String> {
+pub fn json(answer: &Answer) -> Result<String> {
     let quoted = |text: &str| serde_json::to_string(text).map_err(bug);
     let names = answer.names().map(quoted).collect::<Result<Vec<String>>>()?;
     let mut rows = Vec::with_capacity(answer.rows());

@@ -9,7 +9,7 @@ const TABLES: usize = 6;
 /// Settings and files that are told one by one.
 const CAUSES: usize = 5;
 
-pub(super) fn text(diff: &RunDiff, stat: bool) -> String {
+pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
     let told =
         |letter: char, told: &crate::audit::Told| format!("{letter}  {}  {}  {:.16}\n", told.run, told.pipeline, told.started);
     let mut text = told('A', &diff.a) + &told('B', &diff.b);

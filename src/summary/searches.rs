@@ -15,7 +15,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<SearchesRow>> {
 }
 
 /// One line per function and optimiser; nothing where nothing was searched.
-pub(super) fn searches(outcome: &Outcome, store: &Store) -> Result<String> {
+pub fn searches(outcome: &Outcome, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     if rows.is_empty() {
         return Ok(String::new());
@@ -59,7 +59,7 @@ pub(super) fn searches(outcome: &Outcome, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
-pub(super) fn searches_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn searches_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let row = |row: SearchesRow| {
         json!({
             "step": row.step, "function": row.function, "dimensions": row.dimensions, "method": row.method,

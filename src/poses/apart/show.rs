@@ -1,21 +1,17 @@
 //! What the poses promise of a finding beside its rival, as text and as JSON.
 
 use super::Apart;
-use crate::cli::poses::output::{self, Drive};
-use crate::cli::poses::show::closing;
 use crate::diagnose::other_means;
 use crate::error::counted;
-use crate::estimate::choose::{Proposed, TOLD, Told};
+use crate::estimate::choose::{TOLD, Told};
+use crate::poses::show::closing;
+use crate::poses::{Answer, Drive, drive};
 use serde_json::{Value, json};
 
 /// Nobody measures more poses than these.
 const MOST: f64 = 10_000.0;
 
 impl Apart<'_> {
-    pub fn drive<'a>(&'a self, proposed: &'a Proposed) -> Drive<'a> {
-        Drive { robot: &self.robot, ranges: &self.ranges, poses: &proposed.poses, direction: &proposed.direction }
-    }
-
     /// Finding and rival in words.
     fn names(&self) -> [String; 2] {
         [format!("{} at {}", self.finding.effect, self.finding.place), format!("{} at {}", self.rival.0, self.rival.1)]
@@ -56,8 +52,15 @@ impl Apart<'_> {
         }
         out
     }
+}
 
-    pub fn text(&self) -> String {
+impl Answer for Apart<'_> {
+    fn drive(&self) -> Option<Drive<'_>> {
+        let proposed = self.told.proposed.as_ref()?;
+        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses: &proposed.poses, direction: &proposed.direction })
+    }
+
+    fn text(&self) -> String {
         let names = self.names();
         let mut text = format!("finding {}: {}\nrival: {}\n", self.finding.rank, self.finding.statement, names[1]);
         text.push_str(&format!(
@@ -85,12 +88,12 @@ impl Apart<'_> {
                 text.push_str(&format!(", the arm at {temperature:.1} C"));
             }
             text.push_str("; put the rows behind the recording's and diagnose again\n");
-            text.push_str(&closing(self.arguments));
+            text.push_str(&closing(self.request));
         }
         text
     }
 
-    pub fn document(&self) -> Value {
+    fn document(&self) -> Value {
         let names = self.names();
         let Told { before, alike, proposed } = &self.told;
         let separation = [0, 1].map(|k: usize| {
@@ -103,7 +106,7 @@ impl Apart<'_> {
         json!({
             "robot": self.robot.name,
             "run": self.run,
-            "seed": self.arguments.seed,
+            "seed": self.request.seed,
             "finding": { "rank": self.finding.rank, "effect": self.finding.effect, "where": self.finding.place },
             "rival": { "effect": self.rival.0, "where": self.rival.1, "form": self.form },
             "sigma_mm": self.sigma,
@@ -114,8 +117,8 @@ impl Apart<'_> {
             "conclusion": self.conclusion(),
             "approach_visible_share": proposed.as_ref().map(|proposed| proposed.approach_seen),
             "self_collision_checked": false,
-            "out": self.arguments.out,
-            "poses": proposed.as_ref().map_or_else(Vec::new, |proposed| output::objects(&self.drive(proposed))),
+            "out": self.request.out,
+            "poses": self.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
         })
     }
 }

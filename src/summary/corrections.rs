@@ -15,7 +15,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<CorrectionsRow>> {
 }
 
 /// One line per rival, the kept one marked; nothing where nothing was learnt.
-pub(super) fn corrections(outcome: &Outcome, store: &Store) -> Result<String> {
+pub fn corrections(outcome: &Outcome, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     if rows.is_empty() {
         return Ok(String::new());
@@ -48,7 +48,7 @@ pub(super) fn corrections(outcome: &Outcome, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
-pub(super) fn corrections_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn corrections_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
     let row = |row: CorrectionsRow| {
         json!({
             "step": row.step, "rival": row.rival, "chosen": row.chosen, "reason": row.reason, "before_mm": row.before_mm,

@@ -2,10 +2,9 @@
 
 mod show;
 
-use super::{PosesArguments, output, site, wish};
-use crate::cli::diagnose::diagnosis;
-use crate::cli::surroundings::open_store;
-use crate::cli::{emit, emit_json};
+use super::site::site;
+use super::{Request, wish};
+use crate::audit::diagnosis;
 use crate::diagnose::{Standing, contest};
 use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
 use crate::error::{Error, Result, nearest};
@@ -24,8 +23,8 @@ const PAYLOADS: usize = 4;
 type Name = (String, String);
 
 /// A finding and a rival, and what tells them apart.
-struct Apart<'a> {
-    arguments: &'a PosesArguments,
+pub struct Apart<'a> {
+    request: &'a Request,
     run: String,
     finding: FindingRow,
     rival: Name,
@@ -40,12 +39,18 @@ struct Apart<'a> {
     told: Told,
 }
 
-pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> Result<()> {
-    let store = open_store(arguments.store.as_deref())?;
-    let (manifest, stage) = diagnosis(&store, run, arguments.step.as_deref())?;
+/// A run by its name, and which of its diagnoses.
+pub struct RunStage<'a> {
+    pub run: &'a str,
+    pub step: Option<&'a str>,
+}
+
+/// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
+pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
+    let (manifest, stage) = diagnosis(store, of.run, of.step)?;
     let place = format!("run {}", manifest.run_id);
-    let findings: Findings = written(&store, &stage)?;
-    let rivals: Rivals = written(&store, &stage)?;
+    let findings: Findings = written(store, &stage)?;
+    let rivals: Rivals = written(store, &stage)?;
     let (finding, mut rival) = pair(&place, &findings, &rivals, names)?;
     let forms: Vec<Form> =
         serde_json::from_str(&finding.forms).map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
@@ -53,23 +58,23 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
         let message = format!("finding {}, {}, is a fault of the recording: no pose mends it", finding.rank, finding.effect);
         return Err(Error::spec(place, message));
     }
-    let robot = read::<Robot>(&store, &stage)?.to_description()?;
-    let parameters: Parameters = written(&store, &stage)?;
+    let robot = read::<Robot>(store, &stage)?.to_description()?;
+    let parameters: Parameters = written(store, &stage)?;
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
-    let recording: Recording = read(&store, &stage)?;
+    let recording: Recording = read(store, &stage)?;
     let mut data = recording.measurements(&Instrument::default());
     let predicted = model.predict(&data);
-    let rows = as_fitted(&mut data, &written(&store, &stage)?, &predicted);
+    let rows = as_fitted(&mut data, &written(store, &stage)?, &predicted);
     let estimated = |name: &String| parameters.0.iter().any(|row| row.name == *name && row.status == "free");
     let free: Vec<usize> = (0..model.x.len()).filter(|k| estimated(&model.stack.specs()[*k].name)).collect();
     let standing = Standing { model: &model, data: &data, rows: &rows, free: &free };
     let recorded = ranges(&data, &rows);
-    let mut site = site(arguments, &robot, &place, Some(&recorded))?;
-    if arguments.payload.is_empty() {
+    let mut site = site(request, &robot, &place, Some(&recorded))?;
+    if request.payloads.is_empty() {
         site.payloads = payloads(&data, &rows);
     }
     let usual = median(rows.iter().map(|row| data.sigma[*row].x).collect());
-    let sigma = arguments.sigma.map_or(usual, |sigma| sigma * 1e-3);
+    let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && (&row.effect, &row.place) == (&rival.0, &rival.1));
     let mut tried = None;
@@ -81,15 +86,15 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
                 within(&mut site, &recorded);
             }
             tried = Some(form);
-            let wish = wish(arguments, Aim::Information, sigma);
+            let wish = wish(request, Aim::Information, sigma);
             tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
         }
         // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
         Err(_) if listed => Told { before: [0.0; 2], alike: [true; 2], proposed: None },
         Err(fault) => return Err(Error::spec("--separate", fault)),
     };
-    let result = Apart {
-        arguments,
+    Ok(Apart {
+        request,
         run: manifest.run_id,
         finding,
         rival,
@@ -100,11 +105,7 @@ pub(super) fn main(arguments: &PosesArguments, run: &str, names: &[String]) -> R
         sigma: sigma * 1e3,
         circumstances,
         told,
-    };
-    if let (Some(path), Some(proposed)) = (&arguments.out, &result.told.proposed) {
-        output::write(path, &result.drive(proposed))?;
-    }
-    if arguments.json { emit_json(&result.document()) } else { emit(&result.text()) }
+    })
 }
 
 fn written<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {

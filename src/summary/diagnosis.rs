@@ -1,15 +1,15 @@
 //! A diagnosis from its tables, as text and as JSON.
 
-use crate::cli::shell::quoted;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
+use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{FindingNumbers, Findings, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow};
 use serde_json::{Value, json};
 
 /// The tables of a diagnosis.
-pub(super) struct Told {
+pub struct DiagnosisSummary {
     run: String,
     step: String,
     verdict: VerdictRow,
@@ -38,7 +38,7 @@ fn table<T: Table + Default>(stage: &StageReport, store: &Store) -> Result<T> {
     own.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
 }
 
-impl Told {
+impl DiagnosisSummary {
     /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         let verdict: Verdict = table(stage, store)?;
@@ -51,7 +51,7 @@ impl Told {
     /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
     fn next(&self, store: &str) -> Option<Vec<String>> {
         let mut lines: Vec<String> = self.verdict.next_measurements.as_deref()?.lines().map(String::from).collect();
-        let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", quoted(&self.step)) };
+        let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", typed(&self.step)) };
         for finding in self.findings.0.iter().filter(|finding| by_poses(&finding.effect)) {
             let mut own: Vec<&RivalRow> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).collect();
             own.retain(|rival| by_poses(&rival.effect));
@@ -65,7 +65,7 @@ impl Told {
                     rival.place,
                     self.run,
                     finding.rank,
-                    quoted(&name)
+                    typed(&name)
                 ));
             }
         }

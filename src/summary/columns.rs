@@ -1,15 +1,15 @@
 //! The tables of a run with their columns: those of one kind together, since they have the same.
 
 use crate::audit::{QueryColumn, QueryTable};
-use crate::cli::{emit, emit_json};
 use crate::error::{Result, counted};
 use crate::store::Store;
 use serde_json::{Value, json};
 
-pub(super) fn tell(store: &Store, tables: &[&QueryTable], as_json: bool) -> Result<()> {
-    if as_json {
-        return emit_json(&tables.iter().map(|table| object(store, table)).collect::<Result<Vec<Value>>>()?.into());
-    }
+pub fn columns_json(store: &Store, tables: &[&QueryTable]) -> Result<Value> {
+    tables.iter().map(|table| object(store, table)).collect::<Result<Vec<Value>>>().map(Value::from)
+}
+
+pub fn columns(store: &Store, tables: &[&QueryTable]) -> Result<String> {
     let mut groups: Vec<(&str, Vec<&QueryTable>)> = Vec::new();
     for table in tables {
         match groups.iter_mut().find(|(kind, _)| *kind == table.kind) {
@@ -18,7 +18,7 @@ pub(super) fn tell(store: &Store, tables: &[&QueryTable], as_json: bool) -> Resu
         }
     }
     let texts = groups.iter().map(|(kind, group)| text(store, kind, group)).collect::<Result<Vec<String>>>()?;
-    emit(if texts.is_empty() { "the run has no tables\n".into() } else { texts.join("\n") }.as_str())
+    Ok(if texts.is_empty() { "the run has no tables\n".into() } else { texts.join("\n") })
 }
 
 fn object(store: &Store, table: &QueryTable) -> Result<Value> {

@@ -14,14 +14,14 @@ use std::path::{Component, Path, PathBuf};
 const FORMAT: u32 = 1;
 const HASH: &str = "SHA-256";
 /// Where what belongs to a set lies in its folder.
-pub(super) const SEAL: &str = "seal.json";
-pub(super) const RECORDINGS: &str = "recordings";
-pub(super) const SEALED: &str = "sealed";
+pub const SEAL: &str = "seal.json";
+pub const RECORDINGS: &str = "recordings";
+pub const SEALED: &str = "sealed";
 
 /// Hashes by path below the folder of the set, with `/`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Seal {
+pub struct Seal {
     calib_seal: u32,
     hash: String,
     /// Hash of the design that the set was drawn from: who goes on with a set can tell that it is the same, and nothing else.
@@ -36,7 +36,7 @@ impl Seal {
     }
 
     /// Whether the set was drawn from this design.
-    pub(super) fn is_of(&self, design: &Design) -> bool {
+    pub fn is_of(&self, design: &Design) -> bool {
         self.design == Seal::new(design).design
     }
 
@@ -53,7 +53,7 @@ impl Seal {
     }
 
     /// Reads the seal of a set.
-    pub(super) fn read(folder: &Path) -> Result<Seal> {
+    pub fn read(folder: &Path) -> Result<Seal> {
         let path = folder.join(SEAL);
         let place = path.display().to_string();
         let text = raw::text(&path).map_err(|error| Error::data(&place, error.to_string()))?;
@@ -66,7 +66,7 @@ impl Seal {
 
     /// Holds every file of the set in `folder` against its hash; fails with all that are missing or changed. Gives
     /// their paths.
-    pub(super) fn check(folder: &Path) -> Result<Vec<String>> {
+    pub fn check(folder: &Path) -> Result<Vec<String>> {
         let seal = Seal::read(folder)?;
         let mut faults = Vec::new();
         for (name, hash) in &seal.files {

@@ -1,7 +1,7 @@
 //! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
 
 use crate::audit::{Answer, Value};
-use crate::error::counted;
+use crate::error::{counted, one_line};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Significant digits of the largest number of a column.
@@ -23,7 +23,7 @@ struct Drawn {
 }
 
 /// The first rows, and how many are left out.
-pub(super) fn grid(answer: &Answer, rows: usize, width: Option<usize>) -> String {
+pub fn grid(answer: &Answer, rows: usize, width: Option<usize>) -> String {
     let shown = rows.min(answer.rows());
     let columns = answer.names().zip(answer.columns(shown)).map(|(name, values)| drawn(name, &values)).collect();
     let mut text = draw(columns, shown, width);
@@ -90,7 +90,7 @@ fn drawn(name: &str, values: &[Value]) -> Drawn {
             Value::Boolean(truth) => truth.to_string(),
             Value::Integer(number) => number.to_string(),
             Value::Number(number) => written(*number, decimals),
-            Value::Text(text) => cut(&text.replace(|c: char| c.is_control(), " "), LONGEST),
+            Value::Text(text) => cut(&one_line(text), LONGEST),
         })
         .collect();
     if right && decimals.is_some() {

@@ -1,9 +1,29 @@
 //! What the proposed poses promise, as a short table and as JSON.
 
-use super::{PosesArguments, Work, output};
+use super::proposal::Work;
+use super::{Answer, Drive, Request, drive};
 use crate::error::counted;
-use crate::estimate::choose::{Score, median};
+use crate::estimate::choose::{Proposal, Score, median};
 use serde_json::json;
+
+impl Answer for Work<'_> {
+    fn drive(&self) -> Option<Drive<'_>> {
+        let Proposal { poses, direction, .. } = &self.proposal;
+        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction })
+    }
+
+    fn text(&self) -> String {
+        text(self)
+    }
+
+    fn document(&self) -> serde_json::Value {
+        document(self)
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+}
 
 /// Proposed poses, the median random set, the recording.
 fn sets(work: &Work) -> Vec<(String, Score)> {
@@ -27,7 +47,7 @@ fn relative(score: &Score, to: &Score) -> f64 {
     median(score.sigma.iter().zip(&to.sigma).map(|(a, b)| a / b).collect())
 }
 
-pub(super) fn text(work: &Work) -> String {
+fn text(work: &Work) -> String {
     let proposal = &work.proposal;
     let asked = work.parameters.len();
     let mut text = format!(
@@ -69,14 +89,14 @@ pub(super) fn text(work: &Work) -> String {
         "\nof an error by direction of approach, {:.0} % of every joint's stays visible with the directions given\n",
         1e2 * proposal.approach_seen
     ));
-    text.push_str(&closing(work.arguments));
+    text.push_str(&closing(work.request));
     text
 }
 
 /// What every proposal ends with.
-pub(super) fn closing(arguments: &PosesArguments) -> String {
+pub(super) fn closing(request: &Request) -> String {
     let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
-    match &arguments.out {
+    match &request.out {
         Some(path) => format!("{text}poses: {}\n", path.display()),
         None => format!("{text}no file was written: give --out poses.csv (or .parquet)\n"),
     }
@@ -101,7 +121,7 @@ fn separation(work: &Work) -> String {
     text
 }
 
-pub(super) fn document(work: &Work) -> serde_json::Value {
+fn document(work: &Work) -> serde_json::Value {
     let proposal = &work.proposal;
     let sets = sets(work);
     let name = |parameter: usize| &work.parameters[parameter].0;
@@ -132,7 +152,7 @@ pub(super) fn document(work: &Work) -> serde_json::Value {
     });
     json!({
         "robot": work.robot.name,
-        "seed": work.arguments.seed,
+        "seed": work.request.seed,
         "effects": work.effects,
         "left_out": work.left_out.iter().map(|(effect, reason)| json!({"effect": effect, "reason": reason})).collect::<Vec<_>>(),
         "sigma_mm": work.sigma,
@@ -141,7 +161,7 @@ pub(super) fn document(work: &Work) -> serde_json::Value {
         "separation": separation.collect::<Vec<_>>(),
         "approach_visible_share": proposal.approach_seen,
         "self_collision_checked": false,
-        "out": work.arguments.out,
-        "poses": output::objects(&work.drive()),
+        "out": work.request.out,
+        "poses": work.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
     })
 }

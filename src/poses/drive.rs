@@ -1,6 +1,7 @@
 //! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them, deg and mm.
 
 use crate::error::{Error, Result};
+use crate::raw::ending;
 use crate::robot::Measurements;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::Unit;
@@ -10,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Poses to drive to.
-pub(super) struct Drive<'a> {
+pub struct Drive<'a> {
     pub robot: &'a RobotDescription,
     /// rad or m.
     pub ranges: &'a [[f64; 2]],
@@ -20,16 +21,16 @@ pub(super) struct Drive<'a> {
 }
 
 /// A column: its name, its values, and the decimals that people read (none: whole numbers).
-pub(super) struct Column {
-    pub name: String,
-    pub values: Vec<f64>,
+struct Column {
+    name: String,
+    values: Vec<f64>,
     decimals: usize,
 }
 
 /// Decimals of joint positions: 1e-4 deg is 0.004 mm at 2.5 m.
 const JOINT_DECIMALS: usize = 4;
 
-pub(super) fn columns(drive: &Drive) -> Vec<Column> {
+fn columns(drive: &Drive) -> Vec<Column> {
     let Drive { robot, ranges, poses, direction } = *drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
@@ -63,16 +64,16 @@ pub(super) fn columns(drive: &Drive) -> Vec<Column> {
 }
 
 /// What is wrong with the ending, if anything.
-pub(super) fn fault(path: &Path) -> Option<String> {
+pub fn fault(path: &Path) -> Option<String> {
     kind(path).is_none().then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
 }
 
 fn kind(path: &Path) -> Option<&'static str> {
-    let ending = path.extension()?.to_str()?.to_ascii_lowercase();
+    let ending = ending(path);
     ["csv", "parquet"].into_iter().find(|known| *known == ending)
 }
 
-pub(super) fn write(path: &Path, drive: &Drive) -> Result<()> {
+pub fn write(path: &Path, drive: &Drive) -> Result<()> {
     let bytes = if kind(path) == Some("parquet") { parquet(drive)? } else { csv(drive).into_bytes() };
     std::fs::write(path, bytes).map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))
 }
