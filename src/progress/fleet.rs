@@ -1,7 +1,7 @@
 //! The progress of a fleet: a bar for every worker and one for all on a terminal, a line now and then elsewhere.
 
 use super::{PAUSE, Verbosity};
-use crate::error::counted;
+use crate::error::{counted, visible};
 use crate::fleet::Watcher;
 use crate::fleet::{Ending, Record};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -127,14 +127,9 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A name from outside, on one line and without a terminal's commands.
-pub fn shown(name: &str) -> String {
-    name.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
-}
-
 impl Watcher for FleetProgress {
     fn begins(&self, worker: usize, robot: &str) {
-        let robot = shown(robot);
+        let robot = visible(robot);
         if let Some(bar) = self.bars.as_ref().and_then(|bars| bars.workers.get(worker)) {
             bar.reset_elapsed();
             bar.set_message(robot.clone());
@@ -159,7 +154,7 @@ impl Watcher for FleetProgress {
         self.show(state);
         if record.ending != Ending::Done && fresh {
             let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
-            self.say(&format!("{}: {}: {}", shown(&record.robot), record.ending.name(), shown(reason)));
+            self.say(&format!("{}: {}: {}", visible(&record.robot), record.ending.name(), visible(reason)));
         }
     }
 }
