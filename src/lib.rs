@@ -9,6 +9,7 @@
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
@@ -27,8 +28,13 @@
 //! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
-//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
-//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
+//! | [`init`] | what a folder of files is, and the pipeline that reads it | raw, stage, yaml |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
+//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, shell, stage, store |
+//! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
+//! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
+//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, pipeline, shell, stage, store, table |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
@@ -46,6 +52,7 @@
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
+//! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 
 #![forbid(unsafe_code)]
@@ -55,6 +62,7 @@ pub mod statistics;
 pub mod units;
 
 pub mod raw;
+pub mod shell;
 pub mod yaml;
 
 pub mod spatial;
@@ -88,8 +96,13 @@ pub mod stage;
 pub mod pipeline;
 
 pub mod audit;
+pub mod export;
 pub mod fleet;
 pub mod identified;
+pub mod init;
+pub mod poses;
+pub mod proof;
+pub mod summary;
 
 #[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;

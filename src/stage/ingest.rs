@@ -27,7 +27,7 @@ pub use layout::{
 pub use motion::Motion;
 pub use orientation::OrientationColumns;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
 use crate::table::{Intake, IntakeRow, Recording, Rejected, Robot};
 use schemars::JsonSchema;
@@ -140,7 +140,7 @@ fn intake(decided: &write::Decided, context: &Context) -> Intake {
     for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
         let accepted = verdict::accepted(scan, fate);
         let rejected = scan.read - accepted;
-        context.services.note(format!("{name}: {} rows read, {accepted} used, {rejected} rejected", scan.read));
+        context.services.note(format!("{name}: {} read, {accepted} used, {rejected} rejected", counted(scan.read, "row")));
         rows.push(IntakeRow {
             file: name.clone(),
             lines: scan.lines as i64,

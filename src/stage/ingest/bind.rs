@@ -4,7 +4,7 @@ use super::arm::Arm;
 use super::layout::{ColumnRef, FileLayout, ScalarColumn};
 use super::orientation::Convention;
 use super::slot::{PerJoint, Slot};
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::units::{Quantity, Unit};
 
 /// Names in an error message; a header of thousands must not fill the screen.
@@ -206,7 +206,7 @@ impl Binder<'_> {
             (ColumnRef::Name(name), Some(names)) => nearest(name, names.iter().map(String::as_str))
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default(),
-            _ => format!("; the file has {} columns", self.head.width),
+            _ => format!("; the file has {}", counted(self.head.width, "column")),
         }
     }
     /// What stands in the header, for the last fault of the list.
@@ -237,13 +237,17 @@ impl Binder<'_> {
             (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
         if references.len() != count {
-            self.fault(format!("`{name}` lists {} columns; the robot has {count} joints", references.len()));
+            self.fault(format!(
+                "`{name}` lists {}; the robot has {}",
+                counted(references.len(), "column"),
+                counted(count, "joint")
+            ));
             return Ok(());
         }
         if let Some(pattern) = &joints.column {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
-                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {count} joints only"));
+                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {} only", counted(count, "joint")));
                 return Ok(());
             }
         }
@@ -254,7 +258,7 @@ impl Binder<'_> {
             return Ok(());
         }
         if there > 0 && there < count {
-            self.fault(format!("`{name}` has {there} of its columns; the robot has {count} joints"));
+            self.fault(format!("`{name}` has {there} of its columns; the robot has {}", counted(count, "joint")));
         }
         for (joint, reference) in references.iter().enumerate() {
             let linear = slides && arm.prismatic.get(joint).copied().unwrap_or(false);

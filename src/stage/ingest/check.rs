@@ -4,7 +4,7 @@ use super::Ingest;
 use super::layout::{ColumnRef, Columns, Duplicates, FileLayout, Join, ScalarColumn};
 use super::orientation::{Convention, OrientationColumns};
 use super::slot::PerJoint;
-use crate::error::{Fault, nearest};
+use crate::error::{Fault, counted, nearest};
 use crate::units::{Quantity, Unit};
 
 /// What a recording cannot be without.
@@ -109,7 +109,7 @@ fn orientation_faults(orientation: &OrientationColumns, file: &FileLayout, place
         return;
     };
     if references.len() != convention.numbers() {
-        faults.push(Fault::new(place, format!("{} columns; allowed: {}", references.len(), convention.numbers())));
+        faults.push(Fault::new(place, format!("{}; allowed: {}", counted(references.len(), "column"), convention.numbers())));
     }
     for reference in references {
         column(Some(reference), file, place, faults);

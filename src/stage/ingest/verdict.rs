@@ -6,7 +6,7 @@ use super::layout::{Columns, Join, Limits};
 use super::pair::Fate;
 use super::row::Reason;
 use super::scan::{Count, Scan};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
@@ -160,9 +160,9 @@ fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Con
     {
         let [lower, upper] = arm.limits.get(joint).copied().unwrap_or([f64::NAN; 2]);
         context.services.warn(format!(
-            "{}: {} rows have a joint beyond the robot's limits and are used; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
+            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
             scan.label,
-            scan.beyond.rows,
+            counted(scan.beyond.rows, "row"),
             joint + 1
         ));
     }
