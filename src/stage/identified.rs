@@ -2,6 +2,7 @@
 
 use crate::effect::Load;
 use crate::estimate::{CONFLICT, Fate, Fitted, Model, Screening, Suspect, cross_validate};
+use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
@@ -206,16 +207,16 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     if fitted.values < 2 * free {
         services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));
     }
-    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;
+    let noise: f64 = fitting.rows.iter().map(|row| noise(fitting.data, *row)).sum::<f64>() / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
-    if fitted.unmodelled > noise_axis {
+    if fitted.excess_sigma > noise_axis {
         services.note(format!(
             "{:.3} mm per axis is left beyond the instrument's {:.3} mm: this model does not explain it",
-            fitted.unmodelled * 1e3,
+            fitted.excess_sigma * 1e3,
             noise_axis * 1e3
         ));
     }
-    if let Some(turn) = fitted.unmodelled_turn.filter(|turn| *turn > ASKEW) {
+    if let Some(turn) = fitted.excess_sigma_angle.filter(|turn| *turn > ASKEW) {
         services.warn(format!(
             "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
             turn.to_degrees()

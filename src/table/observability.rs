@@ -57,10 +57,10 @@ impl Observability {
         push(
             "unmodelled_mm",
             0,
-            fitted.unmodelled * 1e3,
+            fitted.excess_sigma * 1e3,
             "standard deviation per axis of the fitted rows beyond the instrument's noise",
         );
-        if let Some(sigma) = fitted.unmodelled_turn {
+        if let Some(sigma) = fitted.excess_sigma_angle {
             push(
                 "unmodelled_turn_rad",
                 0,

@@ -9,13 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 const REGISTRIES: [(&str, &str); 1] = [("effect/form.rs", "effect/")];
 
 /// Circles that are known, each by files that no others may join; whoever breaks one takes it from here.
-const KNOWN: [&[&str]; 3] = [
+const KNOWN: [&[&str]; 2] = [
     // A finding and the words about it; split when the diagnosis gets rooms.
     &["diagnose/finding.rs", "diagnose/rivals.rs", "diagnose/statement.rs", "diagnose/unseen.rs", "diagnose/verdict.rs"],
     // The pool keeps what the state asks of it.
     &["diagnose/pool.rs", "diagnose/state.rs"],
-    // Columns of the layout and of what it is made of.
-    &["stage/ingest/layout.rs", "stage/ingest/orientation.rs", "stage/ingest/slot.rs"],
 ];
 
 /// File -> file that it uses -> where and by which path.

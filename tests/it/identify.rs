@@ -131,7 +131,7 @@ fn geometry_ratios_coupling_and_compliance_come_back_and_held_out_points_reach_t
         let held_out = rms(&model, &data, (0..400).filter(|row| !rows.contains(row)));
         let floor = SIGMA * 3f64.sqrt();
         assert!((0.85..1.15).contains(&(held_out / floor)), "{}: held-out {held_out:.2e}, noise {floor:.2e}", description.name);
-        assert!(fitted.unmodelled < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.unmodelled);
+        assert!(fitted.excess_sigma < 3e-6, "{}: nothing is left out, yet {:.1e} m", description.name, fitted.excess_sigma);
         for (k, spec) in model.stack.specs().iter().enumerate() {
             let gauge = GEOMETRY.iter().any(|name| spec.name.starts_with(name));
             if let (false, Fate::Free(sigma)) = (gauge, &fitted.fates[k]) {

@@ -146,7 +146,7 @@ fn screen(
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
     let free: Vec<usize> = (0..fitted.fates.len()).filter(|k| matches!(fitted.fates[*k], Fate::Free(_))).collect();
-    let problem = Problem { data, rows: kept, unmodelled: fitted.beyond() };
+    let problem = Problem { data, rows: kept, excess: fitted.excess() };
     let mut standings = leave_one_out(&problem, model, &free);
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);
