@@ -5,6 +5,7 @@
 
 mod column;
 mod distance;
+mod inclination;
 mod orientation;
 mod point;
 mod residual;
@@ -12,6 +13,7 @@ mod weight;
 
 pub use column::{Column, Convention, Conventions, Part, Shape};
 pub use distance::Distance;
+pub use inclination::Inclination;
 pub use orientation::Orientation;
 pub use point::Point;
 pub use residual::{ExcessSigma, Residual};
@@ -24,7 +26,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
-pub const KINDS: &[&dyn Kind] = &[&Point, &Orientation, &Distance];
+pub const KINDS: &[&dyn Kind] = &[&Point, &Orientation, &Distance, &Inclination];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -86,12 +86,31 @@ impl Truth {
         let anchor = self.model.robot.gauging().anchors[0].place + moved;
         let row: &dyn Fn(usize) -> Vec<f64> = match kind {
             "orientation" => &|row| rotations[row].iter().copied().collect(),
+            "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
             "distance" => &|row| vec![(data.position[row] - anchor).norm()],
             other => panic!("say what `{other}` measures"),
         };
         let values: Vec<f64> = (0..data.rows()).flat_map(row).collect();
         let anchor = (kind == "distance").then(Default::default);
         Readings { kind, width: values.len() / data.rows(), values, sigma: vec![SIGMA; data.rows()], anchor }
+    }
+}
+
+/// Some of the rows.
+pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
+    let taken = |all: &Readings| Readings {
+        values: rows.iter().flat_map(|row| all.values[row * all.width..(row + 1) * all.width].to_vec()).collect(),
+        sigma: rows.iter().map(|row| all.sigma[*row]).collect(),
+        ..all.clone()
+    };
+    Measurements {
+        joints: data.joints,
+        q: rows.iter().flat_map(|row| data.q(*row).to_vec()).collect(),
+        position: rows.iter().map(|row| data.position[*row]).collect(),
+        sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
+        payload: rows.iter().map(|row| data.payload[*row]).collect(),
+        readings: data.readings.iter().map(taken).collect(),
+        ..Measurements::default()
     }
 }
 
@@ -151,7 +170,11 @@ fn alone(data: &Measurements, kind: &dyn Kind) -> Measurements {
 fn the_rank_of_every_kind_is_that_of_theory() {
     for description in [fixture::offset_wrist(), fixture::seven(), fixture::on_track()] {
         let truth = Truth::new(description, Vector3::from(ASKEW));
-        let all = truth.rows(300);
+        let all = truth.rows(600);
+        // A level is read where it is upright.
+        let upright: Vec<usize> =
+            (0..all.rows()).filter(|row| all.reading("orientation", *row).expect("all").values[8] > 0.0).collect();
+        let all = select(&all, &upright);
         for kind in KINDS {
             let data = alone(&all, *kind);
             let rows: Vec<usize> = (0..data.rows()).collect();

@@ -84,3 +84,16 @@ fn what_belongs_together_is_asked_for_together() {
     let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
     assert!(anchor.contains("an anchor is the end of a `distance`"), "{anchor}");
 }
+
+#[test]
+fn both_angles_of_a_level_arrive_and_one_alone_is_refused() {
+    let columns = "      tilt_x: {column: a, unit: mrad, optional: true}\n      tilt_y: {column: b, unit: mrad, optional: true}\n      sigma_tilt: {value: 20, unit: arcsec}\n";
+    let desk = Desk::default().with("a.csv", "q1,q2,a,b\n1,2,-12.5,300\n3,4,7,\n5,6,0,1\n7,8,1,2\n");
+    let taken = take(&desk, &with(columns), robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.readings["tilt_x"], [-0.0125, 0.0, 0.001]);
+    assert_eq!(taken.recording.readings["tilt_y"], [0.3, 0.001, 0.002]);
+    assert_eq!(taken.rejected.0[0].detail, "the inclination is incomplete");
+    let alone =
+        settings(&with("      tilt_x: {column: a, unit: mrad}\n")).check().iter().map(ToString::to_string).collect::<String>();
+    assert!(alone.contains("map all of tilt_x, tilt_y, or none"), "{alone}");
+}
