@@ -1,7 +1,7 @@
 //! `calib` makes industrial robots accurate and says why they were not.
 //!
 //! # The map
-//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate -> diagnose`) has no files
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`) has no files
 //! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
@@ -15,7 +15,8 @@
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
-//! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
+//! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
+//! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly and rewritten in the numbers of their targets | compensate, robot |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
@@ -50,6 +51,7 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
+//! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::Kind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
@@ -70,6 +72,8 @@ pub mod spatial;
 pub mod robot;
 
 pub mod effect;
+
+pub mod observation;
 
 pub mod estimate;
 

@@ -3,6 +3,7 @@
 use crate::effect::Load;
 use crate::error::counted;
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
+use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
@@ -209,7 +210,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         let (points, parameters) = (counted(fitting.rows.len(), "point"), counted(free, "parameter"));
         services.warn(format!("only {points} for {parameters}: take at least {free}"));
     }
-    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;
+    let noise: f64 = fitting.rows.iter().map(|row| noise(fitting.data, *row)).sum::<f64>() / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
         services.note(format!(
@@ -218,7 +219,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             noise_axis * 1e3
         ));
     }
-    if let Some(turn) = fitted.excess_sigma_turn.filter(|turn| *turn > ASKEW) {
+    if let Some(turn) = fitted.excess_sigma_angle.filter(|turn| *turn > ASKEW) {
         services.warn(format!(
             "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
             turn.to_degrees()

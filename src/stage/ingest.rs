@@ -6,26 +6,26 @@
 mod arm;
 mod bind;
 mod check;
+mod columns;
 pub mod encoding;
 mod layout;
 mod lines;
+mod mapped;
 mod motion;
 mod number;
-mod orientation;
 mod pair;
 mod parquet;
 mod reading;
 mod row;
 mod scan;
-mod slot;
+mod slots;
 mod verdict;
 mod write;
 
-pub use layout::{
-    Axis, ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
-};
+pub use columns::Columns;
+pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, Limits};
+pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
 pub use motion::Motion;
-pub use orientation::OrientationColumns;
 
 use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};

@@ -126,9 +126,8 @@ pub(super) fn header(layout: &FileLayout, arm: Option<&Arm>, limits: Limits, con
     if let Some(arm) = arm {
         return Reading::open(source, layout, arm, limits).map(drop);
     }
-    let (mut layout, arm) = (layout.clone(), Arm { prismatic: vec![false], limits: vec![[f64::NEG_INFINITY, f64::INFINITY]] });
-    let columns = &mut layout.columns;
-    (columns.q, columns.current, columns.direction, columns.velocity) = (None, None, None, None);
+    let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
+    let arm = Arm::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
     Reading::open(source, &layout, &arm, limits).map(drop)
 }
 

@@ -2,7 +2,8 @@
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{Columns, Join, Limits};
+use super::columns::Columns;
+use super::layout::{Join, Limits};
 use super::pair::Fate;
 use super::row::Reason;
 use super::scan::{Count, Scan};
@@ -58,7 +59,7 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
 }
 
 fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> {
-    let unit = columns.q.as_ref()?.unit.as_deref().unwrap_or("rad");
+    let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
     let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
     if scan.turns.rows * 2 > judged
         && let Some((line, joint, value)) = scan.turns.first
@@ -166,7 +167,7 @@ fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Con
             joint + 1
         ));
     }
-    let degrees = columns.q.as_ref().is_some_and(|q| q.unit.as_deref() == Some("deg"));
+    let degrees = columns.joint("q").is_some_and(|q| q.unit.as_deref() == Some("deg"));
     if degrees && scan.largest > 0.0 && scan.largest.to_degrees() < SMALL_IN_DEGREES && scan.used() >= 10 {
         context.services.warn(format!(
             "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",

@@ -1,6 +1,6 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
-use crate::robot::measured::{Distance, Distances, Named, Turns};
+use crate::robot::readings::{Named, Reading, Readings};
 use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
@@ -29,10 +29,8 @@ pub struct Measurements {
     pub spread: Option<Vec<Matrix3<f64>>>,
     /// The target that each row measured; the tool point where rows name none.
     pub target: Option<Named>,
-    /// Measured orientations.
-    pub turn: Option<Turns>,
-    /// Measured distances from anchors.
-    pub distance: Option<Distances>,
+    /// What was measured beside points; one entry a kind.
+    pub readings: Vec<Readings>,
 }
 
 impl Measurements {
@@ -48,8 +46,7 @@ impl Measurements {
         self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
     }
 
-    /// Length (m) of the one-sigma noise of a row: root of the summed variances of what it measured of the point, or of the distance
-    /// where it measured that alone.
+    /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.
     pub fn noise(&self, row: usize) -> f64 {
         if self.whole(row) {
             let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
@@ -58,10 +55,7 @@ impl Measurements {
         let measured = (0..3).filter(|axis| self.sigma[row][*axis].is_finite());
         let beyond = |axis: usize| self.spread.as_ref().map_or(0.0, |all| all[row][(axis, axis)]);
         let variance: f64 = measured.map(|axis| self.sigma[row][axis].powi(2) + beyond(axis)).sum();
-        match self.distance(row) {
-            Some(distance) if variance == 0.0 => distance.sigma,
-            _ => variance.sqrt(),
-        }
+        variance.sqrt()
     }
 
     /// Whether any row has a time: else [`Measurements::time`] counts rows.
@@ -130,21 +124,15 @@ impl Measurements {
         Vector3::from_fn(|axis, _| if self.sigma[row][axis].is_finite() { residual[axis] } else { 0.0 })
     }
 
-    /// The measured orientation of a row's target and its standard deviation about each axis, rad.
-    pub fn turn(&self, row: usize) -> Option<(&Matrix3<f64>, f64)> {
-        let turn = self.turn.as_ref()?;
-        Some((turn.rotation[row].as_ref()?, turn.sigma[row]))
+    /// What a row measured of a kind beside points, by the kind's name.
+    pub fn reading(&self, kind: &str, row: usize) -> Option<Reading<'_>> {
+        self.readings.iter().find(|readings| readings.kind == kind)?.row(row)
     }
 
-    pub fn distance(&self, row: usize) -> Option<Distance<'_>> {
-        let all = self.distance.as_ref()?;
-        let length = all.length[row];
-        length.is_finite().then(|| Distance { anchor: all.anchor.name(row), length, sigma: all.sigma[row] })
-    }
-
-    /// Numbers that a row measured: axes of its point, angles, distance.
-    pub fn values(&self, row: usize) -> usize {
-        self.axes(row) + 3 * usize::from(self.turn(row).is_some()) + usize::from(self.distance(row).is_some())
+    /// The anchor that a row measured from; empty where it has no name.
+    pub fn anchor(&self, row: usize) -> Option<&str> {
+        let mut anchored = self.readings.iter().filter(|readings| readings.anchor.is_some());
+        anchored.find_map(|readings| readings.row(row)).map(|reading| reading.anchor)
     }
 
     /// Whether rows `a` and `b` are the same pose under the same payload.
