@@ -77,6 +77,19 @@ pub fn counted(count: impl fmt::Display, noun: &str) -> String {
     }
 }
 
+/// A text from a file on one line: control characters become blanks.
+pub fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// A text from outside on one line, without a terminal's commands; what cannot be seen, as marks that turn the direction of writing, is
+/// written out.
+pub fn visible(text: &str) -> String {
+    let hidden =
+        |c: char| c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    text.chars().map(|c| if hidden(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
+}
+
 /// The nearest of `allowed` to `given`, for "did you mean".
 pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     allowed

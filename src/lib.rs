@@ -1,7 +1,7 @@
 //! `calib` makes industrial robots accurate and says why they were not.
 //!
 //! # The map
-//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> estimate -> diagnose`) has no files
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`) has no files
 //! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
@@ -9,12 +9,14 @@
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
 //! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
-//! | [`estimate`] | least squares, observability, swarm, network | effect, robot, spatial |
+//! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
+//! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly and rewritten in the numbers of their targets | compensate, robot |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
@@ -27,8 +29,13 @@
 //! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
-//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, stage, store, table, yaml |
-//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, store |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
+//! | [`init`] | what a folder of files is, and the pipeline that reads it | raw, stage, yaml |
+//! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
+//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, shell, stage, store |
+//! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
+//! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
+//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, pipeline, shell, stage, store, table |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # Invariants
@@ -44,8 +51,10 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
+//! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::Kind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
+//! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 
 #![forbid(unsafe_code)]
@@ -55,6 +64,7 @@ pub mod statistics;
 pub mod units;
 
 pub mod raw;
+pub mod shell;
 pub mod yaml;
 
 pub mod spatial;
@@ -62,6 +72,8 @@ pub mod spatial;
 pub mod robot;
 
 pub mod effect;
+
+pub mod observation;
 
 pub mod estimate;
 
@@ -88,8 +100,13 @@ pub mod stage;
 pub mod pipeline;
 
 pub mod audit;
+pub mod export;
 pub mod fleet;
 pub mod identified;
+pub mod init;
+pub mod poses;
+pub mod proof;
+pub mod summary;
 
 #[expect(clippy::disallowed_methods, reason = "shows how long things take, on stderr")]
 pub mod progress;

@@ -2,7 +2,7 @@
 
 mod fleet;
 
-pub use fleet::{FleetProgress, shown};
+pub use fleet::FleetProgress;
 
 use crate::pipeline::{Observer, StageReport, StageStatus};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

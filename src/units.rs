@@ -1,5 +1,9 @@
 //! Units at the edges: SI inside, one stored unit per quantity, people's units in files and reports.
 
+mod header;
+
+pub use header::{Header, written};
+
 use std::fmt;
 
 /// A unit that a stored column, a parameter or a column of a recording may have.

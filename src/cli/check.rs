@@ -1,12 +1,13 @@
 //! `calib check`: reads and wires a pipeline, reads its robot file and the headers of its data, and prints its graph, or every fault at once.
 
 use super::emit;
-use crate::error::{Result, counted};
+use crate::error::Result;
+use crate::init::marked;
 use crate::pipeline::{Override, Plan, look};
-use crate::raw;
 use crate::stage::STAGES;
+use crate::summary::graph;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Check a pipeline: print the graph of its stages and tables, or every fault with its line.
 ///
@@ -30,7 +31,7 @@ pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
     let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
     let files = plan.stages.iter().filter(|stage| stage.entry.name == "robot").flat_map(|stage| &stage.files);
     let described = files.map(|file| file.path.as_path()).chain(std::iter::once(arguments.pipeline.as_path()));
-    let marks: String = described.flat_map(|path| MARKS.map(|mark| marked(path, mark))).collect();
+    let marks: String = described.map(marked).collect();
     match look(&plan) {
         Ok(warnings) => {
             let warnings: String = warnings.iter().map(|line| format!("\nwarning: {line}\n")).collect();
@@ -41,51 +42,4 @@ pub(super) fn main(arguments: &CheckArguments) -> Result<()> {
             Err(error)
         }
     }
-}
-
-/// What `calib init` writes behind lines to look at, and what is to be done there.
-const MARKS: [(&str, &str); 2] =
-    [("REPLACE", "put your own there and delete the mark"), ("CHECK", "look whether it is so and delete the mark")];
-
-/// A warning where lines are left that `calib init` marked, with the lines. A line that is a comment all over sets nothing.
-fn marked(path: &Path, (mark, what): (&str, &str)) -> String {
-    let text = raw::text(path).unwrap_or_default();
-    let has_mark = |line: &str| line.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == mark);
-    let counts = |line: &str| !line.trim_start().starts_with('#') && has_mark(line);
-    let lines: Vec<(usize, &str)> = (1..).zip(text.lines()).filter(|(_, line)| counts(line)).collect();
-    if lines.is_empty() {
-        return String::new();
-    }
-    let many = if lines.len() == 1 { "a line is".into() } else { format!("{} lines are", lines.len()) };
-    let mut out = format!("\nwarning: {}: {many} still marked {mark}; {what}\n", path.display());
-    lines.iter().for_each(|(number, line)| out.push_str(&format!("  {number}: {}\n", line.trim())));
-    out
-}
-
-fn graph(plan: &Plan) -> String {
-    let mut text = format!("pipeline {}, seed {}, {}\n", plan.name, plan.seed, counted(plan.stages.len(), "stage"));
-    for stage in &plan.stages {
-        let uses = if stage.id == stage.entry.name { String::new() } else { format!(" (uses {})", stage.entry.name) };
-        text.push_str(&format!("\n{}{uses}: {}\n", stage.id, stage.entry.summary));
-        let width = stage.inputs.iter().map(|input| input.port.name.len()).max().unwrap_or(0);
-        for input in &stage.inputs {
-            let from = input.from.iter().map(|origin| {
-                let writer = &plan.stages[origin.stage];
-                format!("{}.{}", writer.id, writer.outputs[origin.port].name)
-            });
-            let from: Vec<String> = from.collect();
-            let from = if from.is_empty() { "(none)".into() } else { from.join(", ") };
-            text.push_str(&format!("  reads   {:width$}  <- {from}\n", input.port.name));
-        }
-        for file in &stage.files {
-            text.push_str(&format!("  file    {} = {}\n", file.place, file.path.display()));
-        }
-        let outputs: Vec<String> = stage
-            .outputs
-            .iter()
-            .map(|port| if port.name == port.kind { port.name.into() } else { format!("{} ({})", port.name, port.kind) })
-            .collect();
-        text.push_str(&format!("  writes  {}\n", outputs.join(", ")));
-    }
-    text
 }

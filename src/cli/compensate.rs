@@ -1,26 +1,19 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{Arm, Corrector, Manner, Tally};
-use crate::error::{Error, Fault, Result};
+use crate::compensate::{Arm, Corrector, Manner};
+use crate::error::{Error, Fault, Result, counted};
 use crate::identified::Identified;
 use crate::pipeline::Purpose;
-use crate::program::{self, Language, Note, Partial, Program, Refusal};
+use crate::program::{self, Language, Partial, ProgramFile};
 use crate::raw;
-use crate::robot::{Measurements, RobotModel};
-use crate::targets::{Layout, Units, Unreached, parquet, text};
+use crate::robot::Measurements;
+use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
-use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
-
-/// Joints that both languages of programs have targets for.
-const JOINTS_OF_PROGRAMS: usize = 6;
-
-/// Faults told of a program: more are of a file that is none.
-const MOST_FAULTS: usize = 500;
 
 /// Correct targets: joint commands that bring the real arm to where the nominal robot would have put the tool.
 ///
@@ -126,33 +119,12 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {
-        text = format!("model: {}\n{}", identified.origin, summary(&corrector.tally));
+        text = format!("model: {}\n{}", identified.origin, corrector.tally.summary());
     }
     let remarks = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
-    text.extend(warnings(&corrector.tally, remarks));
+    text.extend(corrector.tally.warnings().map(|line| format!("warning: {line}{remarks}\n")));
     let _ = std::io::stderr().write_all(text.as_bytes());
     if unreached.faults.is_empty() { Ok(()) } else { Err(Error::Data(unreached.faults)) }
-}
-
-fn summary(tally: &Tally) -> String {
-    format!(
-        "{} targets; uncorrected they would be off by {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
-        tally.targets,
-        tally.uncorrected_sum / tally.targets.max(1) as f64 * 1e3,
-        tally.uncorrected_max * 1e3,
-        tally.residual_max * 1e3
-    )
-}
-
-fn warnings(tally: &Tally, remarks: &str) -> impl Iterator<Item = String> {
-    let all = [
-        (tally.not_reached, "could not be reached and have no joints"),
-        (tally.turned, "are reached but for their orientation: the wrist is stretched"),
-        (tally.beyond_limits, "leave the joint limits"),
-        (tally.beyond_measured, "are outside of what was measured: the model extrapolates there"),
-    ];
-    let said = all.into_iter().filter(|(count, _)| *count > 0);
-    said.map(move |(count, what)| format!("warning: {count} of them {what}{remarks}\n"))
 }
 
 fn check(arguments: &CompensateArguments) -> Result<()> {
@@ -188,7 +160,7 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
     let robot = &identified.model.robot;
     let start = match &arguments.start {
         Some(start) if start.len() != robot.joints() => {
-            let message = format!("has {} positions, the robot {} joints", start.len(), robot.joints());
+            let message = format!("has {}, the robot {}", counted(start.len(), "position"), counted(robot.joints(), "joint"));
             return Err(Error::spec("--start", message));
         }
         Some(start) => {
@@ -214,42 +186,21 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
     })
 }
 
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+fn is_parquet(path: &Path) -> bool {
+    raw::ending(path) == "parquet"
 }
 
 fn language(targets: &Path) -> Option<Language> {
-    Language::of_ending(targets.extension()?.to_str()?)
+    Language::of_ending(&raw::ending(targets))
 }
 
-/// A controller's program, whole: targets that cannot be reached are refused, since a program has no place for a remark.
+/// A controller's program, whole.
 fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
-    let place = |note: &Note| format!("{}:{}:{}", layout.place, note.line, note.column);
-    let refused = |refusal: Refusal| {
-        let told = refusal.faults.iter().take(MOST_FAULTS);
-        let mut faults: Vec<Fault> = told.map(|note| Fault::new(place(note), &note.message)).collect();
-        if refusal.faults.len() > MOST_FAULTS {
-            faults.push(Fault::new(layout.place, format!("and {} more", refusal.faults.len() - MOST_FAULTS)));
-        }
-        if refusal.partial > 0 {
-            faults.push(Fault::new(layout.place, "partial targets stay as they are with --leave-partial"));
-        }
-        Error::Data(faults)
-    };
-    let robot = RobotModel::new(layout.robot.clone());
-    if robot.joints() != JOINTS_OF_PROGRAMS {
-        let message = format!("programs have targets of {JOINTS_OF_PROGRAMS} joints, the robot has {}", robot.joints());
-        return Err(Error::spec(layout.place, message));
-    }
     let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
-    let program = Program::parse(&text, language, partial).map_err(refused)?;
-    if program.literals().is_empty() {
-        return Err(Error::data(layout.place, "has no targets"));
-    }
-    let answers = program::solve(program.literals(), &robot, corrector);
-    let rewritten = program.rewritten(answers).map_err(refused)?;
-    let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", place(note), note.message));
+    let source = ProgramFile { place: layout.place, text: &text, language };
+    let rewritten = program::corrected(&source, partial, layout.robot, corrector)?;
+    let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
     let Some(out) = &arguments.out else {
         return match std::io::stdout().write_all(&rewritten.bytes) {
@@ -262,37 +213,16 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
     whole(out, |mut file| file.write_all(&rewritten.bytes).map_err(|error| unwritten(out, &error)))
 }
 
-fn unwritten(out: &Path, error: &std::io::Error) -> Error {
-    Error::store(out.display().to_string(), format!("cannot be written: {error}"))
-}
-
-/// A file appears only when it is whole; a pipe or a device is written as it stands.
-fn whole<T>(out: &Path, fill: impl FnOnce(File) -> Result<T>) -> Result<T> {
-    if out.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return fill(File::options().write(true).open(out).map_err(|error| unwritten(out, &error))?);
-    }
-    let mut name = out.to_path_buf().into_os_string();
-    name.push(".part");
-    let aside = PathBuf::from(name);
-    let file = File::create(&aside).map_err(|error| unwritten(out, &error))?;
-    let result =
-        fill(file).and_then(|filled| std::fs::rename(&aside, out).map(|()| filled).map_err(|error| unwritten(out, &error)));
-    if result.is_err() {
-        let _ = std::fs::remove_file(&aside);
-    }
-    result
-}
-
 /// Reads, corrects and writes.
 fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
     if let Some(language) = language(&arguments.targets) {
         return rewritten(arguments, language, layout, corrector).map(|()| Unreached::default());
     }
     let Some(out) = &arguments.out else {
-        return convert(&arguments.targets, std::io::stdout(), has_ending(&arguments.targets, "parquet"), layout, corrector);
+        return convert(&arguments.targets, std::io::stdout(), is_parquet(&arguments.targets), layout, corrector);
     };
-    let columnar = has_ending(out, "parquet");
-    if columnar != has_ending(&arguments.targets, "parquet") {
+    let columnar = is_parquet(out);
+    if columnar != is_parquet(&arguments.targets) {
         let message = "text stays text and Parquet stays Parquet: give --out the ending of the targets";
         return Err(Error::spec("--out", message));
     }

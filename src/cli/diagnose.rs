@@ -1,18 +1,17 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-mod told;
-
 use super::means::{Means, Task};
 use super::pipeline_arguments::told_as;
-use super::{emit, emit_json, shell};
-use crate::error::{Error, Result, nearest};
-use crate::pipeline::{Manifest, Purpose, Selection, StageReport, StageStatus, find_run};
+use super::{emit, emit_json};
+use crate::audit::{diagnosis, the_stage};
+use crate::error::{Error, Result};
+use crate::pipeline::{Purpose, Selection};
+use crate::raw::ending;
 use crate::stage::{Diagnose, Stage};
-use crate::store::Store;
+use crate::summary::DiagnosisSummary;
 use clap::Args;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use told::Told;
 
 /// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
 ///
@@ -55,7 +54,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         let plan = arguments.means.plan(&arguments.what)?;
         let own = plan.stages.iter().enumerate().filter(|(_, stage)| stage.entry.name == Diagnose::NAME);
         let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
-        let Some((at, id)) = one(&file, &own, arguments.step.as_deref())? else {
+        let Some((at, id)) = the_stage(&file, &own, arguments.step.as_deref())? else {
             return Err(Error::spec(file, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
         };
         let id = id.to_string();
@@ -63,7 +62,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         let task = Task { purpose: Purpose::Diagnose, selection: Selection::default(), quiet: arguments.quiet };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
-        Told::read(&outcome.manifest.run_id, stage, &store)?
+        DiagnosisSummary::read(&outcome.manifest.run_id, stage, &store)?
     } else {
         if arguments.means.overrides() {
             return Err(Error::spec("--set", "nothing of a run can be set again; give its pipeline instead"));
@@ -74,7 +73,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
             None => (&*name, arguments.step.as_deref()),
         };
         let (manifest, stage) = diagnosis(&store, run, step)?;
-        Told::read(&manifest.run_id, &stage, &store)?
+        DiagnosisSummary::read(&manifest.run_id, &stage, &store)?
     };
     let store = arguments.means.store_again();
     if arguments.json { emit_json(&told.document(&store)) } else { emit(&told.text(&store)) }
@@ -82,47 +81,5 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
 
 /// A file, or what is named like one; everything else names a run.
 fn is_pipeline(what: &Path) -> bool {
-    let ending = what.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
-    matches!(ending.as_str(), "yaml" | "yml") || what.is_file()
-}
-
-/// A run by its name, and its stage `diagnose`: `step` where it has several. Fails with what to type where there is none.
-pub(super) fn diagnosis(store: &Store, run: &str, step: Option<&str>) -> Result<(Manifest, StageReport)> {
-    let manifest = Manifest::of(store, &find_run(store, run)?)?;
-    let place = format!("run {}", manifest.run_id);
-    let own = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME);
-    let own: Vec<(&StageReport, &str)> = own.map(|stage| (stage, stage.id.as_str())).collect();
-    let sets: String = manifest
-        .overrides
-        .iter()
-        .map(|set| format!(" --set {}", shell::quoted(&format!("{}={}", set.target, set.value))))
-        .collect();
-    let again = format!("calib diagnose {}{sets}", shell::quoted(&manifest.pipeline.file));
-    let Some((stage, id)) = one(&place, &own, step)? else {
-        let message = format!(
-            "diagnosed nothing, its pipeline has no stage `diagnose`: put `- uses: diagnose` after the split of {}, then type\n  {again}",
-            manifest.pipeline.file
-        );
-        return Err(Error::spec(place, message));
-    };
-    if !matches!(stage.status, StageStatus::Cached | StageStatus::Executed) {
-        let step = if own.len() > 1 { format!(" --step {}", shell::quoted(id)) } else { String::new() };
-        return Err(Error::spec(place, format!("never came to its stage `{id}`; type\n  {again}{step}")));
-    }
-    let stage = stage.clone();
-    Ok((manifest, stage))
-}
-
-/// The one that is meant; nothing where there are none.
-fn one<'a, T: Copy>(place: &str, own: &[(T, &'a str)], step: Option<&str>) -> Result<Option<(T, &'a str)>> {
-    let list = || own.iter().map(|(_, id)| *id).collect::<Vec<_>>().join(", ");
-    match (own, step) {
-        ([], _) => Ok(None),
-        (_, Some(step)) => own.iter().find(|(_, id)| *id == step).copied().map(Some).ok_or_else(|| {
-            let near = nearest(step, own.iter().map(|(_, id)| *id)).map(|near| format!("did you mean `{near}`? "));
-            Error::spec(place, format!("no stage `{step}` diagnoses; {}allowed: {}", near.unwrap_or_default(), list()))
-        }),
-        ([only], None) => Ok(Some(*only)),
-        _ => Err(Error::spec(place, format!("has several diagnoses; say which with --step: {}", list()))),
-    }
+    matches!(ending(what).as_str(), "yaml" | "yml") || what.is_file()
 }

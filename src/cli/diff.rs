@@ -1,12 +1,13 @@
 //! `calib diff`: two tables or two runs compared; exit code 0 same, 1 different beyond tolerance, 2 could not compare.
 
 use super::surroundings::open_store;
-use super::{complain, emit, emit_json, run_diff};
+use super::{complain, emit, emit_json};
 use crate::audit::{Place, compare_runs};
 use crate::diff::{self, Detail, Options, TableDiff};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::{Store, TableRef};
+use crate::summary::run_diff;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -108,10 +109,10 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
         value["same"] = diff.is_same().into();
         emit_json(&value)?;
     } else {
-        emit(&run_diff::text(&diff, arguments.stat))?;
+        emit(&run_diff(&diff, arguments.stat))?;
     }
     if let Some(path) = &arguments.html {
-        let text = run_diff::text(&diff, true);
+        let text = run_diff(&diff, true);
         let notes: Vec<String> = text.lines().filter(|line| !line.is_empty()).map(String::from).collect();
         let tables: Vec<(String, TableDiff)> =
             diff.tables.iter().filter_map(|table| Some((table.name.clone(), table.diff.clone()?))).collect();

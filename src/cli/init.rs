@@ -1,20 +1,10 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
-mod columns;
-mod names;
-mod pipeline;
-mod points;
-mod robots;
-mod sheet;
-mod together;
-mod words;
-
 use super::emit;
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Fault, Result};
+use crate::init::{KINDS, Kind, Request, Start, start};
 use clap::Args;
-use columns::Found;
-use pipeline::missing;
-use robots::Kind;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from, with comments, for the columns found in your recordings.
@@ -31,7 +21,7 @@ pub(super) struct InitArguments {
     #[arg(long, short, value_name = "FILE", num_args = 1..=2)]
     data: Vec<PathBuf>,
     /// The robot to start from
-    #[arg(long, value_enum, default_value_t = Kind::Spherical6)]
+    #[arg(long, default_value = KINDS[0].name(), value_parser = kinds())]
     robot: Kind,
     /// Takes the robot from this URDF instead
     #[arg(long, value_name = "FILE")]
@@ -46,70 +36,51 @@ const EXAMPLES: &str = "Examples:
   calib init cell7 --data measurements.csv --urdf arm.urdf --tip flange
   calib init --robot seven";
 
+/// The robots as values of an option, each with its line of help.
+fn kinds() -> impl TypedValueParser<Value = Kind> {
+    let values = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    PossibleValuesParser::new(values).try_map(|name| KINDS.into_iter().find(|kind| kind.name() == name).ok_or("no kind"))
+}
+
 pub(super) fn main(arguments: &InitArguments) -> Result<()> {
-    let [robot, pipeline] = ["robot.yaml", "pipeline.yaml"].map(|name| arguments.folder.join(name));
-    let there = [&robot, &pipeline].into_iter().filter(|path| path.exists());
+    let InitArguments { folder, data, robot, urdf, tip } = arguments;
+    let files = ["robot.yaml", "pipeline.yaml"].map(|name| folder.join(name));
+    let there = files.iter().filter(|path| path.exists());
     let faults: Vec<Fault> =
         there.map(|path| Fault::new(path.display().to_string(), "is already there; nothing was written")).collect();
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
     }
-    let mut found = arguments.data.iter().map(|path| Found::read(path)).collect::<Result<Vec<Found>>>()?;
-    let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
-    let robot_text = match &arguments.urdf {
-        Some(_) => robots::of_urdf(&arguments.tip),
-        None => {
-            if let Some(n) = joints.filter(|n| *n != arguments.robot.joints()) {
-                return Err(Error::spec(
-                    "--robot",
-                    format!(
-                        "{} has {}, the recording {n}; choose another kind",
-                        arguments.robot.name(),
-                        counted(arguments.robot.joints(), "joint")
-                    ),
-                ));
-            }
-            arguments.robot.text()
-        }
-    };
+    let start = start(&Request { folder, data, robot: *robot, urdf: urdf.as_deref(), tip })?;
     let refused = |path: &Path| {
         let place = path.display().to_string();
         move |error: std::io::Error| Error::store(place.clone(), format!("cannot be written: {error}"))
     };
-    std::fs::create_dir_all(&arguments.folder).map_err(refused(&arguments.folder))?;
-    let joined = together::join(&mut found);
-    let text = pipeline::text(arguments, &found, &joined);
-    for (path, text) in [(&robot, &robot_text), (&pipeline, &text)] {
+    std::fs::create_dir_all(folder).map_err(refused(folder))?;
+    for (path, text) in files.iter().zip([&start.robot, &start.pipeline]) {
         std::fs::write(path, text).map_err(refused(path))?;
     }
-    emit(&closing(arguments, &found, &robot, &pipeline))
+    emit(&closing(arguments, &start, &files))
 }
 
-fn closing(arguments: &InitArguments, found: &[Found], robot: &Path, pipeline: &Path) -> String {
+fn closing(arguments: &InitArguments, start: &Start, files: &[PathBuf; 2]) -> String {
     let mut text = String::new();
-    for (path, file) in arguments.data.iter().zip(found) {
-        text.push_str(&format!("{}: {}\n", path.display(), file.account()));
+    for (path, account) in arguments.data.iter().zip(&start.accounts) {
+        text.push_str(&format!("{}: {account}\n", path.display()));
     }
-    let (robot, pipeline) = (robot.display(), pipeline.display());
+    let [robot, pipeline] = files.each_ref().map(|path| path.display());
     text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n"));
     if arguments.urdf.is_none() {
         text.push_str(&format!("  1. {robot}: put your robot's numbers where it says REPLACE\n"));
     } else {
         text.push_str(&format!("  1. {robot}: say where the measured point sits on the tool\n"));
     }
-    let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(found)).filter(|(_, missing)| *missing);
-    let unknown: Vec<&str> = unknown.map(|(what, _)| what).collect();
-    let name = if found.is_empty() || unknown.is_empty() {
+    let name = if start.missing.is_empty() {
         String::new()
     } else {
-        format!("; name {} where it says REPLACE: they were not recognised", unknown.join(" and "))
+        format!("; name {} where it says REPLACE: they were not recognised", start.missing.join(" and "))
     };
     text.push_str(&format!("  2. {pipeline}: look at the lines marked CHECK{name}\n"));
     text.push_str(&format!("  3. calib check {pipeline}\n  4. calib run {pipeline}\n"));
     text
-}
-
-/// A YAML text in double quotes; JSON's escapes are YAML's.
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
 }

@@ -3,7 +3,8 @@
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::error::Result;
-use crate::pipeline::{Manifest, RunStatus, StageStatus, find_run};
+use crate::pipeline::{Manifest, StageStatus, find_run};
+use crate::summary::status;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -82,14 +83,6 @@ fn line(manifest: &Manifest, tags: &[&str]) -> String {
         manifest.what(),
         manifest.pipeline.name
     )
-}
-
-pub(super) fn status(manifest: &Manifest) -> &'static str {
-    match manifest.status {
-        RunStatus::Running => "running or killed",
-        RunStatus::Done => "done",
-        RunStatus::Failed => "failed",
-    }
 }
 
 fn count(manifest: &Manifest, status: StageStatus) -> usize {

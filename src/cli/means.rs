@@ -1,10 +1,10 @@
 //! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
 
-use super::shell::quoted;
 use super::surroundings::{cores, open_store, surroundings};
 use crate::error::Result;
 use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
+use crate::shell::typed;
 use crate::stage::STAGES;
 use crate::store::Store;
 use clap::Args;
@@ -47,7 +47,7 @@ impl Means {
 
     /// `--store` as it was given, to be typed again; empty for the usual place.
     pub fn store_again(&self) -> String {
-        self.store.as_ref().map_or_else(String::new, |store| format!(" --store {}", quoted(&store.display().to_string())))
+        self.store.as_ref().map_or_else(String::new, |store| format!(" --store {}", typed(&store.display().to_string())))
     }
 
     pub fn jobs(&self) -> usize {

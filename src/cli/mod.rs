@@ -2,7 +2,6 @@
 
 mod check;
 mod compensate;
-mod corrections;
 mod diagnose;
 mod diff;
 mod effects;
@@ -20,14 +19,11 @@ mod pipeline_arguments;
 mod poses;
 mod query;
 mod run;
-mod run_diff;
 mod schema;
-mod searches;
 mod shell;
 mod show;
 mod simulate;
 mod surroundings;
-mod tables;
 mod tag;
 mod verify;
 

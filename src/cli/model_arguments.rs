@@ -4,6 +4,7 @@ use super::means::{Means, Task};
 use crate::error::{Error, Result};
 use crate::identified::{Files, Identified, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
+use crate::raw::ending;
 use crate::store::Store;
 use clap::Args;
 use std::ffi::OsString;
@@ -49,7 +50,7 @@ impl ModelArguments {
     }
 
     fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<Identified> {
-        let ending = self.model.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let ending = ending(&self.model);
         if ending == "parquet" {
             let Some(robot) = self.robot.clone() else {
                 let message = "say which robot the parameters are of: --robot robot.yaml, or the table `robot` of the same run";

@@ -1,23 +1,12 @@
 //! `calib poses`: which poses to measure, before anything is measured.
 
-mod apart;
-mod input;
-mod output;
-mod show;
-
+use super::surroundings::open_store;
 use super::{emit, emit_json};
-use crate::effect::{EffectStack, Load, Setting, identified, whole};
+use crate::effect::identified;
 use crate::error::{Error, Fault, Result, nearest};
-use crate::estimate::Model;
-use crate::estimate::choose::{Aim, Proposal, Score, Site, Wish, propose};
-use crate::robot::description::{JointKind, RobotDescription};
-use crate::robot::{Measurements, RobotModel};
-use crate::spatial::Pose;
-use crate::units::Unit;
+use crate::poses::{Answer, Request, RobotFiles, RunStage, apart, fault, is_known, proposal, write};
 use clap::Args;
-use input::Ranges;
-use nalgebra::Vector3;
-use output::Drive;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Propose poses to measure: the best for all parameters together, or for telling two effects apart.
@@ -56,13 +45,13 @@ pub(super) struct PosesArguments {
     #[arg(long, num_args = 0..=2, value_names = ["EFFECT", "RIVAL"])]
     separate: Option<Vec<String>>,
     /// Joint ranges instead of the robot file's, deg (mm for a prismatic joint)
-    #[arg(long, value_name = "MIN:MAX,..", allow_hyphen_values = true, value_parser = input::ranges)]
+    #[arg(long, value_name = "MIN:MAX,..", allow_hyphen_values = true, value_parser = ranges)]
     limits: Option<Ranges>,
     /// Part of each joint's travel left free at either end for the move of approach, percent
     #[arg(long, value_name = "PERCENT", default_value_t = 2.0)]
     margin: f64,
     /// Where the measured point may be in the base frame, mm; a side left empty is free, e.g. 500:2500,-1000:1000,300:
-    #[arg(long = "box", value_name = "XMIN:XMAX,YMIN:YMAX,ZMIN:ZMAX", allow_hyphen_values = true, value_parser = input::ranges)]
+    #[arg(long = "box", value_name = "XMIN:XMAX,YMIN:YMAX,ZMIN:ZMAX", allow_hyphen_values = true, value_parser = ranges)]
     bounds: Option<Ranges>,
     /// Height in the base frame below which neither the measured point nor a link's centre of mass may be, mm
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
@@ -98,73 +87,65 @@ const EXAMPLES: &str = "Examples:
   calib poses --run HEAD --separate 1 'link_compliance@link 2' --payload 0,10
   calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
 
-/// What was proposed and what for; made once, shown as text, JSON or file.
-struct Work<'a> {
-    arguments: &'a PosesArguments,
-    robot: RobotDescription,
-    ranges: Vec<[f64; 2]>,
-    effects: Vec<&'static str>,
-    /// Effects left out, with the reason.
-    left_out: Vec<(&'static str, String)>,
-    /// Names and units of the stack's parameters.
-    parameters: Vec<(String, Unit)>,
-    /// mm.
-    sigma: f64,
-    proposal: Proposal,
-    recorded: Option<Score>,
-}
-
-impl Work<'_> {
-    fn drive(&self) -> Drive<'_> {
-        let Proposal { poses, direction, .. } = &self.proposal;
-        Drive { robot: &self.robot, ranges: &self.ranges, poses, direction }
-    }
-}
-
-/// mm.
-const SIGMA: f64 = 0.02;
-
 pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
     check(arguments)?;
+    let request = request(arguments);
     let pair = arguments.separate.as_deref().unwrap_or_default();
-    let file = match (&arguments.run, &arguments.robot) {
-        (Some(run), _) => return apart::main(arguments, run, pair),
-        (None, Some(file)) => file,
-        (None, None) => return Err(Error::spec("ROBOT", "expected a robot file, or --run")),
-    };
-    let imported = input::robot(file, arguments.urdf.as_deref())?;
-    let place = file.display().to_string();
-    let site = site(arguments, &imported, &place, None)?;
-    let robot = RobotModel::new(imported.clone());
-    let (effects, left_out) = effects(arguments, &robot, &site);
-    let model = || model(&robot, &effects);
-    let aim = match pair {
-        [a, b] => Aim::Separation([a.clone(), b.clone()]),
-        _ => Aim::Information,
-    };
-    for name in pair {
-        if let Some((_, reason)) = left_out.iter().find(|(left, _)| left == name) {
-            return Err(Error::spec("--separate", format!("`{name}` cannot be told: {reason}")));
+    match (&arguments.run, &arguments.robot) {
+        (Some(run), _) => {
+            let store = open_store(arguments.store.as_deref())?;
+            show(arguments, &apart(&request, &store, &RunStage { run, step: arguments.step.as_deref() }, pair)?)
         }
+        (None, Some(file)) => {
+            let robot = RobotFiles { file, urdf: arguments.urdf.as_deref() };
+            show(arguments, &proposal(&request, &robot, pair, arguments.against.as_deref())?)
+        }
+        (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
     }
-    let shown = arguments.sigma.unwrap_or(SIGMA);
-    let sigma = shown * 1e-3;
-    let wish = wish(arguments, aim, sigma);
-    let recording = arguments.against.as_ref().map(|path| input::recording(path, &imported, sigma)).transpose()?;
-    let proposal = propose(model(), &site, &wish).map_err(|fault| Error::spec(place, fault))?;
-    let recorded = recording.map(|data| proposal.jacobian.score(&model(), &data, &proposal.workspace));
-    let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
-    let ranges = site.ranges;
-    let result = Work { arguments, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded };
-    if let Some(path) = &arguments.out {
-        output::write(path, &result.drive())?;
-    }
-    if arguments.json { emit_json(&show::document(&result)) } else { emit(&show::text(&result)) }
 }
 
-/// `sigma` in m.
-fn wish(arguments: &PosesArguments, aim: Aim, sigma: f64) -> Wish {
-    Wish { aim, count: arguments.count as usize, candidates: arguments.candidates as usize, sigma, seed: arguments.seed }
+fn request(arguments: &PosesArguments) -> Request {
+    Request {
+        count: arguments.count as usize,
+        candidates: arguments.candidates as usize,
+        seed: arguments.seed,
+        effects: arguments.effects.clone(),
+        limits: arguments.limits.as_ref().map(|limits| limits.0.clone()),
+        margin: arguments.margin,
+        bounds: arguments.bounds.as_ref().map(|bounds| bounds.0.clone()),
+        floor: arguments.floor,
+        payloads: arguments.payload.clone(),
+        sigma: arguments.sigma,
+        out: arguments.out.clone(),
+    }
+}
+
+fn show(arguments: &PosesArguments, answer: &impl Answer) -> Result<()> {
+    for warning in answer.warnings() {
+        let _ = writeln!(std::io::stderr(), "warning: {warning}");
+    }
+    if let (Some(path), Some(poses)) = (&arguments.out, answer.drive()) {
+        write(path, &poses)?;
+    }
+    if arguments.json { emit_json(&answer.document()) } else { emit(&answer.text()) }
+}
+
+/// Lower and upper ends; infinite where left empty.
+#[derive(Debug, Clone)]
+struct Ranges(Vec<[f64; 2]>);
+
+/// `-10:10,:5,3:` -> ranges.
+fn ranges(text: &str) -> Result<Ranges, String> {
+    let end = |text: &str, free: f64| match text.trim() {
+        "" => Ok(free),
+        number => number.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| format!("`{number}` is no number")),
+    };
+    let one = |part: &str| {
+        let (lower, upper) = part.split_once(':').ok_or_else(|| format!("`{part}` is no range; expected MIN:MAX"))?;
+        let range = [end(lower, f64::NEG_INFINITY)?, end(upper, f64::INFINITY)?];
+        if range[0] < range[1] { Ok(range) } else { Err(format!("`{part}` is empty; expected MIN:MAX with MIN below MAX")) }
+    };
+    text.split(',').map(one).collect::<Result<_, _>>().map(Ranges)
 }
 
 /// Everything that can be said without a file, all at once.
@@ -173,7 +154,7 @@ fn check(arguments: &PosesArguments) -> Result<()> {
     let none = Vec::new();
     let separate = arguments.separate.as_ref().filter(|_| arguments.run.is_none());
     for (option, names) in [("--effects", &arguments.effects), ("--separate", separate.unwrap_or(&none))] {
-        for name in names.iter().filter(|name| whole(name, &setting()).is_none()) {
+        for name in names.iter().filter(|name| !is_known(name)) {
             let known: Vec<&str> = identified().map(|cause| cause.name()).collect();
             let hint = nearest(name, known.iter().copied()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
             faults.push(Fault::new(option, format!("unknown effect `{name}`; {hint}allowed: {}", known.join(", "))));
@@ -204,88 +185,7 @@ fn check(arguments: &PosesArguments) -> Result<()> {
         faults.push(Fault::new("--box", format!("expected three ranges, x, y, z, found {}", bounds.0.len())));
     }
     if let Some(path) = &arguments.out {
-        faults.extend(output::fault(path).map(|fault| Fault::new("--out", fault)));
+        faults.extend(fault(path).map(|fault| Fault::new("--out", fault)));
     }
     if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
-}
-
-/// Where the arm may go; a joint without limits keeps to its range in `recorded`, where there is one.
-fn site(arguments: &PosesArguments, robot: &RobotDescription, place: &str, recorded: Option<&[[f64; 2]]>) -> Result<Site> {
-    let unit = |kind| if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
-    let mut ranges = Vec::new();
-    let mut faults = Vec::new();
-    let given = arguments.limits.as_ref().map(|limits| &limits.0);
-    if let Some(given) = given.filter(|given| given.len() != robot.joints.len()) {
-        return Err(Error::spec("--limits", format!("has {} ranges, the robot {} joints", given.len(), robot.joints.len())));
-    }
-    for (index, joint) in robot.joints.iter().enumerate() {
-        let limits = match given.and_then(|given| given.get(index)) {
-            Some(range) => Some(range.map(|value| unit(joint.kind).to_si(value))),
-            None => joint.limits,
-        };
-        match limits {
-            Some([lower, upper]) if lower.is_finite() && upper.is_finite() => {
-                let free = 1e-2 * arguments.margin * (upper - lower);
-                ranges.push([lower + free, upper - free]);
-            }
-            _ if recorded.is_some() => ranges.extend(recorded.and_then(|all| all.get(index))),
-            _ => faults.push(Fault::new(
-                place,
-                format!(
-                    "joint {} has no limits; put them into the robot file, or give --limits with a range for every joint",
-                    index + 1
-                ),
-            )),
-        }
-    }
-    if !faults.is_empty() {
-        return Err(Error::Spec(faults));
-    }
-    let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 3];
-    if let Some(given) = &arguments.bounds {
-        for (bound, range) in bounds.iter_mut().zip(&given.0) {
-            *bound = range.map(|value| Unit::Millimetre.to_si(value));
-        }
-    }
-    let mut payloads = if arguments.payload.is_empty() { vec![0.0] } else { arguments.payload.clone() };
-    payloads.sort_by(f64::total_cmp);
-    payloads.dedup();
-    let floor = arguments.floor.map_or(f64::NEG_INFINITY, |height| Unit::Millimetre.to_si(height));
-    Ok(Site { ranges, bounds, floor, payloads })
-}
-
-type Named = (Vec<&'static str>, Vec<(&'static str, String)>);
-
-/// The chosen effects that poses can tell of this robot, and those left out.
-fn effects(arguments: &PosesArguments, robot: &RobotModel, site: &Site) -> Named {
-    let heaviest = site.payloads.iter().copied().fold(0.0, f64::max);
-    let data = Measurements {
-        joints: robot.joints(),
-        q: vec![0.0; robot.joints()],
-        position: vec![Vector3::zeros()],
-        sigma: vec![Vector3::zeros()],
-        payload: vec![heaviest],
-        ..Measurements::default()
-    };
-    let setting = setting();
-    let (mut kept, mut left) = (Vec::new(), Vec::new());
-    for effect in identified().filter_map(|cause| cause.whole(&setting)) {
-        if arguments.effects.is_empty() || arguments.effects.iter().any(|name| name == effect.name()) {
-            match effect.missing(robot, &data) {
-                Some(reason) => left.push((effect.name(), reason)),
-                None => kept.push(effect.name()),
-            }
-        }
-    }
-    (kept, left)
-}
-
-fn setting() -> Setting {
-    Setting { base: Pose::identity(), load: Load::GravityTorque }
-}
-
-fn model(robot: &RobotModel, effects: &[&str]) -> Model {
-    let setting = setting();
-    let made = effects.iter().filter_map(|name| whole(name, &setting)).collect();
-    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
 }

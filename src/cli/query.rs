@@ -1,14 +1,12 @@
 //! `calib query`: the tables of a run asked in SQL.
 
-mod grid;
-mod lines;
-mod list;
-
-use super::emit;
 use super::surroundings::open_store;
-use crate::audit::{QueryTables, query};
+use super::{emit, emit_json};
+use crate::audit::{QueryTable, QueryTables, query};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
+use crate::store::Store;
+use crate::summary;
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -57,17 +55,22 @@ pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
     let store = open_store(arguments.store.as_deref())?;
     let tables = QueryTables::of(&Manifest::of(&store, &find_run(&store, run)?)?);
     let Some(sql) = arguments.sql.as_deref().map(str::trim) else {
-        return list::tell(&store, &tables.iter().collect::<Vec<_>>(), arguments.json);
+        return columns(&store, &tables.iter().collect::<Vec<_>>(), arguments.json);
     };
     if !sql.is_empty() && !sql.contains(char::is_whitespace) && !arguments.csv {
-        return list::tell(&store, &[tables.find(sql)?], arguments.json);
+        return columns(&store, &[tables.find(sql)?], arguments.json);
     }
     let answer = query(&store, &tables, sql)?;
     match (arguments.csv, arguments.json) {
-        (true, _) => emit(&lines::csv(&answer)?),
-        (_, true) => emit(&lines::json(&answer)?),
-        _ => emit(&grid::grid(&answer, if arguments.rows == 0 { usize::MAX } else { arguments.rows }, width())),
+        (true, _) => emit(&summary::csv(&answer)?),
+        (_, true) => emit(&summary::json(&answer)?),
+        _ => emit(&summary::grid(&answer, if arguments.rows == 0 { usize::MAX } else { arguments.rows }, width())),
     }
+}
+
+/// The tables with their columns.
+fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
+    if json { emit_json(&summary::columns_json(store, tables)?) } else { emit(&summary::columns(store, tables)?) }
 }
 
 /// Columns of the terminal, where stdout is one.

@@ -1,11 +1,12 @@
 //! `calib run`: runs what is not already done.
 
 use super::pipeline_arguments::PipelineArguments;
-use super::{corrections, emit, emit_json, searches, tables};
+use super::{emit, emit_json};
 use crate::error::{Result, counted};
 use crate::identified::standing_of;
 use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
+use crate::summary;
 use crate::table::Withdrawn;
 use clap::Args;
 use serde_json::json;
@@ -71,11 +72,11 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
         return emit_json(&document(&outcome, &store)?);
     }
     let standing = standing_of(&outcome.manifest, &store)?;
-    let mut text = tables::statistics(&outcome, standing.as_ref(), &store)?;
-    text.push_str(&corrections::corrections(&outcome, &store)?);
-    text.push_str(&searches::searches(&outcome, &store)?);
-    text.push_str(&tables::rejected(&outcome));
-    text.push_str(&tables::headline(&outcome, standing.as_ref(), &store)?);
+    let mut text = summary::statistics(&outcome, standing.as_ref(), &store)?;
+    text.push_str(&summary::corrections(&outcome, &store)?);
+    text.push_str(&summary::searches(&outcome, &store)?);
+    text.push_str(&summary::rejected(&outcome));
+    text.push_str(&summary::headline(&outcome, standing.as_ref(), &store)?);
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }
@@ -148,10 +149,10 @@ fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
         "seed": manifest.seed,
         "stages": stages,
         "standing": standing,
-        "statistics": tables::statistics_json(outcome, store)?,
-        "corrections": corrections::corrections_json(outcome, store)?,
-        "searches": searches::searches_json(outcome, store)?,
-        "rejected_rows": tables::rejected_rows(outcome),
+        "statistics": summary::statistics_json(outcome, store)?,
+        "corrections": summary::corrections_json(outcome, store)?,
+        "searches": summary::searches_json(outcome, store)?,
+        "rejected_rows": summary::rejected_rows(outcome),
         "report": outcome.documents.first(),
         "documents": outcome.documents,
     }))

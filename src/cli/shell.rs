@@ -49,9 +49,3 @@ pub(super) fn man(arguments: &ManArguments) -> Result<()> {
     clap_mangen::Man::new(page).title(title).render(&mut text).map_err(|error| Error::Bug(error.to_string()))?;
     emit(&String::from_utf8_lossy(&text))
 }
-
-/// A word as it is typed into a POSIX shell: in quotes where it must be.
-pub(super) fn quoted(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,@%+~".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', "'\\''")) }
-}

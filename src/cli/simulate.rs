@@ -4,7 +4,6 @@ mod conceal;
 mod prove;
 mod record;
 mod reveal;
-mod seal;
 
 use crate::error::Result;
 use clap::{Args, Subcommand};

@@ -141,10 +141,9 @@ impl Chain for Reach<'_> {
     fn place(&mut self, q: &[f64]) -> Pose {
         self.data.q.copy_from_slice(q);
         let Model { robot, stack, x, .. } = &self.arm.model;
-        stack.point(robot, &self.data, 0, x, &mut self.scratch);
+        let mut pose = stack.place(robot, &self.data, 0, x, &mut self.scratch).tool(&mut self.velocities);
         self.scratch.near(true);
         let base = &self.arm.base;
-        let mut pose = stack.tool(robot, &self.scratch, &mut self.velocities);
         if let Some(correction) = &self.arm.correction {
             self.fill_sources();
             pose.translation += Vector3::from(correction.at(&self.sources).delta);

@@ -5,6 +5,7 @@ use super::{
     one_step,
 };
 use crate::effect::LONG_AFTER;
+use crate::error::counted;
 use crate::robot::RobotModel;
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -89,6 +90,31 @@ pub struct Tally {
     pub turned: u64,
     pub beyond_limits: u64,
     pub beyond_measured: u64,
+}
+
+impl Tally {
+    /// What the correction does, in a line.
+    pub fn summary(&self) -> String {
+        format!(
+            "{}; uncorrected error {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
+            counted(self.targets, "target"),
+            self.uncorrected_sum / self.targets.max(1) as f64 * 1e3,
+            self.uncorrected_max * 1e3,
+            self.residual_max * 1e3
+        )
+    }
+
+    /// What is wrong with some of them, a sentence a line.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let all = [
+            (self.not_reached, "could not be reached and have no joints"),
+            (self.turned, "are reached but for their orientation: the wrist is stretched"),
+            (self.beyond_limits, "leave the joint limits"),
+            (self.beyond_measured, "are outside of what was measured: the model extrapolates there"),
+        ];
+        let said = all.into_iter().filter(|(count, _)| *count > 0);
+        said.map(|(count, what)| format!("{count} of them {what}"))
+    }
 }
 
 struct Job {

@@ -24,14 +24,14 @@ pub use outside::against_simulation;
 pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
 pub use types::{
-    Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, Located, Question, Repeatability, RivalCause, SpectrumLine,
+    Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Question, RivalCause, SpectrumLine,
     Verdict,
 };
 pub use words::other_means;
 
 use judge::{ModelComparison, judge};
 use locate::locate;
-use round::{EstimatedCause, Fitter, Progress, Step, View};
+use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
@@ -43,9 +43,9 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     let (mut fitter, mut now) = Fitter::start(question);
     let before = now.model.predict(&fitter.data);
     tell(words::of_the_base(&now, &fitter));
-    let (mut progress, mut located, mut first) = (Progress::default(), None, None);
+    let (mut history, mut located, mut first) = (RoundHistory::default(), None, None);
     loop {
-        let view = View::of(&now, &fitter);
+        let view = RoundView::of(&now, &fitter);
         let survey = view.survey();
         let mut pool = view.pool(&now, &fitter, &survey);
         located.get_or_insert_with(|| locate(&pool, &pool.given(&[]), &survey));
@@ -54,14 +54,14 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let found = search.run_from(now.causes.iter().map(|cause| &cause.form));
         first.get_or_insert(found.first);
         let causes = EstimatedCause::all(&view.problem, search.pool.estimated(&found.set));
-        tell(words::of_a_round(progress.round(), search.pool, causes.iter().map(|cause| &cause.form), found.last));
+        tell(words::of_a_round(history.round(), search.pool, causes.iter().map(|cause| &cause.form), found.last));
         let next = fitter.fit(&now.model, causes);
-        let step = progress.step(&now, &next);
-        if step == Step::Again {
+        let outcome = history.after(&now, &next);
+        if outcome == RoundOutcome::Again {
             now = next;
             continue;
         }
-        let structureless = step == Step::Settled && found.last > SIGNIFICANT;
+        let structureless = outcome == RoundOutcome::Settled && found.last > SIGNIFICANT;
         if let Some(sigma) = structureless.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);
             now = fitter.fit(&next.model, next.causes);

@@ -1,7 +1,7 @@
 //! Too few rows to ask what was left out: the nominal robot in its place, and no findings.
 
 use super::misfit::Misfit;
-use super::types::{Diagnosis, ErrorLengths, Located, Question, Repeatability, Verdict};
+use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, Verdict};
 use crate::effect::{BasePlacement, Effect, EffectStack};
 use crate::estimate::{FitOptions, Model, align, fit_screened};
 
@@ -39,7 +39,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
         chi_square: misfit.chi_square,
         gate_first: None,
         gate_last: None,
-        repeatability: Repeatability { sigma: 0.0, repeats: 0 },
+        repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
         located_before: Located::default(),
         located_after: Located::default(),
         kept: screening.kept.clone(),

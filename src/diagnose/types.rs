@@ -20,7 +20,7 @@ pub struct Question<'a> {
 
 /// One joint repeatability (rad) and what it rests on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Repeatability {
+pub struct JointRepeatability {
     pub sigma: f64,
     /// Immediate repeats of a pose; none where it was taken from the residual.
     pub repeats: usize,
@@ -188,7 +188,7 @@ pub struct Diagnosis {
     pub chi_square: f64,
     pub gate_first: Option<f64>,
     pub gate_last: Option<f64>,
-    pub repeatability: Repeatability,
+    pub repeatability: JointRepeatability,
     /// Where the residual sits before and after the findings.
     pub located_before: Located,
     pub located_after: Located,

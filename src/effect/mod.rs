@@ -31,6 +31,7 @@ mod link_mass;
 mod motion;
 mod payload_error;
 mod place;
+mod placed_row;
 mod reduction_ratio;
 mod spring;
 mod stack;
@@ -69,8 +70,9 @@ pub use law::{Factor, Law};
 pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
 pub use place::Place;
+pub use placed_row::{PlacedRow, Scratch};
 pub use reduction_ratio::ReductionRatio;
-pub use stack::{EffectStack, PointMotion, Scratch};
+pub use stack::{EffectStack, PointMotion};
 pub use summary::{ParameterEstimate, Summary, people};
 pub use survey::{Hypothesis, Survey};
 pub use term::Term;
@@ -127,9 +129,9 @@ impl<'a> ArmState<'a> {
         robot.gauging().target(self.data.target(self.row))
     }
 
-    /// The number of the anchor that the row measured its distance from.
+    /// The number of the anchor that the row measured from.
     pub fn anchor(&self, robot: &RobotModel) -> Option<usize> {
-        self.data.distance(self.row).and_then(|distance| robot.gauging().anchor(distance.anchor))
+        robot.gauging().anchor(self.data.anchor(self.row)?)
     }
 
     /// Motor currents, A, where recorded.

@@ -2,10 +2,11 @@
 //!
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
-use super::{ArmState, Deflection, Direction, Effect, ParameterSpec};
-use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
-use crate::spatial::{Pose, Twist, hat, left_jacobian};
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
+use super::placed_row::{PlacedRow, Scratch, Station, along};
+use super::{ArmState, Deflection, Effect, ParameterSpec};
+use crate::robot::{Measurements, Posture, RobotModel, Travel};
+use crate::spatial::Pose;
+use nalgebra::{Matrix3x6, Vector3};
 use std::ops::Range;
 
 /// Effects in a fixed order with their parameters numbered through.
@@ -14,57 +15,6 @@ pub struct EffectStack {
     specs: Vec<ParameterSpec>,
     base: Pose,
     needs_torque: bool,
-}
-
-/// Buffers of one evaluation, made once per thread.
-pub struct Scratch {
-    deflection: Deflection,
-    /// Commanded travel of each joint.
-    commanded: Vec<Travel>,
-    load_correction: LoadCorrection,
-    posture: Posture,
-    stations: Vec<Station>,
-    /// Frame in front of E_k.
-    before: Vec<Pose>,
-    /// Velocity of the point by the twist of E_k.
-    by_station: Vec<Matrix3x6<f64>>,
-    /// Velocity of the point by the travel of joint k.
-    by_joint: Vec<Vector3<f64>>,
-    /// The row's target.
-    target: Option<usize>,
-    /// Whether `commanded` is near the next row's joints.
-    near: bool,
-    /// Travel of each joint and twist at each station by the constant effects, where only points are wanted, all of the same parameters.
-    constant: Option<(Vec<f64>, Vec<Twist>)>,
-}
-
-impl Scratch {
-    /// Partials are wanted again.
-    pub(crate) fn points_and_partials(&mut self) {
-        self.deflection.bare = false;
-        self.constant = None;
-    }
-
-    /// Whether the next row's joints are near those placed last; their sines then follow by addition theorems.
-    pub(crate) fn near(&mut self, near: bool) {
-        self.near = near;
-    }
-}
-
-/// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
-#[derive(Clone)]
-struct Station {
-    twist: Twist,
-    /// Whether nothing moves here: most stations of most models.
-    still: bool,
-    motion: Pose,
-    jacobian: Matrix6<f64>,
-}
-
-impl Station {
-    fn of(twist: &Twist) -> Self {
-        Self { twist: *twist, still: *twist == Twist::zeros(), motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
-    }
 }
 
 impl EffectStack {
@@ -96,20 +46,7 @@ impl EffectStack {
     }
 
     pub fn scratch(&self, robot: &RobotModel) -> Scratch {
-        let n = robot.joints();
-        Scratch {
-            deflection: Deflection::new(n),
-            commanded: vec![Travel::default(); n],
-            load_correction: LoadCorrection::new(n),
-            posture: Posture::new(n),
-            stations: vec![Station::of(&Twist::zeros()); n + 1],
-            before: vec![Pose::identity(); n + 1],
-            by_station: vec![Matrix3x6::zeros(); n + 1],
-            by_joint: vec![Vector3::zeros(); n],
-            target: None,
-            near: false,
-            constant: None,
-        }
+        Scratch::new(robot.joints())
     }
 
     /// Prepares for rows of which only the points are wanted, all under the same `x`: there are no partials, and what is the same at
@@ -125,11 +62,18 @@ impl EffectStack {
         scratch.constant = Some((scratch.deflection.joint.clone(), scratch.deflection.station.clone()));
     }
 
-    /// The measured point (m, tracker frame) of a row under parameters `x`.
+    /// Places the arm of a row under parameters `x`: all that it shows follows from what comes back.
     ///
     /// Torques are taken at the arm's own geometry, first unwound, then wound up; what a third pass would add is of the order of
     /// the wind-up (rad) cubed.
-    pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+    pub fn place<'a>(
+        &self,
+        robot: &'a RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &'a mut Scratch,
+    ) -> PlacedRow<'a> {
         for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
             *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
         }
@@ -154,10 +98,15 @@ impl EffectStack {
                 point = self.chain(robot, scratch);
             }
         }
-        point
+        PlacedRow { robot, scratch, point }
     }
 
-    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`, as [`Self::partials`].
+    /// The measured point (m, tracker frame) of a row under parameters `x`.
+    pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+        self.place(robot, data, row, x, scratch).point
+    }
+
+    /// The measured point, and its derivative by every parameter through `emit(parameter, derivative)`, as [`PlacedRow::partials`].
     pub fn derivatives(
         &self,
         robot: &RobotModel,
@@ -167,108 +116,9 @@ impl EffectStack {
         scratch: &mut Scratch,
         emit: impl FnMut(usize, Vector3<f64>),
     ) -> Vector3<f64> {
-        let point = self.point(robot, data, row, x, scratch);
-        self.partials(robot, &point, scratch, emit);
-        point
-    }
-
-    /// Derivatives of the `point` that [`Self::point`] has just returned.
-    ///
-    /// A parameter may be emitted more than once; derivatives of one parameter add up. Torques are treated as constant: their
-    /// change with the parameters is of second order.
-    pub(crate) fn partials(
-        &self,
-        robot: &RobotModel,
-        point: &Vector3<f64>,
-        scratch: &mut Scratch,
-        mut emit: impl FnMut(usize, Vector3<f64>),
-    ) {
-        self.velocities(robot, point, scratch);
-        let Scratch { deflection, by_station, by_joint, .. } = scratch;
-        for (parameter, direction) in &deflection.partials {
-            emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
-        }
-    }
-
-    /// Tool frame (tracker frame) of the row that [`Self::point`] has just placed, and the velocity (v; w) of its origin by each joint.
-    pub(crate) fn tool(&self, robot: &RobotModel, scratch: &Scratch, velocities: &mut [Twist]) -> Pose {
-        let behind = &scratch.posture.behind;
-        let tool = behind[robot.joints()] * *robot.home();
-        for (joint, velocity) in velocities.iter_mut().enumerate() {
-            *velocity = robot.velocity(joint, &behind[joint], &tool.translation);
-        }
-        tool
-    }
-
-    /// The orientation of the row's target (tracker frame), after [`Self::point`].
-    pub(crate) fn orientation(&self, robot: &RobotModel, scratch: &Scratch) -> Matrix3<f64> {
-        scratch.posture.behind[robot.joints()].rotation * robot.seat(scratch.target).rotation
-    }
-
-    /// Derivatives (rad, tracker axes) of [`Self::orientation`], as [`Self::partials`].
-    pub(crate) fn turning(&self, robot: &RobotModel, scratch: &Scratch, mut emit: impl FnMut(usize, Vector3<f64>)) {
-        let Scratch { deflection, posture, stations, before, .. } = scratch;
-        let joint = |joint: usize| {
-            if robot.is_revolute(joint) { posture.behind[joint].rotation * robot.axis(joint) } else { Vector3::zeros() }
-        };
-        for (parameter, direction) in &deflection.partials {
-            let turn = match direction {
-                Direction::Joint(k, rate) => joint(*k) * *rate,
-                Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
-                Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
-                Direction::Anchor(_) => continue,
-            };
-            emit(*parameter, turn);
-        }
-    }
-
-    /// From where a row's anchor is to its `point`, after [`Self::point`]. `None` where the robot knows no such anchor.
-    pub(crate) fn reach(
-        &self,
-        robot: &RobotModel,
-        anchor: &str,
-        point: &Vector3<f64>,
-        scratch: &Scratch,
-    ) -> Option<Vector3<f64>> {
-        let gauging = robot.gauging();
-        let anchor = gauging.anchors.get(gauging.anchor(anchor)?)?;
-        Some(point - anchor.place - scratch.deflection.anchor)
-    }
-
-    /// Derivatives of [`Self::reach`], as [`Self::partials`].
-    pub(crate) fn reaching(
-        &self,
-        robot: &RobotModel,
-        point: &Vector3<f64>,
-        scratch: &mut Scratch,
-        mut emit: impl FnMut(usize, Vector3<f64>),
-    ) {
-        self.velocities(robot, point, scratch);
-        let Scratch { deflection, by_station, by_joint, .. } = scratch;
-        for (parameter, direction) in &deflection.partials {
-            let velocity = match direction {
-                Direction::Anchor(rate) => -rate,
-                other => along(other, by_joint, by_station, &deflection.compliance),
-            };
-            emit(*parameter, velocity);
-        }
-    }
-
-    /// How the point moves with every joint and station.
-    fn velocities(&self, robot: &RobotModel, point: &Vector3<f64>, scratch: &mut Scratch) {
-        let Scratch { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = scratch;
-        for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
-            // Of a twist (v; w) in the frame: R v + R w x arm.
-            let mut spatial = Matrix3x6::zeros();
-            spatial.fixed_view_mut::<3, 3>(0, 0).copy_from(&frame.rotation);
-            spatial.fixed_view_mut::<3, 3>(0, 3).copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
-            *velocity = spatial * station.jacobian;
-        }
-        for (joint, velocity) in by_joint.iter_mut().enumerate() {
-            let axis = behind[joint].rotation * robot.axis(joint);
-            *velocity =
-                if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
-        }
+        let mut placed = self.place(robot, data, row, x, scratch);
+        placed.partials(emit);
+        placed.point
     }
 
     /// What the row shows of any effect, in the stack or not. The arm hangs as the stack makes it hang.
@@ -284,7 +134,7 @@ impl EffectStack {
         if !self.needs_torque {
             scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
         }
-        self.velocities(robot, &point, scratch);
+        scratch.velocities(robot, &point);
         PointMotion {
             row,
             point,
@@ -358,15 +208,6 @@ impl PointMotion {
         for (parameter, direction) in &buffer.partials {
             emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.compliance));
         }
-    }
-}
-
-fn along(direction: &Direction, by_joint: &[Vector3<f64>], by_station: &[Matrix3x6<f64>], compliance: &[f64]) -> Vector3<f64> {
-    match direction {
-        Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
-        Direction::Station(station, rate) => by_station[*station] * rate,
-        Direction::Torque(joint, rate) => by_joint[*joint] * (compliance[*joint] * *rate),
-        Direction::Anchor(_) => Vector3::zeros(),
     }
 }
 

@@ -103,7 +103,7 @@ impl Reduced {
     fn of(before: &Session, after: &Session, shared: &[usize], base: &[usize]) -> Self {
         let order: Vec<usize> = shared.iter().chain(base).copied().collect();
         let factor = |session: &Session| {
-            let problem = Problem { data: session.data, rows: session.rows, unmodelled: session.fitted.excess() };
+            let problem = Problem { data: session.data, rows: session.rows, excess: session.fitted.excess() };
             problem.observe(session.model, &order).factor
         };
         let (first, second) = (factor(before), factor(after));

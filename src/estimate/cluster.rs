@@ -4,10 +4,10 @@
 
 use super::factor::Tall;
 use super::model::Model;
-use super::piece::{self, Piece};
 use super::problem::Problem;
+use super::term::Term;
 use super::triangle::Triangle;
-use crate::effect::Scratch;
+use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -30,16 +30,17 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
             |(scratch, jacobian), pose| {
                 let (mut errors, mut visible) = (Vec::new(), Vec::new());
                 for &row in pose {
-                    let point = model.stack.point(&model.robot, problem.data, row, &model.x, scratch);
-                    for piece in pieces(problem, model, row, &point, scratch).into_iter().flatten() {
-                        let share = piece.share();
+                    let mut placed = model.place(problem.data, row, scratch);
+                    for kind in KINDS {
+                        let Some((term, _)) = Term::of(*kind, problem.data, row, &placed, problem.excess) else { continue };
+                        let share = term.share();
                         jacobian.fill(Vector3::zeros());
-                        piece.derivatives(model, &point, scratch, |parameter, derivative| {
+                        term.derivatives(&mut placed, |parameter, derivative| {
                             if let Some(sum) = jacobian.get_mut(column[parameter]) {
                                 *sum += derivative;
                             }
                         });
-                        errors.extend((piece.error * share).iter());
+                        errors.extend((term.error * share).iter());
                         visible.extend((0..p).map(|k| {
                             let seen: Vector3<f64> = (0..=k).map(|j| jacobian[j] * inverse.at(j, k)).sum();
                             seen * share
@@ -54,22 +55,6 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
     let priors = free.iter().enumerate().filter_map(|(j, k)| model.known(*k).prior.map(|prior| (j, 1.0 / prior.sigma)));
     let told = priors.map(|(j, weight)| upwards(inverse, |k| if k < j { 0.0 } else { inverse.at(j, k) * weight }));
     triangle(p, lines.into_iter().chain(told))
-}
-
-/// What a row measured, after the stack's `point` of it.
-pub(super) fn pieces(
-    problem: &Problem,
-    model: &Model,
-    row: usize,
-    point: &Vector3<f64>,
-    scratch: &Scratch,
-) -> [Option<Piece>; 3] {
-    let (data, beyond) = (problem.data, problem.unmodelled);
-    let own = piece::point(data, row, &data.residual(row, point), beyond);
-    let turn = piece::turn(model, data, row, scratch).map(|rest| Piece::of_turn(&rest, beyond));
-    let distance = piece::distance(model, data, row, point, scratch);
-    let distance = distance.map(|(rest, along)| Piece::of_distance(&rest, &along, beyond));
-    [own, turn, distance]
 }
 
 /// What one pose does to the parameters: R^-1 G' (1 - G G')^-1/2 e.

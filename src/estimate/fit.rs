@@ -8,12 +8,12 @@ use super::known::PriorCheck;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
-use super::piece::{Rest, Unmodelled, Weight, as_of_three, bound};
 use super::problem::{Evaluation, Problem};
 use super::repeats::{Poses, Repeated};
+use super::term::{as_of_three, bound};
+use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
-use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// What is free. Everything else keeps the value it has in `model.x`.
@@ -47,11 +47,11 @@ pub struct Fitted {
     pub stop: Stop,
     /// Standard deviation per axis that the rows show beyond the instrument's, m.
     pub excess_sigma: f64,
-    /// The same about each axis, rad, where orientations were measured.
-    pub excess_sigma_turn: Option<f64>,
+    /// The same about each axis, rad, where angles were measured.
+    pub excess_sigma_angle: Option<f64>,
     /// Numbers that were measured in the fitted rows.
     pub values: usize,
-    /// Measured points, orientations and distances with Huber weight below one.
+    /// Of what was measured, how much has a Huber weight below one.
     pub downweighted: usize,
     /// Parameters with a prior: what it says against what the data say.
     pub prior_checks: BTreeMap<usize, PriorCheck>,
@@ -71,8 +71,8 @@ pub struct Fitted {
 
 impl Fitted {
     /// What the rows show beyond their own noise.
-    pub(crate) fn excess(&self) -> Unmodelled {
-        Unmodelled { point: self.excess_sigma, turn: self.excess_sigma_turn.unwrap_or_default() }
+    pub(crate) fn excess(&self) -> ExcessSigma {
+        ExcessSigma { length: self.excess_sigma, angle: self.excess_sigma_angle.unwrap_or_default() }
     }
 }
 
@@ -94,13 +94,13 @@ const ROUNDS: usize = 4;
 pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitted {
     let specs = model.stack.specs().to_vec();
     let prior = |set: &[usize]| set.iter().map(|k| specs[*k].prior_sigma).collect::<Vec<_>>();
-    let mut problem = Problem { data, rows: options.rows, unmodelled: Unmodelled::default() };
+    let mut problem = Problem { data, rows: options.rows, excess: ExcessSigma::default() };
     for k in options.candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
     let sight = problem.evaluate(model, options.candidates);
-    problem.unmodelled = unmodelled(&problem, &sight, 0);
+    problem.excess = excess_sigma(&problem, &sight, 0);
     let mut search = Search {
         statuses: vec![ParameterStatus::Kept; specs.len()],
         course: Vec::new(),
@@ -113,7 +113,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         all = problem.observe(model, options.candidates);
     }
     let Search { mut statuses, course, stop, free } = search;
-    let errors = problem.errors(&all.residuals, &all.rests);
+    let errors = problem.errors(&all.residuals);
     let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     let (factor, _) = model.with_priors(&free, data);
@@ -144,6 +144,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
             }
         }
     }
+    let has_angles = all.residuals.iter().any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
     let (everything, _) = model.with_priors(options.candidates, all.factor);
     let singular = factor.singular_values(&prior(&free));
@@ -152,12 +153,12 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         statuses,
         course,
         stop,
-        excess_sigma: problem.unmodelled.point,
-        excess_sigma_turn: all.rests.iter().any(|rest| rest.turn).then_some(problem.unmodelled.turn),
+        excess_sigma: problem.excess.length,
+        excess_sigma_angle: has_angles.then_some(problem.excess.angle),
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
         prior_checks,
-        repeated: poses.against(problem.data, options.rows, &all.residuals, free.len()),
+        repeated: poses.against(problem.data, whole_points(&all.residuals), free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
         indices: indices(&singular, options.rows.len()),
@@ -225,18 +226,18 @@ impl Search {
             for k in candidates.iter().filter(|k| !free.contains(k)) {
                 model.x[*k] = model.rest(*k);
             }
-            let weighted_so = !first || round > 0 || problem.unmodelled == Unmodelled::default();
+            let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
             let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
             let limit = if first && round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
             let (steps, stop, end) = minimise(problem, model, &free, start, limit);
             self.course.extend(steps);
             self.stop = stop;
-            let next = unmodelled(problem, &end, free.len());
+            let next = excess_sigma(problem, &end, free.len());
             let same = |one: f64, other: f64| (one - other).abs() <= 0.02 * one.max(other);
-            let settled = same(next.point, problem.unmodelled.point)
-                && same(next.turn, problem.unmodelled.turn)
+            let settled = same(next.length, problem.excess.length)
+                && same(next.angle, problem.excess.angle)
                 && free.len() == candidates.len();
-            problem.unmodelled = next;
+            problem.excess = next;
             self.free.clone_from(&free);
             candidates = free;
             if settled {
@@ -247,15 +248,19 @@ impl Search {
     }
 }
 
+/// What is left of whole points.
+fn whole_points(residuals: &[Residual]) -> impl Iterator<Item = &Residual> + Clone {
+    residuals.iter().filter(|residual| residual.dimension() == Dimension::Length && residual.axes == 3)
+}
+
 /// How many rows of a moving arm count as one: what is left on the way lasts from row to row.
-fn lasting(problem: &Problem, residuals: &[Vector3<f64>]) -> f64 {
+fn lasting(problem: &Problem, residuals: &[Residual]) -> f64 {
     if !problem.data.in_motion(problem.rows) {
         return 1.0;
     }
-    let whole = problem.rows.iter().zip(residuals).filter(|(row, _)| problem.data.whole(**row));
-    let whitened: Vec<f64> = whole
-        .flat_map(|(row, residual)| {
-            let error = Weight::of(problem.data, *row, problem.unmodelled.point).apply(residual);
+    let whitened: Vec<f64> = whole_points(residuals)
+        .flat_map(|residual| {
+            let error = residual.whitened(problem.data, problem.excess.length);
             // Gross errors last for one row and would hide that others last longer.
             (error * (bound(3) / error.norm().max(bound(3)))).data.0[0]
         })
@@ -286,35 +291,21 @@ fn reduced(errors: &[(f64, usize)], parameters: usize) -> f64 {
     sum / values.saturating_sub(parameters).max(1) as f64
 }
 
-/// The extra standard deviations that bring the median whitened error of points and distances, and of orientations, to what noise
-/// alone would give.
-fn unmodelled(problem: &Problem, at: &Evaluation, parameters: usize) -> Unmodelled {
-    let rows = problem.rows;
-    let all: usize = rows.iter().map(|row| problem.data.values(*row)).sum();
+/// The extra standard deviations that bring the median whitened error of lengths, and of angles, to what noise alone would give.
+fn excess_sigma(problem: &Problem, at: &Evaluation, parameters: usize) -> ExcessSigma {
+    let all: usize = at.residuals.iter().map(|residual| residual.axes).sum();
     let freedom = all.saturating_sub(parameters).max(1) as f64 / all.max(1) as f64;
-    let (turns, distances): (Vec<&Rest>, Vec<&Rest>) = at.rests.iter().partition(|rest| rest.turn);
-    let mut errors = vec![0.0; rows.len() + distances.len()];
-    let point = excess(|extra| {
-        let beyond = Unmodelled { point: extra, turn: 0.0 };
-        errors.clear();
-        for (residual, row) in at.residuals.iter().zip(rows) {
-            let error = Weight::of(problem.data, *row, extra).apply(residual).norm_squared();
-            match problem.data.axes(*row) {
-                0 => (),
-                3 => errors.push(error),
-                axes => errors.push(error * as_of_three(axes)),
-            }
-        }
-        errors.extend(distances.iter().map(|rest| rest.error(beyond).powi(2) * as_of_three(1)));
-        (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
-    });
-    let turn = excess(|extra| {
-        let beyond = Unmodelled { point: 0.0, turn: extra };
-        errors.clear();
-        errors.extend(turns.iter().map(|rest| rest.error(beyond).powi(2)));
-        (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
-    });
-    Unmodelled { point, turn }
+    let mut errors = Vec::with_capacity(at.residuals.len());
+    let mut of = |dimension: Dimension| {
+        excess(|extra| {
+            let own = at.residuals.iter().filter(|residual| residual.dimension() == dimension);
+            let square = |residual: &Residual| residual.whitened(problem.data, extra).norm_squared() * as_of_three(residual.axes);
+            errors.clear();
+            errors.extend(own.map(square));
+            (nearest(&mut errors, 0.5).unwrap_or(0.0) / freedom, errors.len())
+        })
+    };
+    ExcessSigma { length: of(Dimension::Length), angle: of(Dimension::Angle) }
 }
 
 /// The extra standard deviation with which the median squared error (of so many) is that of three unit normals.

@@ -4,13 +4,14 @@
 //! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
 //! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
 
-use super::cluster::pieces;
 use super::factor::Factor;
 use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
 use super::repeats::Poses;
+use super::term::Term;
+use crate::observation::KINDS;
 use crate::robot::Measurements;
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -105,7 +106,7 @@ impl Whole<'_> {
     fn without_each(&self, folds: &[&Vec<usize>]) -> Vec<Vec<f64>> {
         let Self { model, data, rows, fitted } = *self;
         let candidates = self.candidates();
-        let problem = Problem { data, rows, unmodelled: fitted.excess() };
+        let problem = Problem { data, rows, excess: fitted.excess() };
         let near = Near::of(&problem, model, fitted);
         let one = |fold: &&Vec<usize>| {
             let close = near.as_ref().and_then(|near| near.without(&problem, model, fold));
@@ -181,8 +182,9 @@ impl Near {
         }
         let mut scratch = other.stack.scratch(&other.robot);
         let after = part.iter().flat_map(|row| {
-            let point = other.stack.point(&other.robot, problem.data, *row, &other.x, &mut scratch);
-            pieces(problem, &other, *row, &point, &scratch).into_iter().flatten().map(|piece| piece.error).collect::<Vec<_>>()
+            let placed = other.place(problem.data, *row, &mut scratch);
+            let terms = KINDS.iter().filter_map(|kind| Term::of(*kind, problem.data, *row, &placed, problem.excess));
+            terms.map(|(term, _)| term.error).collect::<Vec<_>>()
         });
         let after: Vec<f64> = after.zip(&shares).flat_map(|(error, share)| <[f64; 3]>::from(error * *share)).collect();
         let (mut bend, mut whole) = (0.0, 0.0);
@@ -197,7 +199,7 @@ impl Near {
         Some(part.iter().map(|row| miss(&other, problem.data, *row, &mut scratch).length).collect())
     }
 
-    /// Whitened derivatives and errors of the pieces of some rows, three lines each, and the root of each one's Huber weight.
+    /// Whitened derivatives and errors of the terms of some rows, three lines each, and the root of each one's Huber weight.
     fn linear(&self, problem: &Problem, model: &Model, part: &[usize]) -> (Mat<f64>, Vec<f64>, Vec<f64>) {
         let p = self.free.len();
         let mut column = vec![usize::MAX; model.stack.specs().len()];
@@ -207,17 +209,18 @@ impl Near {
         let mut scratch = model.stack.scratch(&model.robot);
         let (mut lines, mut errors, mut shares) = (Vec::new(), Vec::new(), Vec::new());
         for row in part {
-            let point = model.stack.point(&model.robot, problem.data, *row, &model.x, &mut scratch);
-            for piece in pieces(problem, model, *row, &point, &scratch).into_iter().flatten() {
-                let share = piece.share();
+            let mut placed = model.place(problem.data, *row, &mut scratch);
+            for kind in KINDS {
+                let Some((term, _)) = Term::of(*kind, problem.data, *row, &placed, problem.excess) else { continue };
+                let share = term.share();
                 let mut line = vec![Vector3::zeros(); p];
-                piece.derivatives(model, &point, &mut scratch, |parameter, derivative| {
+                term.derivatives(&mut placed, |parameter, derivative| {
                     if let Some(sum) = line.get_mut(column[parameter]) {
                         *sum += derivative * share;
                     }
                 });
                 lines.push(line);
-                errors.extend(<[f64; 3]>::from(piece.error * share));
+                errors.extend(<[f64; 3]>::from(term.error * share));
                 shares.push(share);
             }
         }

@@ -1,7 +1,7 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
 use super::known::Known;
-use crate::effect::{BaseFrame, BasePlacement, EffectStack};
+use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, Scratch};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -33,6 +33,11 @@ impl Model {
             .effects()
             .find(|(effect, _)| effect.name() == BaseFrame::NAME)
             .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
+    }
+
+    /// Places the arm of a row.
+    pub(crate) fn place<'a>(&'a self, data: &Measurements, row: usize, scratch: &'a mut Scratch) -> PlacedRow<'a> {
+        self.stack.place(&self.robot, data, row, &self.x, scratch)
     }
 
     /// Measured points (m, tracker frame) of every row.

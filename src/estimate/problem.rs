@@ -2,8 +2,9 @@
 
 use super::factor::{Factor, Tall};
 use super::model::Model;
-use super::piece::{self, Piece, Rest, Unmodelled, Weight, huber};
-use crate::effect::Scratch;
+use super::term::{Term, huber};
+use crate::effect::PlacedRow;
+use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, kinds};
 use crate::robot::Measurements;
 use faer::Mat;
 use nalgebra::Vector3;
@@ -20,31 +21,25 @@ pub(crate) struct Problem<'a> {
     /// Rows of the recording to fit.
     pub rows: &'a [usize],
     /// Standard deviations added to the instrument's: what the model does not explain.
-    pub unmodelled: Unmodelled,
+    pub excess: ExcessSigma,
 }
 
 /// The state of a problem at some parameters.
 pub(crate) struct Evaluation {
-    /// Measured - predicted points (m), in the order of the problem's rows; zero along axes that were not measured.
-    pub residuals: Vec<Vector3<f64>>,
-    /// What is left of orientations and distances, in that order.
-    pub rests: Vec<Rest>,
+    /// Measured - predicted, in the order of the problem's rows; of a row in the order of kinds.
+    pub residuals: Vec<Residual>,
     /// Sum of Huber's losses and of the priors', dimensionless.
     pub cost: f64,
-    /// Root mean square of the residual length of points, or of distances where no point was measured, m.
+    /// Root mean square of the residual length of points, or of another length where no point was measured, m.
     pub rms: f64,
     pub factor: Factor,
 }
 
 impl Problem<'_> {
-    /// Length in standard deviations and number of axes of every piece.
-    pub fn errors(&self, residuals: &[Vector3<f64>], rests: &[Rest]) -> Vec<(f64, usize)> {
-        let point = |(residual, row): (&Vector3<f64>, &usize)| {
-            let length = Weight::of(self.data, *row, self.unmodelled.point).apply(residual).norm();
-            Some((length, self.data.axes(*row))).filter(|(_, axes)| *axes > 0)
-        };
-        let others = rests.iter().map(|rest| (rest.error(self.unmodelled), rest.axes()));
-        residuals.iter().zip(self.rows).filter_map(point).chain(others).collect()
+    /// Length in standard deviations and number of axes of every residual.
+    pub fn errors(&self, residuals: &[Residual]) -> Vec<(f64, usize)> {
+        let length = |residual: &Residual| residual.whitened(self.data, self.excess.of(residual.dimension())).norm();
+        residuals.iter().map(|residual| (length(residual), residual.axes)).collect()
     }
 
     /// The problem at the model's parameters, linearised in the `free` ones, with what is known of them beforehand.
@@ -62,73 +57,61 @@ impl Problem<'_> {
         }
         let spans: Vec<Span> = self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
-        let mut rests = Vec::new();
         let mut sum: Option<Factor> = None;
-        for Span { residuals: some, rests: others, factor } in spans {
+        for Span { residuals: some, factor } in spans {
             residuals.extend(some);
-            rests.extend(others);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
-        let cost = self.errors(&residuals, &rests).into_iter().map(|(error, axes)| huber(error, axes)).sum();
-        let rms = self.rms(&residuals, &rests);
+        let cost = self.errors(&residuals).into_iter().map(|(error, axes)| huber(error, axes)).sum();
         let factor = sum.unwrap_or_else(|| Factor::of(&Mat::zeros(1, free.len() + 1)));
-        Evaluation { residuals, rests, cost, rms, factor }
-    }
-
-    fn rms(&self, residuals: &[Vector3<f64>], rests: &[Rest]) -> f64 {
-        let points = self.rows.iter().filter(|row| self.data.axes(**row) > 0).count();
-        let mean = |squares: f64, count: usize| (squares / count.max(1) as f64).sqrt();
-        if points > 0 {
-            return mean(residuals.iter().map(Vector3::norm_squared).sum(), points);
-        }
-        let distances: Vec<f64> = rests.iter().filter(|rest| !rest.turn).map(|rest| rest.residual.norm_squared()).collect();
-        mean(distances.iter().sum(), distances.len())
+        Evaluation { cost, rms: rms(&residuals), residuals, factor }
     }
 
     /// Residuals and factor of some rows, in memory of a chunk.
     fn span(&self, model: &Model, rows: &[usize], column: &[Option<usize>], p: usize) -> Span {
         let mut scratch = model.stack.scratch(&model.robot);
-        let extra = usize::from(self.data.turn.is_some()) + usize::from(self.data.distance.is_some());
-        let mut tall = Tall::new(p + 1, 3 * (1 + extra) * rows.len().min(CHUNK));
+        let kinds = kinds(self.data);
+        // Three lines for each kind, whatever a row has of it.
+        let lines_of_row = 3 * kinds.len();
+        let mut tall = Tall::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
-        let mut rests = Vec::new();
         for chunk in rows.chunks(CHUNK) {
-            let height = 3 * (1 + extra) * chunk.len();
+            let height = lines_of_row * chunk.len();
             let mut lines = tall.chunk(height);
-            let mut write = |first: usize, piece: Piece, point: &Vector3<f64>, scratch: &mut Scratch| {
-                let share = piece.share();
-                piece.derivatives(model, point, scratch, |parameter, derivative| {
+            let mut write = |first: usize, term: Term, placed: &mut PlacedRow| {
+                let share = term.share();
+                term.derivatives(placed, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
                         let derivative = derivative * share;
                         add(&mut lines[j][first..first + 3], &derivative);
                     }
                 });
-                add(&mut lines[p][first..first + 3], &(piece.error * share));
+                add(&mut lines[p][first..first + 3], &(term.error * share));
             };
             for (i, &row) in chunk.iter().enumerate() {
-                let first = 3 * (1 + extra) * i;
-                let point = model.stack.point(&model.robot, self.data, row, &model.x, &mut scratch);
-                let residual = self.data.residual(row, &point);
-                if let Some(piece) = piece::point(self.data, row, &residual, self.unmodelled) {
-                    write(first, piece, &point, &mut scratch);
-                }
-                residuals.push(residual);
-                if extra == 0 {
-                    continue;
-                }
-                if let Some(rest) = piece::turn(model, self.data, row, &scratch) {
-                    write(first + 3, Piece::of_turn(&rest, self.unmodelled), &point, &mut scratch);
-                    rests.push(rest);
-                }
-                if let Some((rest, along)) = piece::distance(model, self.data, row, &point, &scratch) {
-                    write(first + 3 * extra, Piece::of_distance(&rest, &along, self.unmodelled), &point, &mut scratch);
-                    rests.push(rest);
+                let mut placed = model.place(self.data, row, &mut scratch);
+                for (k, kind) in kinds.iter().enumerate() {
+                    if let Some((term, residual)) = Term::of(*kind, self.data, row, &placed, self.excess) {
+                        write(lines_of_row * i + 3 * k, term, &mut placed);
+                        residuals.push(residual);
+                    }
                 }
             }
             tall.absorb(height);
         }
-        Span { residuals, rests, factor: tall.factor() }
+        Span { residuals, factor: tall.factor() }
     }
+}
+
+/// Root mean square of the lengths (m) of the first kind that measured one.
+fn rms(residuals: &[Residual]) -> f64 {
+    let lengths = KINDS.iter().map(|kind| kind.about()).filter(|kind| kind.dimension == Dimension::Length);
+    let squares = |name: &str| -> Vec<f64> {
+        let own = residuals.iter().filter(|residual| residual.kind.about().name == name);
+        own.map(|residual| residual.error.norm_squared()).collect()
+    };
+    let first = lengths.map(|kind| squares(kind.name)).find(|squares| !squares.is_empty()).unwrap_or_default();
+    (first.iter().sum::<f64>() / first.len().max(1) as f64).sqrt()
 }
 
 fn add(to: &mut [f64], value: &Vector3<f64>) {
@@ -139,7 +122,6 @@ fn add(to: &mut [f64], value: &Vector3<f64>) {
 
 /// What a thread makes of its rows.
 struct Span {
-    residuals: Vec<Vector3<f64>>,
-    rests: Vec<Rest>,
+    residuals: Vec<Residual>,
     factor: Factor,
 }

@@ -49,12 +49,12 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     if candidates.len() == known || rows.is_empty() {
         return BTreeMap::new();
     }
-    let unmodelled = fitted.excess();
+    let excess = fitted.excess();
     let at = |model: &Model, data: &Measurements| {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        Problem { data, rows: &rows, unmodelled }.observe(model, &candidates).factor
+        Problem { data, rows: &rows, excess }.observe(model, &candidates).factor
     };
-    let own = Problem { data, rows, unmodelled }.observe(model, &candidates).factor;
+    let own = Problem { data, rows, excess }.observe(model, &candidates).factor;
     let declared = model.robot.description().payload_mass;
     let usual = data.payload[rows[0]];
     let spread = at(model, &poses(model, data, rows, &[usual]));

@@ -5,8 +5,8 @@
 
 use super::fisher::tail;
 use super::model::Model;
-use super::piece::Weight;
 use crate::effect::{EffectStack, Load, Setting, whole};
+use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,12 +55,11 @@ impl Poses {
         self.points.iter().filter(|rows| rows.len() > 1)
     }
 
-    /// What the repeats say against `residuals` (m, of `rows`) that a fit of `parameters` left. `None` without repeats.
-    pub fn against(
+    /// What the repeats say against what a fit of `parameters` left of `whole` points. `None` without repeats.
+    pub(crate) fn against<'a>(
         &self,
         data: &Measurements,
-        rows: &[usize],
-        residuals: &[Vector3<f64>],
+        whole: impl Iterator<Item = &'a Residual> + Clone,
         parameters: usize,
     ) -> Option<Repeated> {
         let (mut squares, mut whitened, mut freedom, mut revisited) = (0.0, 0.0, 0, false);
@@ -77,9 +76,8 @@ impl Poses {
         if freedom == 0 {
             return None;
         }
-        let whole = || rows.iter().zip(residuals).filter(|(row, _)| data.whole(**row));
-        let total: f64 = whole().map(|(row, residual)| Weight::of(data, *row, 0.0).apply(residual).norm_squared()).sum();
-        let between = (3 * whole().count()).checked_sub(parameters + freedom).filter(|between| *between > 0);
+        let total: f64 = whole.clone().map(|residual| residual.whitened(data, 0.0).norm_squared()).sum();
+        let between = (3 * whole.count()).checked_sub(parameters + freedom).filter(|between| *between > 0);
         let lack_of_fit = between.filter(|_| whitened > 0.0).map(|between| {
             let ratio = (total - whitened).max(0.0) / between as f64 / (whitened / freedom as f64);
             (ratio, tail(ratio, between as f64, freedom as f64))

@@ -4,6 +4,7 @@
 
 use super::ledger::RunNote;
 use crate::error::{Error, Fault, Result};
+use crate::shell::quoted;
 use std::path::{Path, PathBuf};
 
 /// Slurm's default `MaxArraySize` is 1001: larger arrays are refused.
@@ -94,7 +95,7 @@ pub fn slurm(note: &RunNote, wishes: &Wishes) -> Result<Vec<Script>> {
 
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
 pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> String {
-    let yaml = |text: &str| serde_json::Value::from(text).to_string();
+    let yaml = crate::yaml::quoted;
     let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
     let limit =
         wishes.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();
@@ -115,9 +116,4 @@ pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> 
         yaml(&wishes.store.to_string_lossy()),
         yaml(claim)
     )
-}
-
-/// A word for a POSIX shell, whatever is in it.
-fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', "'\\''"))
 }

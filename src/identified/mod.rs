@@ -1,7 +1,9 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
+mod robot_file;
 mod standing;
 
+pub use robot_file::robot_file;
 pub use standing::standing_of;
 
 use crate::compensate::{Arm, Coverage, Uncertainty};
@@ -10,9 +12,8 @@ use crate::error::{Error, Result, nearest};
 use crate::estimate::network::Correction;
 use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
-use crate::raw;
+use crate::raw::ending;
 use crate::robot::description::RobotDescription;
-use crate::robot::import::{Text, read_calib, read_case};
 use crate::robot::{Instrument, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
@@ -103,7 +104,7 @@ impl Identified {
             let loose = from_file::<Robot>(&files.robot)?;
             files.vouched(&files.robot, loose, &mut warnings)?.to_description()?
         } else {
-            read_robot(&files.robot)?
+            robot_file(&files.robot, None)?
         };
         let origin = format!("table {}", files.parameters.display());
         Ok(Self { warnings, ..Self::of(robot, parameters, origin)? })
@@ -179,16 +180,4 @@ impl Files {
         }
         Ok(loose.table)
     }
-}
-
-fn ending(path: &Path) -> String {
-    path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase()
-}
-
-/// Reads the practice layout (`.json`), or calib's YAML.
-fn read_robot(path: &Path) -> Result<RobotDescription> {
-    let label = path.display().to_string();
-    let text = raw::text(path).map_err(|error| Error::spec(&label, format!("cannot be read: {error}")))?;
-    let file = Text { label: &label, text: &text };
-    Ok(if ending(path) == "json" { read_case(file)?.robot } else { read_calib(file, None)?.robot })
 }

@@ -4,12 +4,14 @@
 //! once, one number each. What cannot be told to be a target or not refuses the program; nothing is guessed. A program is parsed
 //! whole before anything is solved, so that all its faults come at once.
 
+mod correct;
 mod krl;
 mod literal;
 mod pose;
 mod rapid;
 mod token;
 
+pub use correct::{ProgramFile, corrected};
 pub use literal::{Kind, Literal};
 pub use pose::solve;
 

@@ -1,6 +1,7 @@
 //! The progress of a fleet: a bar for every worker and one for all on a terminal, a line now and then elsewhere.
 
 use super::{PAUSE, Verbosity};
+use crate::error::{counted, visible};
 use crate::fleet::Watcher;
 use crate::fleet::{Ending, Record};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -45,7 +46,11 @@ impl FleetProgress {
                 bar
             });
             let workers = workers.collect();
-            let style = ProgressStyle::with_template("{wide_bar} {human_pos}/{human_len} robots, {msg}");
+            let style = ProgressStyle::with_template(if total == 1 {
+                "{wide_bar} {human_pos}/{human_len} robot, {msg}"
+            } else {
+                "{wide_bar} {human_pos}/{human_len} robots, {msg}"
+            });
             let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
             let total = all.add(ProgressBar::new(total as u64).with_style(style));
             Bars { all, workers, total }
@@ -106,7 +111,7 @@ impl FleetProgress {
             bars.total.set_message(format!("{pace}{bad}"));
         } else if state.said.elapsed() >= PAUSE || state.over == self.total {
             state.said = Instant::now();
-            let line = format!("{}/{} robots, {pace}{bad}", state.over, self.total);
+            let line = format!("{}/{}, {pace}{bad}", state.over, counted(self.total, "robot"));
             drop(state);
             self.say(&line);
         }
@@ -122,14 +127,9 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// A name from outside, on one line and without a terminal's commands.
-pub fn shown(name: &str) -> String {
-    name.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
-}
-
 impl Watcher for FleetProgress {
     fn begins(&self, worker: usize, robot: &str) {
-        let robot = shown(robot);
+        let robot = visible(robot);
         if let Some(bar) = self.bars.as_ref().and_then(|bars| bars.workers.get(worker)) {
             bar.reset_elapsed();
             bar.set_message(robot.clone());
@@ -154,7 +154,7 @@ impl Watcher for FleetProgress {
         self.show(state);
         if record.ending != Ending::Done && fresh {
             let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
-            self.say(&format!("{}: {}: {}", shown(&record.robot), record.ending.name(), shown(reason)));
+            self.say(&format!("{}: {}: {}", visible(&record.robot), record.ending.name(), visible(reason)));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::page::render;
 use super::svg::Svg;
-use crate::error::Result;
+use crate::error::{Result, visible};
 use crate::table::{FleetChanges, FleetRow, FleetTable};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -119,13 +119,6 @@ fn change(row: &crate::table::FleetChangeRow) -> Change<'_> {
         limit: show(row.limit),
         unit,
     }
-}
-
-/// A name with what cannot be seen made visible.
-fn visible(name: &str) -> String {
-    let hidden =
-        |c: char| c.is_control() || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    name.chars().map(|c| if hidden(c) { c.escape_default().to_string() } else { c.to_string() }).collect()
 }
 
 /// Width and height of a sparkline.

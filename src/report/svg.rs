@@ -70,20 +70,12 @@ fn tenth(value: f64) -> String {
     }
 }
 
-/// Text as XML: markup is quoted, and control characters, which XML cannot hold at all, are replaced.
+/// Text as XML; control characters, which XML cannot hold at all, are replaced.
 fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            '\t' | '\n' => out.push(' '),
-            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
+    let held = text.chars().map(|c| match c {
+        '\t' | '\n' => ' ',
+        c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => '\u{fffd}',
+        c => c,
+    });
+    quick_xml::escape::escape(held.collect::<String>()).into_owned()
 }

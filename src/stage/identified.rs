@@ -1,7 +1,9 @@
 //! What identifications share: the choice of load, and what they hand back (model, course, visibility, residuals).
 
 use crate::effect::Load;
+use crate::error::counted;
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
+use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
@@ -199,10 +201,11 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     let free = fitted.singular.len();
     let asked = fitted.singular_all.len();
     services.note(format!(
-        "{} points, {free} of {asked} parameters estimated, {} after {} iterations",
-        fitting.rows.len(),
+        "{}, {free} of {} estimated, {} after {}",
+        counted(fitting.rows.len(), "point"),
+        counted(asked, "parameter"),
         fitted.stop.name(),
-        fitted.course.len().saturating_sub(1),
+        counted(fitted.course.len().saturating_sub(1), "iteration"),
     ));
     if let Some((rank, expected)) = fitting.geometry
         && rank < expected
@@ -211,9 +214,10 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             .note(format!("the data see {rank} of the {expected} geometric parameters of this arm: {}", why_not(&model.robot)));
     }
     if fitted.values < 2 * free {
-        services.warn(format!("{} points are few for {free} parameters: take at least {free}", fitting.rows.len()));
+        let (points, parameters) = (counted(fitting.rows.len(), "point"), counted(free, "parameter"));
+        services.warn(format!("only {points} for {parameters}: take at least {free}"));
     }
-    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row)).sum::<f64>() / fitting.rows.len() as f64;
+    let noise: f64 = fitting.rows.iter().map(|row| noise(fitting.data, *row)).sum::<f64>() / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
         services.note(format!(
@@ -222,7 +226,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
             noise_axis * 1e3
         ));
     }
-    if let Some(turn) = fitted.excess_sigma_turn.filter(|turn| *turn > ASKEW) {
+    if let Some(turn) = fitted.excess_sigma_angle.filter(|turn| *turn > ASKEW) {
         services.warn(format!(
             "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
             turn.to_degrees()
@@ -252,7 +256,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
     if fitted.downweighted > 0 {
-        services.note(format!("{} rows stand far off and count less", fitted.downweighted));
+        services.note(format!("far off and of less weight: {}", counted(fitted.downweighted, "row")));
     }
 }
 

@@ -5,6 +5,7 @@
 use crate::effect::{Anchor, Effect, EffectStack, Setting, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
+use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::stage::identified::{Fitting, Identified};
@@ -141,14 +142,11 @@ impl Identify {
 /// Effects that together are the rigid geometry of the arm and of what measures it.
 const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
 
-/// (found, expected) rank of the geometry, when all of it was asked for.
-///
-/// 4R + 2P for the axes, 3 for each target and as many for its orientation, 3 for each anchor; 6 less where distances alone were
-/// measured: nothing says where all of it stands. Theory has no word on rows of one or two axes.
+/// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
-    let gauging = model.robot.gauging();
-    let needed = GEOMETRY.iter().filter(|name| **name != Anchor::NAME || !gauging.anchors.is_empty());
-    let asked = needed.clone().all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
+    let anchored = !model.robot.gauging().anchors.is_empty();
+    let mut needed = GEOMETRY.iter().filter(|name| **name != Anchor::NAME || anchored);
+    let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model
         .stack
         .effects()
@@ -156,16 +154,11 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
         .flat_map(|(_, range)| range)
         .filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_)))
         .count();
-    let expected = (0..model.robot.joints()).map(|j| if model.robot.is_revolute(j) { 4 } else { 2 }).sum::<usize>()
-        + gauging.targets.iter().map(|target| if target.oriented { 6 } else { 3 }).sum::<usize>().max(3)
-        + 3 * gauging.anchors.len();
-    let framed = rows.iter().any(|row| data.whole(*row));
-    let partial = rows.iter().any(|row| !data.whole(*row) && (data.axes(*row) > 0 || data.turn(*row).is_some()));
-    let expected = if framed { expected } else { expected - 6 };
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    (asked && !held && !told && (framed || !partial)).then_some((found, expected))
+    let expected = observation::rank(&model.robot, data, rows)?;
+    (asked && !held && !told).then_some((found, expected))
 }
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
@@ -225,7 +218,7 @@ const DECISIVE: f64 = 10.0;
 /// BIC of a fit from its robust residual scale.
 fn evidence(fitted: &Fitted, fitting: &Fitting) -> f64 {
     let rows = fitting.rows.len() as f64;
-    let noise: f64 = fitting.rows.iter().map(|row| fitting.data.noise(*row).powi(2) / 3.0).sum::<f64>() / rows;
+    let noise: f64 = fitting.rows.iter().map(|row| observation::noise(fitting.data, *row).powi(2) / 3.0).sum::<f64>() / rows;
     let values = 3.0 * rows;
     values * (noise + fitted.excess_sigma * fitted.excess_sigma).ln() + fitted.singular.len() as f64 * values.ln()
 }

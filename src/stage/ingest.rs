@@ -6,28 +6,28 @@
 mod arm;
 mod bind;
 mod check;
+mod columns;
 pub mod encoding;
 mod layout;
 mod lines;
+mod mapped;
 mod motion;
 mod number;
-mod orientation;
 mod pair;
 mod parquet;
 mod reading;
 mod row;
 mod scan;
-mod slot;
+mod slots;
 mod verdict;
 mod write;
 
-pub use layout::{
-    Axis, ColumnRef, Columns, CountColumn, Decimal, Duplicates, FileLayout, Join, JointColumns, Limits, ScalarColumn, TextColumn,
-};
+pub use columns::Columns;
+pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, Limits};
+pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
 pub use motion::Motion;
-pub use orientation::OrientationColumns;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
 use crate::table::{Intake, IntakeRow, Recording, Rejected, Robot};
 use schemars::JsonSchema;
@@ -140,7 +140,7 @@ fn intake(decided: &write::Decided, context: &Context) -> Intake {
     for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
         let accepted = verdict::accepted(scan, fate);
         let rejected = scan.read - accepted;
-        context.services.note(format!("{name}: {} rows read, {accepted} used, {rejected} rejected", scan.read));
+        context.services.note(format!("{name}: {} read, {accepted} used, {rejected} rejected", counted(scan.read, "row")));
         rows.push(IntakeRow {
             file: name.clone(),
             lines: scan.lines as i64,

@@ -6,7 +6,7 @@
 
 mod told;
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::network::correction::features;
 use crate::estimate::network::rivals::{Contest, fits, learn};
 use crate::estimate::network::{Activation, Arm, OUTPUTS, Recipe, Rival, Samples, Start, compare};
@@ -293,7 +293,7 @@ impl Learn {
         let services = context.services;
         let rows = samples.rows();
         if rows < FEWEST {
-            services.warn(format!("{rows} rows are too few to learn from, at least {FEWEST} are needed: no correction"));
+            services.warn(format!("only {} to learn from, at least {FEWEST} are needed: no correction", counted(rows, "row")));
             return (Network::default(), Corrections::default(), Training::default());
         }
         let contest = self.contest(rows, arm, prismatic, context);

@@ -1,6 +1,6 @@
 //! What identifications make of poses measured more than once: weights by the joints' repeatability, and words for the person.
 
-use crate::error::Fault;
+use crate::error::{Fault, counted};
 use crate::estimate::{Model, Poses, Repeated, spread};
 use crate::robot::Measurements;
 use crate::stage::Context;
@@ -55,8 +55,11 @@ pub fn note(context: &Context, repeated: &Repeated) {
     let Repeated { poses, noise, freedom, revisited, lack_of_fit } = repeated;
     let what = if *revisited { "noise and repeatability" } else { "noise (the arm stood still: no word on repeatability)" };
     let floor = noise * 1e3;
-    let mut line =
-        format!("{poses} poses were measured more than once: {floor:.3} mm per axis of {what}, {freedom} degrees of freedom");
+    let mut line = format!(
+        "measured more than once: {}, {floor:.3} mm per axis of {what}, {} of freedom",
+        counted(poses, "pose"),
+        counted(freedom, "degree")
+    );
     if let Some((ratio, chance)) = lack_of_fit {
         line += &if *chance < UNLIKELY {
             format!("; what is left between poses is {ratio:.1} times that in squares: this model lacks something")

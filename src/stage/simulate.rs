@@ -1,6 +1,6 @@
 //! `simulate`: a recording from a twin of the robot whose truth is known.
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Robot, Truth, TruthRow};
@@ -150,7 +150,11 @@ impl Stage for Simulate {
             None => experiment.record(|| tick(&mut done)),
         };
         let shots = shots.map_err(|message| Error::spec(place, message))?;
-        context.services.note(format!("{points} points measured on a twin with {} effects besides its truth", effects.len()));
+        context.services.note(format!(
+            "{} measured on a twin with {} besides its truth",
+            counted(points, "point"),
+            counted(effects.len(), "effect")
+        ));
         Ok(SimulateWrites {
             recording: self.recording(&robot, &shots),
             truth: truth(&robot, &self.truth, &self.tracker, effects),
@@ -181,7 +185,10 @@ impl Simulate {
         }
         for (name, list) in [("motors.sign", &self.motors.sign), ("repeatability_arcsec", &self.repeatability_arcsec)] {
             if !list.is_empty() && list.len() != joints {
-                faults.push(Fault::new(name, format!("has {} numbers, the robot {joints} joints", list.len())));
+                faults.push(Fault::new(
+                    name,
+                    format!("has {}, the robot {}", counted(list.len(), "number"), counted(joints, "joint")),
+                ));
             }
         }
         for (joint, factor) in self.truth.compliance_rad_a.iter().enumerate().filter(|(_, factor)| **factor != 0.0) {

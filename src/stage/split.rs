@@ -3,7 +3,7 @@
 //! Neighbouring rows with the same joints are repeats of one pose: blocks and random choice keep them together, since a pose
 //! that was seen in training is no test.
 
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
@@ -178,7 +178,7 @@ impl Stage for SplitBy {
         }
         for name in self.names() {
             if !counts.contains_key(name) {
-                return Err(Error::data("split", format!("set `{name}` gets none of the {} rows", recording.rows())));
+                return Err(Error::data("split", format!("set `{name}` gets none of the {}", counted(recording.rows(), "row"))));
             }
         }
         let listed: Vec<String> = counts.iter().map(|(set, rows)| format!("{set} {rows}")).collect();
@@ -296,13 +296,19 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         let left = rows - dealt.len();
         let wanted = stretch.rows.map_or(left as u64, |rows| rows);
         if wanted > left as u64 {
-            return Err(Error::data("split", format!("set `{}` wants {wanted} rows, {left} of {rows} are left", stretch.set)));
+            return Err(Error::data(
+                "split",
+                format!("set `{}` wants {}, {left} of {rows} are left", stretch.set, counted(wanted, "row")),
+            ));
         }
         dealt.resize(dealt.len() + wanted as usize, stretch.set.clone());
     }
     if dealt.len() < rows {
-        let message =
-            format!("the sets take {} of {rows} rows; let the last one leave `rows` out, or name one more", dealt.len());
+        let message = format!(
+            "the sets take {} of {}; let the last one leave `rows` out, or name one more",
+            dealt.len(),
+            counted(rows, "row")
+        );
         return Err(Error::data("split", message));
     }
     Ok(dealt)

@@ -1,7 +1,7 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
 
 use crate::effect::{BaseFrame, LONG_AFTER};
-use crate::error::{Fault, Result};
+use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, align_points};
 use crate::robot::RobotModel;
 use crate::stage::identified::{Fitting, Identified};
@@ -50,7 +50,7 @@ impl Stage for Transfer {
         let earlier = reads.parameters.of_the_arm()?;
         let left = reads.parameters.0.len() - earlier.0.len();
         if left > 0 {
-            context.services.note(format!("{left} parameters belong to the first measurement alone and are left behind"));
+            context.services.note(format!("left behind, being of the first measurement alone: {}", counted(left, "parameter")));
         }
         // Another recording has another clock: steps have happened, and the arm is warm.
         data.time = Some(vec![LONG_AFTER; data.rows()]);

@@ -60,7 +60,7 @@ impl Observability {
             fitted.excess_sigma * 1e3,
             "standard deviation per axis of the fitted rows beyond the instrument's noise",
         );
-        if let Some(sigma) = fitted.excess_sigma_turn {
+        if let Some(sigma) = fitted.excess_sigma_angle {
             push(
                 "unmodelled_turn_rad",
                 0,

@@ -298,3 +298,36 @@ fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_corrected_is_the_first_sentence_of_a_remark_and_no_other() {
+        let row = |remark: Option<&str>| ParameterRow {
+            name: "joint_offset.j2".into(),
+            effect: "joint_offset".into(),
+            place: "joint 2".into(),
+            unit: "rad".into(),
+            nominal: 0.0,
+            value: 1e-3,
+            change: 1e-3,
+            sigma: Some(1e-5),
+            status: "free".into(),
+            step: "diagnose".into(),
+            remark: remark.map(String::from),
+            form: None,
+        };
+        let advice = BTreeMap::from([("joint_offset.j2".to_string(), "measure more".to_string())]);
+        for remark in [None, Some("moves with another")] {
+            let bare = Parameters(vec![row(remark)]);
+            assert_eq!(bare.corrected(), Corrected::RobotFile);
+            assert_eq!(bare.clone().correcting(Corrected::RobotFile), bare);
+            let outside = bare.correcting(Corrected::OutsideSimulation);
+            assert_eq!(outside.with_advice(&advice).corrected(), Corrected::OutsideSimulation);
+        }
+        let mentioned = format!("not so: {}", Corrected::OUTSIDE);
+        assert_eq!(Parameters(vec![row(Some(&mentioned))]).corrected(), Corrected::RobotFile);
+    }
+}

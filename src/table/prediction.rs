@@ -32,12 +32,13 @@ crate::table::rows! { "prediction",
         /// What was measured, where it was not a whole point: its axes, e.g. `z`, `rotation`, `distance`. Residual and error then are
         /// those of the axes, or else of the distance.
         measured: Option<String>,
-        /// Angle between the measured and the predicted orientation; null where it was not measured.
+        /// Angle between what was measured and predicted of the orientation; null where nothing was.
         turn_rad: Option<f64>,
     }
 }
 
 use crate::estimate::{Covariance, Model};
+use crate::observation::{KINDS, noise};
 use crate::robot::Measurements;
 use crate::table::{Recording, Split};
 use nalgebra::Vector3;
@@ -83,12 +84,12 @@ impl Prediction {
                     Some(miss) if !whole => miss.length * 1e3,
                     _ => residual.norm(),
                 },
-                noise_mm: data.noise(row) * 1e3,
+                noise_mm: noise(data, row) * 1e3,
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
                 fold_error_mm: None,
                 block_error_mm: None,
                 measured: (!whole).then(|| measured(data, row)),
-                turn_rad: miss.and_then(|miss| miss.turn),
+                turn_rad: miss.and_then(|miss| miss.angle),
             }
         });
         Self(rows.collect())
@@ -114,9 +115,5 @@ impl Prediction {
 
 /// What a row measured, in words.
 fn measured(data: &Measurements, row: usize) -> String {
-    let axes = ["x", "y", "z"].into_iter().enumerate().filter(|(axis, _)| data.sigma[row][*axis].is_finite());
-    let mut parts: Vec<&str> = axes.map(|(_, name)| name).collect();
-    parts.extend(data.turn(row).map(|_| "rotation"));
-    parts.extend(data.distance(row).map(|_| "distance"));
-    parts.join(" ")
+    KINDS.iter().flat_map(|kind| kind.words(data, row)).collect::<Vec<_>>().join(" ")
 }

@@ -1,12 +1,17 @@
 //! The recording: joints as commanded or logged, and what was measured of the tool. SI in Rust, mm and rad in the table.
 
+mod columns;
+
+pub use columns::columns;
+
 use crate::error::Result;
-use crate::robot::{Distances, Instrument, Measurements, Named, Turns};
-use crate::spatial::Pose;
+use crate::observation::{Column, KINDS};
+use crate::robot::{Instrument, Measurements, Named};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// Measured points in the order of recording; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
 ///
@@ -43,16 +48,10 @@ pub struct Recording {
     pub velocity: Option<Vec<f64>>,
     /// The target that was measured; the tool point where a row names none.
     pub target: Option<Vec<Option<String>>>,
-    /// Orientation of the target in the tracker's frame, as a rotation vector, rad; NaN where it was not measured.
-    pub rotation: Option<Vec<[f64; 3]>>,
-    /// Its standard deviation about each axis, rad; there wherever the orientation is.
-    pub rotation_sigma: Option<Vec<f64>>,
-    /// Distance of the target from an anchor, m; NaN where it was not measured.
-    pub distance: Option<Vec<f64>>,
-    /// Its standard deviation, m; there wherever the distance is.
-    pub distance_sigma: Option<Vec<f64>>,
-    /// The anchor, where there are several.
-    pub anchor: Option<Vec<Option<String>>>,
+    /// What was measured beside points: numbers of a setting, SI, row-major; NaN where a row measured none.
+    pub readings: BTreeMap<&'static str, Vec<f64>>,
+    /// Names that go with them, e.g. of anchors.
+    pub names: BTreeMap<&'static str, Vec<Option<String>>>,
 }
 
 impl Recording {
@@ -101,16 +100,13 @@ impl Recording {
             velocity: self.velocity.clone(),
             spread: None,
             target: self.target.as_ref().map(|names| named(names)),
-            turn: self
-                .rotation
-                .as_ref()
-                .zip(self.rotation_sigma.as_ref())
-                .map(|(all, sigma)| Turns { rotation: all.iter().map(rotation).collect(), sigma: sigma.clone() }),
-            distance: self.distance.as_ref().zip(self.distance_sigma.as_ref()).map(|(length, sigma)| Distances {
-                anchor: self.anchor.as_ref().map(|names| named(names)).unwrap_or_default(),
-                length: length.clone(),
-                sigma: sigma.clone(),
-            }),
+            readings: KINDS
+                .iter()
+                .filter_map(|kind| {
+                    let names = |setting: &str| self.names.get(setting).map(|names| named(names));
+                    kind.readings(|setting| self.readings.get(setting).map(Vec::as_slice), names)
+                })
+                .collect(),
         }
     }
 
@@ -124,76 +120,19 @@ fn named(names: &[Option<String>]) -> Named {
     Named::of(names.iter().map(|name| name.as_deref().unwrap_or_default()))
 }
 
-fn rotation(vector: &[f64; 3]) -> Option<Matrix3<f64>> {
-    let there = vector.iter().all(|value| value.is_finite());
-    there.then(|| Pose::from_rotation_vector(Vector3::from(*vector), Vector3::zeros()).rotation)
-}
-
 impl Table for Recording {
     const KIND: &'static str = "recording";
 
     fn to_frame(&self) -> Result<Frame> {
-        let mut frame = FrameBuilder::new(Self::KIND);
-        let per_joint = |values: &[f64], joint: usize, unit: Unit| -> Vec<f64> {
-            values.iter().skip(joint).step_by(self.joints.max(1)).map(|&value| unit.from_si(value)).collect()
-        };
-        frame.push("sequence", Cell::to_array(self.sequence.clone()));
-        frame.push("point_id", Cell::to_array(self.point_id.clone()));
-        frame.push("usage", Cell::to_array(self.usage.clone()));
-        for joint in 0..self.joints {
-            let (ending, unit) = joint_unit(self.prismatic.get(joint).copied().unwrap_or(false));
-            frame.push(format!("q{}_{ending}", joint + 1), Cell::to_array(per_joint(&self.q, joint, unit)));
-        }
-        for (axis, name) in AXES.iter().enumerate() {
-            let of = |points: &[[f64; 3]]| points.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect::<Vec<f64>>();
-            frame.push(format!("{name}_mm"), Cell::to_array(present(of(&self.position))));
-            if let Some(sigma) = &self.position_sigma {
-                frame.push(format!("sigma_{name}_mm"), Cell::to_array(present(of(sigma))));
-            }
-        }
-        if let Some(all) = &self.simulated {
-            for (axis, name) in AXES.iter().enumerate() {
-                let column = all.iter().map(|point| Unit::Millimetre.from_si(point[axis])).collect();
-                frame.push(format!("sim_{name}_mm"), Cell::to_array(present(column)));
-            }
-        }
-        for (name, values) in [("time_s", &self.time), ("payload_kg", &self.payload), ("temp_c", &self.temperature)] {
-            if let Some(values) = values {
-                frame.push(name, Cell::to_array(present(values.clone())));
-            }
-        }
-        for (name, names) in [("target", &self.target), ("anchor", &self.anchor)] {
-            if let Some(names) = names {
-                frame.push(name, Cell::to_array(names.clone()));
-            }
-        }
-        if let Some(all) = &self.rotation {
-            for (axis, name) in AXES.iter().enumerate() {
-                frame.push(format!("r{name}_rad"), Cell::to_array(present(all.iter().map(|vector| vector[axis]).collect())));
-            }
-        }
-        for (name, values, unit) in [
-            ("sigma_r_rad", &self.rotation_sigma, Unit::Radian),
-            ("distance_mm", &self.distance, Unit::Millimetre),
-            ("sigma_distance_mm", &self.distance_sigma, Unit::Millimetre),
-        ] {
-            if let Some(values) = values {
-                frame.push(name, Cell::to_array(present(values.iter().map(|value| unit.from_si(*value)).collect())));
-            }
-        }
-        for joint in 0..self.joints {
-            for (prefix, ending, values) in [("i", "_a", &self.current), ("dir", "", &self.direction)] {
-                if let Some(values) = values {
-                    let column = present(per_joint(values, joint, Unit::One));
-                    frame.push(format!("{prefix}{}{ending}", joint + 1), Cell::to_array(column));
-                }
-            }
-            if let Some(velocity) = &self.velocity {
-                let (ending, unit) = rate_unit(self.prismatic.get(joint).copied().unwrap_or(false));
-                frame.push(format!("dq{}_{ending}", joint + 1), Cell::to_array(present(per_joint(velocity, joint, unit))));
-            }
-        }
-        frame.finish()
+        let texts = [("usage", Some(&self.usage)), ("target", self.target.as_ref())];
+        let texts = texts.into_iter().filter_map(|(name, texts)| Some((name, texts?)));
+        let texts = texts.chain(self.names.iter().map(|(name, names)| (*name, names)));
+        let numbers = columns().filter_map(|column| Some((column, self.numbers(column)?)));
+        let numbers = numbers.flat_map(|(column, (values, first, step))| {
+            let stored = column.columns(&self.prismatic).into_iter().enumerate();
+            stored.map(move |(k, (name, unit))| (name, unit, values.iter().skip(first + k).step_by(step)))
+        });
+        frame(self.sequence.clone(), self.point_id.clone(), texts.map(|(name, texts)| (name, texts.clone())), numbers)
     }
 
     fn from_frame(frame: &Frame) -> Result<Self> {
@@ -203,84 +142,95 @@ impl Table for Recording {
             .take_while(|(turns, slides)| *turns || *slides)
             .map(|(_, slides)| slides)
             .collect();
-        let joints = prismatic.len();
-        let optional = |name: &str| has(name).then(|| absent(frame, name)).transpose();
-        let optional_joints = |prefix: &str, ending: &str| {
-            let columns = (1..=joints).map(|joint| absent(frame, &format!("{prefix}{joint}{ending}")));
-            has(&format!("{prefix}1{ending}"))
-                .then(|| columns.collect::<Result<Vec<_>>>().map(|columns| interleave(&columns)))
-                .transpose()
+        let mut numbers: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+        for column in columns() {
+            let stored = column.columns(&prismatic);
+            if stored.first().is_some_and(|(name, _)| has(name)) {
+                let read = |(name, unit): &(String, Unit)| -> Result<Vec<f64>> {
+                    // Null -> NaN.
+                    let values = frame.read::<Option<f64>>(name)?;
+                    Ok(values.into_iter().map(|value| value.map_or(f64::NAN, |value| unit.to_si(value))).collect())
+                };
+                numbers.insert(column.setting, interleave(&stored.iter().map(read).collect::<Result<Vec<_>>>()?));
+            }
+        }
+        let mut texts: BTreeMap<&'static str, Vec<Option<String>>> = BTreeMap::new();
+        for column in columns().filter(|column| column.is_text() && has(column.setting)) {
+            if column.setting != "point_id" {
+                texts.insert(column.setting, frame.read(column.setting)?);
+            }
+        }
+        let mut take = |setting: &str| numbers.remove(setting);
+        let mut points = |[x, y, z]: [&str; 3]| -> Option<Vec<[f64; 3]>> {
+            let axes = [take(x)?, take(y)?, take(z)?];
+            Some((0..frame.rows()).map(|row| [axes[0][row], axes[1][row], axes[2][row]]).collect())
         };
-        let points = |prefix: &str| -> Result<Vec<[f64; 3]>> {
-            let columns = AXES.iter().map(|axis| absent(frame, &format!("{prefix}{axis}_mm"))).collect::<Result<Vec<_>>>()?;
-            let si = |row: usize, axis: usize| Unit::Millimetre.to_si(columns[axis][row]);
-            Ok((0..frame.rows()).map(|row| [si(row, 0), si(row, 1), si(row, 2)]).collect())
-        };
-        let names = |name: &str| has(name).then(|| frame.read::<Option<String>>(name)).transpose();
-        let lengths = |name: &str| -> Result<Option<Vec<f64>>> {
-            let metres = |column: Vec<f64>| column.into_iter().map(|value| Unit::Millimetre.to_si(value)).collect();
-            Ok(optional(name)?.map(metres))
-        };
-        let rotations = || -> Result<Vec<[f64; 3]>> {
-            let columns = AXES.iter().map(|axis| absent(frame, &format!("r{axis}_rad"))).collect::<Result<Vec<_>>>()?;
-            Ok((0..frame.rows()).map(|row| [columns[0][row], columns[1][row], columns[2][row]]).collect())
-        };
-        let rates = prismatic.iter().enumerate().map(|(joint, &slides)| {
-            let (ending, unit) = rate_unit(slides);
-            let column = absent(frame, &format!("dq{}_{ending}", joint + 1))?;
-            Ok(column.into_iter().map(|value| unit.to_si(value)).collect())
-        });
-        let moving = has("dq1_rad_s") || has("dq1_mm_s");
-        let velocity = moving.then(|| rates.collect::<Result<Vec<_>>>().map(|columns| interleave(&columns))).transpose()?;
-        let q = prismatic.iter().enumerate().map(|(joint, &slides)| {
-            let (ending, unit) = joint_unit(slides);
-            let column = frame.read::<f64>(&format!("q{}_{ending}", joint + 1))?;
-            Ok(column.into_iter().map(|value| unit.to_si(value)).collect())
-        });
         Ok(Self {
-            joints,
-            q: interleave(&q.collect::<Result<Vec<_>>>()?),
+            joints: prismatic.len(),
             prismatic,
             sequence: frame.read("sequence")?,
             point_id: frame.read("point_id")?,
-            usage: frame.read("usage")?,
-            position: points("")?,
-            position_sigma: has("sigma_x_mm").then(|| points("sigma_")).transpose()?,
-            simulated: has("sim_x_mm").then(|| points("sim_")).transpose()?,
-            time: optional("time_s")?,
-            payload: optional("payload_kg")?,
-            temperature: optional("temp_c")?,
-            current: optional_joints("i", "_a")?,
-            direction: optional_joints("dir", "")?,
-            velocity,
-            target: names("target")?,
-            rotation: has("rx_rad").then(rotations).transpose()?,
-            rotation_sigma: optional("sigma_r_rad")?,
-            distance: lengths("distance_mm")?,
-            distance_sigma: lengths("sigma_distance_mm")?,
-            anchor: names("anchor")?,
+            usage: texts.remove("usage").unwrap_or_default(),
+            position: points(POINT).unwrap_or_default(),
+            position_sigma: points(SIGMA),
+            simulated: points(SIMULATED),
+            q: take("q").unwrap_or_default(),
+            time: take("time"),
+            payload: take("payload"),
+            temperature: take("temperature"),
+            current: take("current"),
+            direction: take("direction"),
+            velocity: take("velocity"),
+            target: texts.remove("target"),
+            readings: numbers,
+            names: texts,
         })
     }
 }
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+const POINT: [&str; 3] = ["x", "y", "z"];
+const SIGMA: [&str; 3] = ["sigma_x", "sigma_y", "sigma_z"];
+const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 
-fn joint_unit(prismatic: bool) -> (&'static str, Unit) {
-    if prismatic { ("mm", Unit::Millimetre) } else { ("rad", Unit::Radian) }
+impl Recording {
+    /// The numbers of a column, SI: where they are, the first of them, and how far the next row's is.
+    fn numbers(&self, column: &Column) -> Option<(&[f64], usize, usize)> {
+        let points = [(POINT, Some(&self.position)), (SIGMA, self.position_sigma.as_ref()), (SIMULATED, self.simulated.as_ref())];
+        for (settings, points) in points {
+            if let Some(axis) = settings.iter().position(|setting| *setting == column.setting) {
+                return Some((points?.as_flattened(), axis, 3));
+            }
+        }
+        let values = match column.setting {
+            "q" => Some(&self.q),
+            "time" => self.time.as_ref(),
+            "payload" => self.payload.as_ref(),
+            "temperature" => self.temperature.as_ref(),
+            "current" => self.current.as_ref(),
+            "direction" => self.direction.as_ref(),
+            "velocity" => self.velocity.as_ref(),
+            other => self.readings.get(other),
+        };
+        Some((values?, 0, column.columns(&self.prismatic).len().max(1)))
+    }
 }
 
-fn rate_unit(prismatic: bool) -> (&'static str, Unit) {
-    if prismatic { ("mm_s", Unit::MillimetrePerSecond) } else { ("rad_s", Unit::RadianPerSecond) }
-}
-
-/// NaN -> null.
-fn present(values: Vec<f64>) -> Vec<Option<f64>> {
-    values.into_iter().map(|value| (!value.is_nan()).then_some(value)).collect()
-}
-
-/// Null -> NaN.
-fn absent(frame: &Frame, name: &str) -> Result<Vec<f64>> {
-    Ok(frame.read::<Option<f64>>(name)?.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+/// The table of rows with their texts by setting and their numbers (SI; NaN where a row has none) by stored name and unit.
+pub fn frame<'a, N: Iterator<Item = &'a f64>>(
+    sequence: Vec<i64>,
+    point_id: Vec<String>,
+    texts: impl Iterator<Item = (&'static str, Vec<Option<String>>)>,
+    numbers: impl Iterator<Item = (String, Unit, N)>,
+) -> Result<Frame> {
+    let mut frame = FrameBuilder::new(Recording::KIND);
+    frame.push("sequence", Cell::to_array(sequence));
+    frame.push("point_id", Cell::to_array(point_id));
+    texts.for_each(|(name, texts)| frame.push(name, Cell::to_array(texts)));
+    for (name, unit, values) in numbers {
+        let stored: Vec<Option<f64>> = values.map(|value| (!value.is_nan()).then(|| unit.from_si(*value))).collect();
+        frame.push(name, Cell::to_array(stored));
+    }
+    frame.finish()
 }
 
 /// Columns of equal length -> row-major.

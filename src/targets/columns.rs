@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Fault, Result};
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::units::{Quantity, Unit};
+use crate::units::{Header, Quantity, Unit};
 
 /// What a column holds; joints and axes from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,13 +101,15 @@ fn same(a: &Role, b: &Role) -> bool {
 }
 
 fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Role>, String> {
-    let lower = name.trim().to_ascii_lowercase();
-    let (stem, ending) = match lower.rsplit_once('_') {
-        Some((stem, ending)) if Unit::parse(unit_symbol(ending)).is_some() => (stem, Unit::parse(unit_symbol(ending))),
-        _ => (lower.as_str(), None),
-    };
-    let of = |quantity: Quantity, otherwise: Option<Unit>, option: &str| match ending.or(otherwise) {
-        Some(unit) if unit.quantity() == quantity => Ok(unit),
+    let lower = name.trim().to_lowercase();
+    let named = |text: &str| robot.joints.iter().position(|joint| joint.name.to_lowercase() == text);
+    // Of a joint called `joint_1_s` the `s` is no unit.
+    let whole = Header { stem: &lower, unit: None, ending: None };
+    let Header { stem, unit, ending } = if named(&lower).is_some() { whole } else { Header::of(&lower) };
+    let of = |quantity: Quantity, otherwise: Option<Unit>, option: &str| match unit.or(otherwise) {
+        Some(unit) if unit.quantity() == quantity => Ok(Some(unit)),
+        // A letter behind the name is a word then: the point C of `x_c`.
+        Some(_) if ending.is_some_and(|ending| ending.len() == 1) => Ok(None),
         Some(unit) => Err(format!("column `{name}`: {unit} is no unit of it; allowed: {}", Unit::symbols(quantity).join(", "))),
         None => Err(format!(
             "column `{name}` has no unit; call it e.g. `{stem}_{}`, or give {option}",
@@ -117,35 +119,28 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Rol
     let numbered = |prefix: &str| {
         stem.strip_prefix(prefix).and_then(|number| number.parse::<usize>().ok()).filter(|n| (1..=robot.joints.len()).contains(n))
     };
-    let by_name = robot.joints.iter().position(|joint| joint.name.to_ascii_lowercase() == stem);
-    let joint = by_name.or_else(|| JOINT_NAMES.iter().find_map(|prefix| numbered(prefix)).map(|n| n - 1));
+    let joint = named(stem).or_else(|| JOINT_NAMES.iter().find_map(|prefix| numbered(prefix)).map(|n| n - 1));
     if let Some(joint) = joint {
         let unit = match robot.joints[joint].kind {
             JointKind::Revolute => of(Quantity::Angle, units.angle, "--angle deg")?,
             JointKind::Prismatic => of(Quantity::Length, units.length, "--length mm")?,
         };
-        return Ok(Some(Role::Joint(joint, unit)));
+        return Ok(unit.map(|unit| Role::Joint(joint, unit)));
     }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
-        return Ok(Some(Role::Axis(axis, of(Quantity::Length, units.length, "--length mm")?)));
+        return Ok(of(Quantity::Length, units.length, "--length mm")?.map(|unit| Role::Axis(axis, unit)));
     }
-    if let (Some(part), None) = (["qw", "qx", "qy", "qz"].iter().position(|part| *part == stem), ending) {
+    if let (Some(part), None) = (["qw", "qx", "qy", "qz"].iter().position(|part| *part == stem), unit) {
         return Ok(Some(Role::Quaternion(part)));
     }
     if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
-        return Ok(Some(Role::Turn(turn, of(Quantity::Angle, units.angle, "--angle deg")?)));
+        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?.map(|unit| Role::Turn(turn, unit)));
     }
-    let role = match lower.as_str() {
-        "payload_kg" => Some(Role::Payload),
-        "temp_c" | "temperature_c" => Some(Role::Temperature),
-        "time_s" => Some(Role::Time),
+    Ok(match (stem, unit) {
+        ("payload", Some(Unit::Kilogram)) => Some(Role::Payload),
+        ("temp" | "temperature", Some(Unit::Celsius)) => Some(Role::Temperature),
+        ("time", Some(Unit::Second)) => Some(Role::Time),
+        (_, Some(Unit::Ampere)) => numbered("i").map(|n| Role::Current(n - 1)),
         _ => numbered("dir").map(|n| Role::Direction(n - 1)),
-    };
-    let current = || (ending == Some(Unit::Ampere)).then(|| numbered("i")).flatten().map(|n| Role::Current(n - 1));
-    Ok(role.or_else(current))
-}
-
-/// Symbols as column names have them are lower-case.
-fn unit_symbol(ending: &str) -> &str {
-    if ending == "a" { "A" } else { ending }
+    })
 }

@@ -5,8 +5,10 @@ mod columns;
 mod decimal;
 pub mod parquet;
 pub mod text;
+mod whole;
 
 pub use columns::Units;
+pub use whole::{unwritten, whole};
 
 use crate::error::Fault;
 use crate::robot::description::RobotDescription;

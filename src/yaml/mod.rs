@@ -17,6 +17,11 @@ use serde_saphyr::options::{DuplicateKeyPolicy, NonFiniteFloatPolicy};
 use serde_saphyr::{Location, Spanned};
 use std::fmt;
 
+/// A text as YAML in double quotes; JSON's escapes are YAML's.
+pub fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
 /// Parses one YAML document; what can be read is returned even where there are faults.
 pub fn parse(text: &str) -> (Option<Node>, Vec<Trouble>) {
     let mut troubles = Vec::new();

@@ -46,7 +46,7 @@ fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
     assert!((solved.norm_squared() / length - 1.0).abs() < 1e-6);
 }
 
-const ROBOT: &str = "calib_robot: 1
+pub const ROBOT: &str = "calib_robot: 1
 name: small
 units: {length: mm, angle: deg}
 kinematics:
@@ -132,6 +132,34 @@ fn only_the_numbers_of_joints_change_in_a_text_of_targets() {
     assert!(after[3].starts_with("P2;-") && after[3].ends_with("; x "), "{}", after[3]);
     let first: f64 = after[1].split(';').nth(1).expect("a field").replace(',', ".").parse().expect("a number");
     assert!((first - 10.5).abs() > 1e-3 && (first - 10.5).abs() < 0.5);
+}
+
+#[test]
+fn units_of_targets_are_written_as_in_headers_of_recordings() {
+    let row = "10,20,-30,5,40,0\n";
+    let joints = |header: fn(usize) -> String| {
+        let input = (1..=6).map(header).collect::<Vec<_>>().join(",") + "\n" + row;
+        let output = calib(cell(), &["compensate", "latest", "--plain", "--quiet"], &input);
+        assert!(output.status.success(), "{input}{}", text(&output.stderr));
+        text(&output.stdout).lines().nth(1).expect("a row").to_string()
+    };
+    let expected = joints(|n| format!("q{n}_deg"));
+    assert_ne!(expected, row.trim_end());
+    let written: [fn(usize) -> String; 6] = [
+        |n| format!("J{n} [Grad]"),
+        |n| format!("A{n} [\u{b0}]"),
+        |n| format!("q{n} (Degrees)"),
+        |n| format!("A{n} deg"),
+        |n| format!("J{n}/Grad"),
+        |n| format!("joint{n}_GRAD"),
+    ];
+    for header in written {
+        assert_eq!(joints(header), expected, "{}", header(1));
+    }
+    let point = |name: &str| format!("{name} [Millimeter]");
+    let input = ["x", "y", "z"].map(point).join(",") + ",x_c\n900,40,930,7\n";
+    let output = calib(cell(), &["compensate", "latest", "--quiet"], &input);
+    assert!(output.status.success(), "{}", text(&output.stderr));
 }
 
 #[test]
@@ -259,7 +287,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
     let input = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n119.999,20,-30,5,40,179\n";
     let told = |more: &[&str]| text(&calib(cell(), &[&["compensate", "latest"], more].concat(), input).stderr);
     let (loud, quiet) = (told(&[]), told(&["-q"]));
-    assert!(loud.contains("model: ") && loud.contains("1 targets; "), "{loud}");
+    assert!(loud.contains("model: ") && loud.contains("1 target; "), "{loud}");
     let warnings: String = loud.lines().filter(|line| line.starts_with("warning: ")).map(|line| format!("{line}\n")).collect();
     assert!(warnings.contains("1 of them leave the joint limits"), "{loud}");
     assert_eq!(quiet, warnings);

@@ -48,6 +48,101 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
     }
 }
 
+type Turn = [[f64; 3]; 3];
+
+/// The product of two rotations, row-major.
+fn product(a: Turn, b: Turn) -> Turn {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|k| (0..3).map(|j| a[i][j] * b[j][k]).sum()))
+}
+
+fn turned(turn: Turn, p: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|i| (0..3).map(|k| turn[i][k] * p[k]).sum())
+}
+
+/// About a unit axis, by Rodrigues.
+fn about([x, y, z]: [f64; 3], angle: f64) -> Turn {
+    let (sin, cos) = angle.sin_cos();
+    let cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+    let square = product(cross, cross);
+    let unit = |i, k| if i == k { 1.0 } else { 0.0 };
+    [0, 1, 2].map(|i| [0, 1, 2].map(|k| unit(i, k) + sin * cross[i][k] + (1.0 - cos) * square[i][k]))
+}
+
+fn numbers<const N: usize>(element: roxmltree::Node, name: &str) -> [f64; N] {
+    let text = element.attribute(name).unwrap_or_else(|| panic!("no {name}"));
+    let all: Vec<f64> = text.split(' ').map(|number| number.parse().expect("a number")).collect();
+    all.try_into().expect("as many numbers")
+}
+
+/// Place and orientation of the site `tool0`, from body to body as MuJoCo's documentation has them.
+fn by_mjcf(text: &str, q: &[f64]) -> ([f64; 3], Turn) {
+    let document = roxmltree::Document::parse(text).expect("XML");
+    let child = |node: roxmltree::Node<'_, '_>, name: &str| {
+        node.children().find(|child| child.has_tag_name(name)).map(|child| child.id())
+    };
+    let mut body = document.root_element().children().find(|node| node.has_tag_name("worldbody")).expect("a world");
+    let (mut place, mut turn, mut joints) = ([0.0; 3], about([0.0, 0.0, 1.0], 0.0), q.iter());
+    while let Some(next) = child(body, "body") {
+        body = document.get_node(next).expect("a body");
+        if body.has_attribute("pos") {
+            let step = turned(turn, numbers(body, "pos"));
+            place = [0, 1, 2].map(|k| place[k] + step[k]);
+        }
+        if let Some(joint) = child(body, "joint") {
+            let joint = document.get_node(joint).expect("a joint");
+            assert_eq!((joint.attribute("type"), numbers(joint, "pos")), (Some("hinge"), [0.0; 3]));
+            turn = product(turn, about(numbers(joint, "axis"), *joints.next().expect("an angle")));
+        }
+    }
+    assert_eq!(joints.next(), None, "a joint for every angle");
+    let site = document.get_node(child(body, "site").expect("a site")).expect("a site");
+    let [w, x, y, z] = numbers(site, "quat");
+    let own = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ];
+    let step = turned(turn, numbers(site, "pos"));
+    ([0, 1, 2].map(|k| place[k] + step[k]), product(turn, own))
+}
+
+#[test]
+fn a_mujoco_model_is_the_arm_that_was_identified_with_its_limits_and_known_masses() {
+    let heavy = crate::compensate::ROBOT.to_string()
+        + "links:\n  - {mass: 90, centre: [10, 0, 200]}\n  - {mass: 60, centre: [0, 20, 650]}\n  - null\n  - null\n  - null\n  - null\n";
+    std::fs::write(cell().join("heavy <1>.yaml"), heavy.replace("name: small", "name: \"<a & b> ---\"")).expect("a file");
+    let export = |format: &str| {
+        let table = ".calib/tables/small/identify.parameters.parquet";
+        let output = calib(cell(), &["export", table, "--robot", "heavy <1>.yaml", "--format", format], "");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("UTF-8")
+    };
+    let (text, model) = (export("mjcf"), export("json"));
+    let model: Value = serde_json::from_str(&model).expect("JSON");
+    for k in 0..20 {
+        let q: Vec<f64> = (0..6).map(|j| 2.0 * (1.7 * k as f64 + 0.9 * j as f64).sin()).collect();
+        let (found, wanted) = (by_mjcf(&text, &q).0, by_json(&model, &q));
+        let apart = (0..3).map(|k| (found[k] - wanted[k]).powi(2)).sum::<f64>().sqrt();
+        assert!(apart < 1e-9, "{apart} m");
+    }
+    let at_zero = by_mjcf(&text, &[0.0; 6]).1;
+    for (i, row) in at_zero.iter().enumerate() {
+        for (k, found) in row.iter().enumerate() {
+            assert!((found - model["tool"]["rotation"][i][k].as_f64().expect("a number")).abs() < 1e-12);
+        }
+    }
+    let document = roxmltree::Document::parse(&text).expect("XML");
+    let all = |name: &'static str| document.descendants().filter(move |node| node.has_tag_name(name));
+    assert_eq!(document.root_element().attribute("model"), Some("<a & b> ---"));
+    let masses: Vec<[f64; 1]> = all("inertial").map(|node| numbers(node, "mass")).collect();
+    assert_eq!(masses, [[90.0], [60.0]]);
+    let limits: [f64; 2] = numbers(all("joint").nth(1).expect("a joint"), "range");
+    assert!((limits[0].to_degrees() + 60.0).abs() < 1e-9 && (limits[1].to_degrees() - 75.0).abs() < 1e-9, "{limits:?}");
+    let remarks: String = document.root().children().filter_map(|node| node.text()).collect();
+    assert!(remarks.contains("not carried: reduction_ratio at joint 3"), "{remarks}");
+    assert!(remarks.contains("bodies whose mass is not known have 0.001 kg"), "{remarks}");
+}
+
 const KRL: &str = "DEF weld( )\r\n; {A1 9, A2 not code\r\nDECL E6AXIS XHOME={A1 0.0,A2 -10.0,A3 20.0,A4 5,A5 30,A6 0.0,E1 0.0}\r\n PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0} C_PTP\r\nLIN {E6POS: X 900.0,Y 40.0,Z 930.5,A 0.0,B 0.0,C 0.0,S 2,T 10,E1 0.0}\r\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\r\nEND\r\n";
 
 const RAPID: &str = "MODULE m\n  ! [[1,2\n  CONST jointtarget home:=[[0,-10,20,5,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n  CONST robtarget ps{2}:=[[[900.0,40,930],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],[[910,40,930],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];\n  PERS tooldata t:=[TRUE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n  MoveAbsJ [[1,-10,20,5,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]]\\NoEOffs, v1000, z50, t;\nENDMODULE\n";

@@ -1,17 +1,16 @@
 //! What may be measured beside a single point: several targets, poses, some axes, distances. Rank, truth and uncertainty of each.
 
-use crate::desk::{Desk, table};
+mod laws;
+mod level;
+mod tables;
+
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
-use calib::effect::Load;
 use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::description::RobotDescription;
-use calib::robot::{Distances, Gauging, Measurements, Named, RobotModel, Target, Turns};
+use calib::robot::{Gauging, Measurements, Named, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
-use calib::stage::{Identify, IdentifyReads};
-use calib::table::{Observability, Parameters, Prediction, Recording, Robot, Split, SplitRow, Table};
 use nalgebra::{Matrix3, Vector3};
-use serde_json::json;
 use std::collections::BTreeMap;
 
 const SIGMA: f64 = 1e-5;
@@ -94,9 +93,14 @@ impl Cell {
         let askew = Pose::from_rotation_vector(Vector3::new(0.9, -1.2, 0.4), Vector3::zeros()).rotation;
         let noise = |row: usize| Vector3::from_fn(|axis, _| SIGMA_TURN * self.noise(500_000 + 3 * row + axis));
         let turns = self.turns(data).into_iter().enumerate();
-        let measured =
-            turns.map(|(row, turn)| Some(Pose::from_rotation_vector(noise(row), Vector3::zeros()).rotation * turn * askew));
-        data.turn = Some(Turns { rotation: measured.collect(), sigma: vec![SIGMA_TURN; data.rows()] });
+        let measured = turns.map(|(row, turn)| Pose::from_rotation_vector(noise(row), Vector3::zeros()).rotation * turn * askew);
+        data.readings.push(Readings {
+            kind: "orientation",
+            width: 9,
+            values: measured.flat_map(|rotation| rotation.data.0.concat()).collect(),
+            sigma: vec![SIGMA_TURN; data.rows()],
+            anchor: None,
+        });
     }
 
     /// Adds measured distances from anchors in turn (m, tracker frame), with a sigma.
@@ -104,9 +108,11 @@ impl Cell {
         let own = self.truth.predict(data);
         let rows = 0..data.rows();
         let length = |row: usize| (own[row] - anchors[row % anchors.len()].1).norm() + sigma * self.noise(900_000 + row);
-        data.distance = Some(Distances {
-            anchor: Named::of(rows.clone().map(|row| anchors[row % anchors.len()].0)),
-            length: rows.map(length).collect(),
+        data.readings.push(Readings {
+            kind: "distance",
+            width: 1,
+            anchor: Some(Named::of(rows.clone().map(|row| anchors[row % anchors.len()].0))),
+            values: rows.map(length).collect(),
             sigma: vec![sigma; data.rows()],
         });
     }
@@ -197,11 +203,11 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
         // The median of 80 scatters by a tenth.
         assert!(fitted.excess_sigma < 0.6 * SIGMA, "{name}: {:e} m", fitted.excess_sigma);
         assert!(
-            fitted.excess_sigma_turn.is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
+            fitted.excess_sigma_angle.is_some_and(|turn| turn < 0.6 * SIGMA_TURN),
             "{name}: {:?} rad",
-            fitted.excess_sigma_turn
+            fitted.excess_sigma_angle
         );
-        let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.turn).collect();
+        let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.angle).collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
         assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
     }
@@ -277,84 +283,6 @@ fn rows_of_one_axis_count_for_that_axis_alone() {
     assert!(all < some && some < none, "more axes tell more: {all:e}, {some:e}, {none:e}");
     let off = model.predict(&fresh).iter().zip(&fresh.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(off < 4.0 * SIGMA, "new poses are off by {off:e} m");
-}
-
-/// The cell as tables: the robot, a recording of it, and rows that are all to be fitted.
-fn tables(cell: &Cell, data: &Measurements) -> IdentifyReads {
-    let rows = data.rows();
-    let measured = |row: usize| [0, 1, 2].map(|k| if data.sigma[row][k].is_finite() { data.position[row][k] } else { f64::NAN });
-    let vector = |turn: &Option<Matrix3<f64>>| match turn {
-        Some(rotation) => Pose::new(*rotation, Vector3::zeros()).rotation_vector().into(),
-        None => [f64::NAN; 3],
-    };
-    let names = |named: &Named| (0..rows).map(|row| Some(named.name(row).to_string())).collect();
-    let recording = Recording {
-        joints: data.joints,
-        prismatic: vec![false; data.joints],
-        sequence: (0..rows as i64).collect(),
-        point_id: (0..rows).map(|row| format!("P{row}")).collect(),
-        usage: vec![None; rows],
-        q: data.q.clone(),
-        position: (0..rows).map(measured).collect(),
-        target: data.target.as_ref().map(names),
-        rotation: data.turn.as_ref().map(|turn| turn.rotation.iter().map(vector).collect()),
-        rotation_sigma: data.turn.as_ref().map(|turn| turn.sigma.clone()),
-        distance: data.distance.as_ref().map(|distance| distance.length.clone()),
-        distance_sigma: data.distance.as_ref().map(|distance| distance.sigma.clone()),
-        anchor: data.distance.as_ref().map(|distance| names(&distance.anchor)),
-        ..Recording::default()
-    };
-    let recording = Recording::from_frame(&recording.to_frame().expect("a sound table")).expect("the same table");
-    let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "fit".into() };
-    IdentifyReads { robot: Robot::from_description(&cell.description), recording, split: Split((0..rows).map(split).collect()) }
-}
-
-#[test]
-fn a_model_read_back_from_its_table_measures_what_was_measured() {
-    let cell = Cell::new(fixture::offset_wrist(), &THREE, 9);
-    let mut data = cell.rows(40, 0);
-    cell.disturb(&mut data);
-    cell.turn(&mut data);
-    cell.reach(&mut data, &[("N", Vector3::new(4.0, 1.0, 0.3)), ("S", Vector3::new(1.0, -3.0, 0.2))], 3e-5);
-    for row in 90..120 {
-        data.sigma[row] = Vector3::repeat(f64::INFINITY);
-        data.position[row] = Vector3::zeros();
-    }
-    let reads = tables(&cell, &data);
-    let (description, recording) = (cell.description.clone(), reads.recording.clone());
-    let desk = Desk::default();
-    let stage: Identify =
-        serde_json::from_value(json!({"targets": {"A": [119.0, 1.0, 30.0]}, "screen": false})).expect("settings");
-    let tables = desk.run(&stage, reads).expect("identify runs");
-    let parameters = table::<Parameters>(&tables).remove(0);
-    let placed = |name: &str| parameters.0.iter().find(|row| row.name == name).map_or(f64::NAN, |row| row.value);
-    // The tool frame lies along the base at the zero pose.
-    let [x, y] = ["tool_offset.B.x", "tool_offset.C.y"].map(placed);
-    assert!((x + 60.0).abs() < 1.5 && (y + 80.0).abs() < 1.5, "{x} mm, {y} mm");
-    assert!((placed("anchor.N.x") - 4000.0).abs() < 0.5, "{} mm", placed("anchor.N.x"));
-    let model = parameters.model(RobotModel::new(description), &[], Load::GravityTorque).expect("a model");
-    let own = recording.measurements(&Default::default());
-    let misses = model.misses(&own);
-    let prediction = table::<Prediction>(&tables).remove(0);
-    for (row, miss) in prediction.0.iter().zip(&misses) {
-        assert!((row.error_mm - miss.length * 1e3).abs() < 1e-6, "{}: {} and {}", row.point_id, row.error_mm, miss.length * 1e3);
-        assert!((row.turn_rad.expect("turned") - miss.turn.expect("turned")).abs() < 1e-9);
-        assert_eq!(row.measured.as_deref(), (row.sequence >= 90).then_some("rotation distance"));
-    }
-    let rank = |quantity: &str| {
-        let table = table::<Observability>(&tables).remove(0);
-        table.0.iter().find(|row| row.quantity == quantity).map(|row| row.value)
-    };
-    assert_eq!((rank("rank"), rank("rank_expected")), (Some(24.0 + 18.0 + 6.0), Some(24.0 + 18.0 + 6.0)));
-}
-
-#[test]
-fn a_target_that_the_recording_does_not_have_is_named_with_those_it_has() {
-    let cell = Cell::new(fixture::offset_wrist(), &THREE, 9);
-    let stage: Identify = serde_json::from_value(json!({"targets": {"D": [1.0, 2.0, 3.0]}})).expect("settings");
-    let error = Desk::default().run(&stage, tables(&cell, &cell.rows(20, 0))).map(|_| ()).expect_err("no such target");
-    assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("with.targets.D: the recording has no such target; it has: A, B, C"), "{error}");
 }
 
 #[test]

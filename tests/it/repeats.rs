@@ -173,7 +173,7 @@ fn the_stage_weighs_by_the_stated_repeatability_and_tables_what_repeats_say() {
     assert_eq!(value(&measured, "clusters"), Some(25.0));
     assert!(value(&measured, "repeat_noise_mm").is_some_and(|noise| noise < 0.01));
     assert!(value(&measured, "lack_of_fit_p").is_some_and(|chance| chance < 1e-6));
-    assert!(notes.iter().any(|line| line.contains("25 poses were measured more than once")), "{notes:#?}");
+    assert!(notes.iter().any(|line| line.contains("measured more than once: 25 poses")), "{notes:#?}");
     assert!(notes.iter().any(|line| line.contains("this model lacks something")), "{notes:#?}");
     let wrong: Identify = serde_json::from_value(json!({"repeatability": {"arcsec": 0.0}})).expect("settings");
     assert!(wrong.check().iter().any(|fault| fault.to_string().starts_with("repeatability: expected `measured`")));

@@ -7,10 +7,9 @@ mod run;
 mod status;
 
 use super::surroundings::{bucket, default_store};
-use crate::error::{Error, Fault, Result, counted};
+use crate::error::{Error, Fault, Result, counted, visible};
 use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop};
 use crate::pipeline::Surroundings;
-use crate::progress::shown;
 use crate::store::Store;
 use clap::{Args, Subcommand};
 use rayon::prelude::*;
@@ -91,7 +90,7 @@ fn verdict(fleet: &Fleet, records: &[Option<Record>]) -> Result<()> {
     let bad = |ending: Ending| records.iter().flatten().filter(move |record| record.ending == ending);
     let line = |record: &Record| {
         let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
-        Fault::new(shown(&record.robot), format!("{}: {}", record.ending.name(), shown(reason)))
+        Fault::new(visible(&record.robot), format!("{}: {}", record.ending.name(), visible(reason)))
     };
     let mut faults: Vec<Fault> = bad(Ending::Failed).chain(bad(Ending::Rejected)).take(NAMED).map(line).collect();
     let count = bad(Ending::Failed).count() + bad(Ending::Rejected).count();

@@ -4,10 +4,10 @@ use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
 use super::cluster::{ClusterArguments, on_slurm};
 use super::{Place, records, verdict, workshop};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
 use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop, local, tables};
-use crate::progress::{FleetProgress, Verbosity, shown};
+use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -195,7 +195,7 @@ pub(super) fn count(records: &[Option<Record>], ending: Ending) -> usize {
 fn text(records: &[Option<Record>], computed: usize, seconds: f64, told: &tables::Told) -> String {
     let mut text = String::new();
     for row in told.fleet.0.iter().filter(|row| row.flags.is_some()) {
-        text.push_str(&format!("{}: {}\n", shown(&row.robot), shown(row.flags.as_deref().unwrap_or_default())));
+        text.push_str(&format!("{}: {}\n", visible(&row.robot), visible(row.flags.as_deref().unwrap_or_default())));
     }
     for path in &told.tables {
         text.push_str(&format!("table: {}\n", path.display()));

@@ -4,9 +4,8 @@ use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
 use super::run::{count, ledger};
 use super::{Place, records, workshop};
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, visible};
 use crate::fleet::{Ending, Fleet, FleetFile, Record, slurm};
-use crate::progress::shown;
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
@@ -47,7 +46,7 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
             (Some(record), true) => emit_json(&json!(record)),
             (Some(record), false) => emit(&detail(&record, &store, fleet.name())),
             (None, true) => emit_json(&json!({ "robot": name, "ending": "missing" })),
-            (None, false) => emit(&format!("{}: not computed yet for its settings and data as they are\n", shown(name))),
+            (None, false) => emit(&format!("{}: not computed yet for its settings and data as they are\n", visible(name))),
         };
     }
     let records = records(&workshop)?;
@@ -65,7 +64,7 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
     }
     let mut text = String::new();
     for record in records.iter().flatten().filter(|record| record.ending != Ending::Done) {
-        text.push_str(&format!("{}: {}: {}\n", shown(&record.robot), record.ending.name(), first_line(record)));
+        text.push_str(&format!("{}: {}: {}\n", visible(&record.robot), record.ending.name(), first_line(record)));
     }
     text.push_str(&format!(
         "fleet {}: {done} of {} done, {rejected} rejected, {failed} failed, {missing} not computed yet\n",
@@ -76,13 +75,13 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
 }
 
 fn first_line(record: &Record) -> String {
-    shown(record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default())
+    visible(record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default())
 }
 
 fn detail(record: &Record, store: &crate::store::Store, fleet: &str) -> String {
-    let mut text = format!("{}: {}\n", shown(&record.robot), record.ending.name());
+    let mut text = format!("{}: {}\n", visible(&record.robot), record.ending.name());
     for line in record.reason.iter().flat_map(|reason| reason.lines()) {
-        text.push_str(&format!("  {}\n", shown(line)));
+        text.push_str(&format!("  {}\n", visible(line)));
     }
     text.push_str(&format!("  by {}, {:.1} s, ended {}\n", record.worker, record.wall_seconds, record.ended));
     if let Some(log) = &record.log {
@@ -92,7 +91,7 @@ fn detail(record: &Record, store: &crate::store::Store, fleet: &str) -> String {
         text.push_str(&format!("  log: {}\n", store.root().join("runs").join(run).join("manifest.json").display()));
         for stage in store.manifest(run).ok().iter().filter_map(|manifest| manifest["stages"].as_array()).flatten() {
             for warning in stage["warnings"].as_array().into_iter().flatten().filter_map(|line| line.as_str()) {
-                text.push_str(&format!("  {}: warning: {}\n", stage["id"].as_str().unwrap_or_default(), shown(warning)));
+                text.push_str(&format!("  {}: warning: {}\n", stage["id"].as_str().unwrap_or_default(), visible(warning)));
             }
         }
     }

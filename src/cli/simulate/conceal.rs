@@ -2,16 +2,14 @@
 
 use super::super::surroundings::cores;
 use super::super::{emit, emit_json};
-use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::estimate::threads::in_order;
-use crate::twin::conceal::case::Case;
-use crate::twin::conceal::design::{Content, Design};
+use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
+use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::FAMILIES;
 use crate::twin::conceal::robots::KINDS;
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Make recordings in which effects are hidden, and seal the truth.
 ///
@@ -78,7 +76,7 @@ impl ConcealArguments {
 pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
     let design = design(arguments)?;
     vacant(&arguments.out)?;
-    let points = make(arguments, &design)?;
+    let points = conceal(&arguments.out, &design, arguments.threads())?;
     let (recordings, seal) = (arguments.out.join(RECORDINGS), arguments.out.join(SEAL));
     if arguments.json {
         return emit_json(&json!({ "cases": design.cases, "points": points, "recordings": recordings, "seal": seal }));
@@ -90,37 +88,6 @@ pub(super) fn main(arguments: &ConcealArguments) -> Result<()> {
         recordings.display(),
         seal.display()
     ))
-}
-
-/// Writes the recordings, their truths and the seal; gives the number of points.
-pub(super) fn make(arguments: &ConcealArguments, design: &Design) -> Result<usize> {
-    let contents = design.contents();
-    let made = in_order(arguments.threads(), contents.len(), |number| written(design, number, contents[number]));
-    let mut seal = Seal::new(design);
-    let mut points = 0;
-    for case in made {
-        let case = case.map_err(|message| Error::spec("conceal", message))?;
-        for (name, text) in &case.recording {
-            seal.write(&arguments.out, format!("{RECORDINGS}/{}/{name}", case.name), text)?;
-        }
-        seal.write(&arguments.out, format!("{SEALED}/{}.json", case.name), &case.sealed)?;
-        points += case.points;
-    }
-    seal.close(&arguments.out)?;
-    Ok(points)
-}
-
-/// A case as it goes to the disk.
-struct Written {
-    name: String,
-    points: usize,
-    recording: [(&'static str, String); 3],
-    sealed: String,
-}
-
-fn written(design: &Design, number: usize, content: Content) -> Result<Written, String> {
-    let case = Case::make(design, number, content)?;
-    Ok(Written { recording: case.recording()?, sealed: case.sealed(), points: case.shots.len(), name: case.name })
 }
 
 /// The design that the options state; fails with every fault of them.
@@ -172,13 +139,4 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
 fn unknown(option: &str, name: &str, allowed: &[&str]) -> Fault {
     let hint = nearest(name, allowed.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
     Fault::new(option, format!("no `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", ")))
-}
-
-/// Nothing is overwritten: the folder is new or empty.
-pub(super) fn vacant(folder: &Path) -> Result<()> {
-    let taken = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    if taken {
-        return Err(Error::spec(folder.display().to_string(), "is not empty; name a new folder"));
-    }
-    Ok(())
 }

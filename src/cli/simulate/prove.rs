@@ -2,10 +2,9 @@
 
 use super::super::{emit, emit_json};
 use super::conceal::{self, ConcealArguments};
-use super::reveal;
-use super::seal::{RECORDINGS, SEAL, SEALED, Seal};
 use crate::error::{Error, Result, counted};
 use crate::estimate::threads::in_order;
+use crate::proof::{self, RECORDINGS, SEAL, SEALED, Seal};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -43,8 +42,8 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
             return Err(Error::spec(folder.display().to_string(), "holds another set; name a new folder, or give its options"));
         }
     } else {
-        conceal::vacant(folder)?;
-        conceal::make(&arguments.conceal, &design)?;
+        proof::vacant(folder)?;
+        proof::conceal(folder, &design, arguments.conceal.threads())?;
     }
     // Before anything is diagnosed, and again before anything is revealed: a diagnosis must not have touched the truth.
     let names: Vec<String> = Seal::check(folder)?.iter().filter_map(|name| case(name)).collect();
@@ -61,7 +60,7 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     });
     told.into_iter().collect::<Result<()>>()?;
     let sealed = Seal::check(folder)?;
-    let board = reveal::board(folder, &sealed, &folder.join(VERDICTS))?;
+    let board = proof::board(folder, &sealed, &folder.join(VERDICTS))?;
     if arguments.conceal.json {
         return emit_json(&board.document());
     }

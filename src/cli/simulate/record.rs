@@ -2,14 +2,13 @@
 
 use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
-use super::conceal::vacant;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
+use crate::proof::{recorded, vacant};
 use crate::stage::{STAGES, Simulate, Stage};
 use crate::store::Store;
 use crate::table::{Recording, Robot, Table, Truth};
-use crate::twin::folder::{self, Decimals, Log};
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
@@ -44,11 +43,6 @@ pub(super) struct RecordArguments {
     quiet: bool,
 }
 
-/// 1e-9 deg is 0.00005 um at 3 m.
-const DECIMALS: Decimals = Decimals { angle: 9, length: 9, time: 2 };
-/// Of a moving arm a microsecond counts.
-const MOVING: Decimals = Decimals { time: 6, ..DECIMALS };
-
 pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Result<()> {
     let place = arguments.pipeline.display().to_string();
     let plan = Plan::load(&arguments.pipeline, &arguments.set, STAGES)?;
@@ -67,21 +61,9 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let robot = table::<Robot>(&outcome, &store)?.to_description()?;
     let (recording, truth): (Recording, Truth) = (table(&outcome, &store)?, table(&outcome, &store)?);
     let rows = recording.rows();
-    let log = log(recording, moves);
-    let decimals = if moves { MOVING } else { DECIMALS };
-    let description = folder::robot(&robot).map_err(|fault| Error::spec(&place, fault))?;
-    let mut numbers = "name,effect,where,unit,value\n".to_string();
-    for row in &truth.0 {
-        numbers.push_str(&format!("{},{},{},{},{}\n", row.name, row.effect, row.place, row.unit, row.value));
-    }
+    let files = recorded(&robot, recording, &truth, moves).map_err(|fault| Error::spec(&place, fault))?;
     let fault = |error: std::io::Error| Error::store(arguments.out.display().to_string(), error.to_string());
     std::fs::create_dir_all(&arguments.out).map_err(fault)?;
-    let files = [
-        ("robot.json", description),
-        ("controller.csv", log.controller(decimals)),
-        ("tracker.csv", log.tracker(decimals)),
-        ("truth.csv", numbers),
-    ];
     for (name, text) in files {
         std::fs::write(arguments.out.join(name), text).map_err(fault)?;
     }
@@ -95,23 +77,4 @@ fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {
     let last = outcome.tables(T::KIND).last();
     let output = last.ok_or_else(|| Error::Bug(format!("a simulation without a table {}", T::KIND)))?;
     T::from_frame(&store.load(&output.table)?)
-}
-
-/// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.
-fn log(recording: Recording, at_once: bool) -> Log {
-    let rows = recording.rows();
-    Log {
-        joints: recording.joints,
-        time_s: recording.time,
-        usage: recording.usage.into_iter().map(Option::unwrap_or_default).collect(),
-        payload_kg: recording.payload.unwrap_or_else(|| vec![0.0; rows]),
-        q: recording.q,
-        current: recording.current,
-        direction: recording.direction,
-        velocity: recording.velocity,
-        at_once,
-        temperature_c: recording.temperature,
-        position: recording.position,
-        id: recording.point_id,
-    }
 }

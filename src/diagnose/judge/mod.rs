@@ -12,7 +12,7 @@ pub(crate) use fold_errors::{FOLDS, FoldGain};
 use super::round::FitState;
 
 /// What stands of the causes that were found.
-pub(crate) struct Judged {
+pub(crate) struct JudgedCauses {
     pub state: FitState,
     /// The causes' positions in the pool, in their order.
     pub set: Vec<usize>,
@@ -23,8 +23,8 @@ pub(crate) struct Judged {
 
 /// Exchanges causes that do not carry over to other poses, and takes back those that cannot stand; `set` holds the causes' positions in
 /// the pool, in their order.
-pub(crate) fn judge(state: FitState, mut set: Vec<usize>, comparison: &ModelComparison) -> Judged {
+pub(crate) fn judge(state: FitState, mut set: Vec<usize>, comparison: &ModelComparison) -> JudgedCauses {
     let (state, mut gains) = exchange::exchange(state, &mut set, comparison);
     let (state, withdrawn) = withdraw::withdraw(state, &mut set, &mut gains, comparison);
-    Judged { state, set, gains, withdrawn }
+    JudgedCauses { state, set, gains, withdrawn }
 }

@@ -2,7 +2,7 @@
 
 use super::base_model::base_model;
 use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
-use crate::diagnose::types::{Question, Repeatability};
+use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{BaseFrame, Effect, EffectStack, Form, Load, ParameterSpec, Setting, Term, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
@@ -75,7 +75,7 @@ pub(crate) struct Fitter<'a> {
     pub data: Measurements,
     /// Base parameters to estimate, all of them if `None`.
     free: Option<Vec<usize>>,
-    pub repeatability: Repeatability,
+    pub repeatability: JointRepeatability,
     /// Covariance of every row's point per squared joint deviation.
     spread: Vec<Matrix3<f64>>,
     /// Whether the repeatability is that of a residual.
@@ -92,7 +92,7 @@ impl<'a> Fitter<'a> {
             question,
             data: question.data.clone(),
             free: None,
-            repeatability: Repeatability { sigma: 0.0, repeats: 0 },
+            repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: Vec::new(),
             asked: false,
         };

@@ -2,15 +2,15 @@
 
 mod base_model;
 mod fit_state;
+mod history;
 mod noise;
-mod progress;
 mod reversed_joints;
 mod stretches;
 mod view;
 
 pub use base_model::BASE;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter};
+pub(crate) use history::{RoundHistory, RoundOutcome};
 pub(crate) use noise::REPEATS;
-pub(crate) use progress::{Progress, Step};
 pub(crate) use reversed_joints::REVERSED;
-pub(crate) use view::{View, compliance};
+pub(crate) use view::{RoundView, compliance};

@@ -1,6 +1,6 @@
 //! How well the joints repeat: one standard deviation for all, by maximum likelihood on repeats or on a residual without structure.
 
-use crate::diagnose::types::Repeatability;
+use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model};
 use crate::robot::Measurements;
@@ -30,10 +30,10 @@ pub(super) fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
 }
 
 /// From immediate repeats among `rows`: row i measured the pose of the row before again. `spread` as of [`spreads`].
-pub(super) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> Repeatability {
+pub(super) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> JointRepeatability {
     if data.in_motion(rows) {
         // Rows of a halt tell nothing of what the joints do on the way.
-        return Repeatability { sigma: 0.0, repeats: 0 };
+        return JointRepeatability { sigma: 0.0, repeats: 0 };
     }
     let pairs: Vec<(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)> = rows
         .windows(2)
@@ -45,9 +45,9 @@ pub(super) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix
         })
         .collect();
     if pairs.len() < FEW {
-        return Repeatability { sigma: 0.0, repeats: pairs.len() };
+        return JointRepeatability { sigma: 0.0, repeats: pairs.len() };
     }
-    Repeatability { sigma: likeliest(&pairs, 2.0), repeats: pairs.len() }
+    JointRepeatability { sigma: likeliest(&pairs, 2.0), repeats: pairs.len() }
 }
 
 /// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.

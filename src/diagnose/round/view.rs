@@ -8,7 +8,7 @@ use crate::effect::{Survey, hypotheses};
 use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
-pub(crate) struct View<'a> {
+pub(crate) struct RoundView<'a> {
     pub problem: WhitenedProblem<'a>,
     /// Pose of each row.
     pub pose: Vec<usize>,
@@ -17,7 +17,7 @@ pub(crate) struct View<'a> {
     compliance: Vec<f64>,
 }
 
-impl<'a> View<'a> {
+impl<'a> RoundView<'a> {
     pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
         let compliance = compliance(&now.model);
         let mut problem = WhitenedProblem::new(&now.model, &fitter.data, thinned(&now.screening.kept));

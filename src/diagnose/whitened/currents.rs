@@ -6,6 +6,7 @@
 use crate::effect::PointMotion;
 use crate::estimate::Prior;
 use crate::robot::{Measurements, RobotModel};
+use crate::statistics::nearest;
 use nalgebra::{DMatrix, DVector};
 
 /// The motors whose currents are usable.
@@ -127,6 +128,5 @@ fn solve(matrix: &DMatrix<f64>, values: &[f64]) -> Option<DVector<f64>> {
 
 fn median_deviation(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).collect();
-    let middle = sizes.len() / 2;
-    1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    1.4826 * nearest(&mut sizes, 0.5).unwrap_or_default()
 }

@@ -1,6 +1,6 @@
 //! What the last round looked at, and what stands of what it found.
 
-use crate::diagnose::judge::Judged;
+use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::types::Located;
 use crate::effect::{Effect, Survey};
@@ -9,7 +9,7 @@ use crate::effect::{Effect, Survey};
 pub(crate) struct LastRound<'a, 'b> {
     pub pool: &'b CachedHypotheses<'a>,
     pub survey: &'b Survey<'a>,
-    pub judged: Judged,
+    pub judged: JudgedCauses,
     /// The gate's probability at the start and at the end.
     pub first: f64,
     pub last: f64,

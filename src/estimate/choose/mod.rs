@@ -7,11 +7,13 @@
 mod exchange;
 mod point_jacobian;
 mod site;
+mod spread;
 mod tell;
 mod visit_order;
 
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
+pub use spread::spread;
 pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
 
 use super::model::Model;

@@ -3,8 +3,8 @@
 use crate::estimate::factor::{Factor, Tall};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
-use crate::estimate::piece::Unmodelled;
 use crate::estimate::problem::Problem;
+use crate::observation::ExcessSigma;
 use crate::robot::Measurements;
 use crate::statistics::nearest;
 use faer::linalg::matmul::matmul;
@@ -43,7 +43,7 @@ impl PointJacobian {
     /// Which of the parameters in `order` the data would see; the earlier one stays where two do the same.
     pub(super) fn of(model: &Model, data: &Measurements, order: &[usize]) -> Self {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let factor = Problem { data, rows: &rows, unmodelled: Unmodelled::default() }.evaluate(model, order).factor;
+        let factor = Problem { data, rows: &rows, excess: ExcessSigma::default() }.evaluate(model, order).factor;
         let prior = |k: &usize| model.stack.specs()[*k].prior_sigma;
         let seen = visibility(&factor, &order.iter().map(prior).collect::<Vec<_>>());
         let free: Vec<usize> = order.iter().zip(&seen).filter(|(_, v)| **v == Visibility::Seen).map(|(k, _)| *k).collect();

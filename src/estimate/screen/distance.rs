@@ -4,9 +4,10 @@
 //! 1 + H (1 - wH)^-1. Rows that were not fitted have w = 0.
 
 use crate::estimate::model::Model;
-use crate::estimate::piece::{HUBER, Weight};
 use crate::estimate::problem::Problem;
+use crate::estimate::term::{HUBER, Term};
 use crate::estimate::triangle::Triangle;
+use crate::observation::{KINDS, Kind, noise};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -40,44 +41,48 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
         fitted[*row] = true;
     }
     let p = free.len();
+    let screened: Vec<&dyn Kind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
     (0..data.rows())
         .into_par_iter()
         .with_min_len(CHUNK)
         .map_init(
             || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
             |(scratch, jacobian), row| {
-                jacobian.fill(Vector3::zeros());
-                let predicted = model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
-                    if let Some(entry) = jacobian.get_mut(column[parameter]) {
-                        *entry += derivative;
-                    }
-                });
-                let residual = data.residual(row, &predicted);
-                let scale = Weight::of(data, row, problem.unmodelled.point);
-                let whitened = scale.apply(&residual);
-                let weight = match whitened.norm() {
-                    _ if !fitted[row] => 0.0,
-                    length if length > HUBER => HUBER / length,
-                    _ => 1.0,
+                let mut placed = model.place(data, row, scratch);
+                let predicted = placed.point;
+                let away = |kind: &&'static dyn Kind| {
+                    let (term, _) = Term::of(*kind, data, row, &placed, problem.excess)?;
+                    jacobian.fill(Vector3::zeros());
+                    term.derivatives(&mut placed, |parameter, derivative| {
+                        if let Some(entry) = jacobian.get_mut(column[parameter]) {
+                            *entry += derivative;
+                        }
+                    });
+                    let weight = match term.error.norm() {
+                        _ if !fitted[row] => 0.0,
+                        length if length > HUBER => HUBER / length,
+                        _ => 1.0,
+                    };
+                    let leverage = inverse.as_ref().map_or_else(Matrix3::zeros, |inverse| leverage(jacobian, inverse));
+                    Some(distance(&term.error, leverage, weight))
                 };
-                let leverage = inverse.as_ref().map_or_else(Matrix3::zeros, |inverse| leverage(jacobian, inverse, &scale));
+                let distance = screened.iter().filter_map(away).fold(0.0, f64::max);
                 Standing {
                     predicted,
-                    residual,
-                    sigma: data.noise(row).hypot(3f64.sqrt() * problem.unmodelled.point) / 3f64.sqrt(),
-                    distance: distance(&whitened, leverage, weight),
+                    residual: data.residual(row, &predicted),
+                    sigma: noise(data, row).hypot(3f64.sqrt() * problem.excess.length) / 3f64.sqrt(),
+                    distance,
                 }
             },
         )
         .collect()
 }
 
-/// H = G G', G = J R^-1 whitened, R^-1 upper triangular.
-fn leverage(jacobian: &[Vector3<f64>], inverse: &Triangle, scale: &Weight) -> Matrix3<f64> {
+/// H = G G', G = J R^-1 of the whitened derivatives, R^-1 upper triangular.
+fn leverage(jacobian: &[Vector3<f64>], inverse: &Triangle) -> Matrix3<f64> {
     let mut leverage = Matrix3::zeros();
     for column in 0..jacobian.len() {
         let g: Vector3<f64> = jacobian.iter().zip(inverse.column(column)).map(|(derivative, share)| derivative * *share).sum();
-        let g = scale.apply(&g);
         leverage += g * g.transpose();
     }
     leverage

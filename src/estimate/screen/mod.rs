@@ -147,7 +147,7 @@ fn screen(
 ) -> Screened {
     let free: Vec<usize> =
         (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
-    let problem = Problem { data, rows: kept, unmodelled: fitted.excess() };
+    let problem = Problem { data, rows: kept, excess: fitted.excess() };
     let mut standings = leave_one_out(&problem, model, &free);
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);

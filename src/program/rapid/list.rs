@@ -2,6 +2,7 @@
 
 use super::super::token::{Source, Token};
 use super::super::{Found, Kind, Literal, quoted};
+use crate::error::counted;
 use std::ops::Range;
 
 /// deg or mm: the external axis is not connected.
@@ -130,7 +131,7 @@ impl<'t> List<'t> {
             match item {
                 Item::List(list) if list.items.len() == *size => numbers.push(list.numbers(found)),
                 Item::List(list) => {
-                    let message = format!("{} numbers, expected {size} here in a {}", list.items.len(), want.name());
+                    let message = format!("{}, expected {size} here in a {}", counted(list.items.len(), "number"), want.name());
                     found.fault(list.span.start, message);
                 }
                 Item::Leaf(tokens) => {

@@ -1,11 +1,12 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::Arm;
-use super::layout::{ColumnRef, FileLayout, ScalarColumn};
-use super::orientation::Convention;
-use super::slot::{PerJoint, Slot};
-use crate::error::{Error, Fault, Result, nearest};
+use super::layout::FileLayout;
+use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
+use crate::error::{Error, Fault, Result, counted, nearest};
+use crate::observation::{Column, Convention};
 use crate::units::{Quantity, Unit};
+use std::ops::Range;
 
 /// Names in an error message; a header of thousands must not fill the screen.
 const SHOWN: usize = 60;
@@ -15,10 +16,12 @@ pub(super) struct Binding {
     /// Fields of a row.
     pub width: usize,
     pub id: Option<Text>,
-    pub usage: Option<Text>,
-    pub target: Option<Text>,
-    pub anchor: Option<Text>,
-    pub turn: Option<Convention>,
+    /// In the order of the row's texts.
+    pub texts: Vec<Option<Text>>,
+    /// Quantities of several numbers: where they are, and how they are read.
+    pub conventions: Vec<(Range<usize>, &'static Column, &'static Convention)>,
+    /// Whether the file has what a kind of measurement measured.
+    pub measures: bool,
     pub sequence: Option<usize>,
     pub cells: Vec<Cell>,
     /// Numbers that are the same in every row, SI.
@@ -35,11 +38,14 @@ pub(super) enum Text {
 
 /// A column of numbers.
 pub(super) struct Cell {
-    pub slot: Slot,
-    /// Place of the slot in a row's numbers.
+    /// Place in a row's numbers.
     pub index: usize,
     pub column: usize,
     pub unit: Unit,
+    /// What a recording may hold, SI.
+    pub range: [f64; 2],
+    /// A direction: 1, -1 or 0.
+    pub is_direction: bool,
     pub optional: bool,
     /// The column, as people call it: `x_mm`, or `column 4`.
     pub name: String,
@@ -82,10 +88,9 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
     let binding = Binding {
         width: head.width,
         id: None,
-        usage: None,
-        target: None,
-        anchor: None,
-        turn: None,
+        texts: arm.slots.texts().iter().map(|_| None).collect(),
+        conventions: Vec::new(),
+        measures: false,
         sequence: None,
         cells: Vec::new(),
         constants: Vec::new(),
@@ -93,52 +98,51 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
     };
     let mut binder = Binder { head, binding, faults: Vec::new() };
     let columns = &layout.columns;
-    for (name, text) in columns.texts() {
+    for (declared, text) in columns.texts() {
         let value = text.value.clone().map(Text::Value);
         let bound = value.or_else(|| {
-            let column = binder.column(text.column.as_ref()?, name, text.optional)?;
+            let column = binder.column(text.column.as_ref()?, declared.setting, text.optional)?;
             Some(Text::Column { column, optional: text.optional })
         });
-        match name {
-            "usage" => binder.binding.usage = bound,
-            "target" => binder.binding.target = bound,
-            "anchor" => binder.binding.anchor = bound,
-            _ => binder.binding.id = bound,
+        match arm.slots.texts().iter().position(|name| *name == declared.setting) {
+            Some(at) => binder.binding.texts[at] = bound,
+            None => binder.binding.id = bound,
         }
     }
-    if let Some(sequence) = &columns.sequence {
+    if let Some(sequence) = columns.count("sequence") {
         binder.binding.sequence = binder.column(&sequence.column, "sequence", false);
     }
-    for (name, scalar, _, slot) in columns.scalars() {
+    for (declared, scalar) in columns.numbers() {
         let unit = unit(scalar.unit.as_deref())?;
-        let index = slot.index(arm.joints());
+        let index = arm.slots.of(declared.setting).start;
         if let Some(value) = scalar.value {
             binder.binding.constants.push((index, unit.to_si(value)));
         } else if let Some(reference) = &scalar.column
-            && let Some(column) = binder.column(reference, name, scalar.optional)
+            && let Some(column) = binder.column(reference, declared.setting, scalar.optional)
         {
-            let difference = binder.difference(scalar, name)?;
-            let name = binder.name(column);
-            binder.binding.cells.push(Cell { slot, index, column, unit, optional: scalar.optional, name, difference });
+            let difference = binder.difference(scalar, declared.setting)?;
+            let cell = binder.cell(declared, false, index, column, unit);
+            binder.binding.cells.push(Cell { optional: scalar.optional, difference, ..cell });
         }
     }
-    if let Some(orientation) = &columns.orientation
-        && let Some((convention, references)) = orientation.columns()
-    {
-        binder.binding.turn = Some(convention);
-        let unit = unit(orientation.unit.as_deref())?;
-        for (number, reference) in references.iter().enumerate() {
-            if let Some(column) = binder.column(reference, "orientation", false) {
-                let (slot, name) = (Slot::Turn(number), binder.name(column));
-                let index = slot.index(arm.joints());
-                let optional = orientation.optional;
-                binder.binding.cells.push(Cell { slot, index, column, unit, optional, name, difference: None });
+    for (declared, conventions, mapped) in columns.conventions() {
+        let Some((convention, references)) = mapped.chosen(conventions) else { continue };
+        let unit = unit(mapped.unit.as_deref())?;
+        let places = arm.slots.of(declared.setting);
+        for (index, reference) in places.clone().zip(references) {
+            if let Some(column) = binder.column(reference, declared.setting, false) {
+                let cell = binder.cell(declared, false, index, column, unit);
+                binder.binding.cells.push(Cell { optional: mapped.optional, ..cell });
             }
         }
+        binder.binding.conventions.push((places, declared, convention));
     }
-    for mapped in columns.per_joint() {
-        binder.joints(&mapped, arm)?;
+    for (declared, mapped) in columns.joints() {
+        binder.joints(declared, mapped, arm)?;
     }
+    let cells = &binder.binding.cells;
+    let measured = arm.slots.kinds.iter().flat_map(|kind| &kind.values);
+    binder.binding.measures = measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index));
     if binder.faults.is_empty() {
         Ok(binder.binding)
     } else {
@@ -206,7 +210,7 @@ impl Binder<'_> {
             (ColumnRef::Name(name), Some(names)) => nearest(name, names.iter().map(String::as_str))
                 .map(|near| format!("; did you mean `{near}`?"))
                 .unwrap_or_default(),
-            _ => format!("; the file has {} columns", self.head.width),
+            _ => format!("; the file has {}", counted(self.head.width, "column")),
         }
     }
     /// What stands in the header, for the last fault of the list.
@@ -225,9 +229,14 @@ impl Binder<'_> {
         }
         text
     }
-    fn joints(&mut self, mapped: &PerJoint, arm: &Arm) -> Result<()> {
-        let PerJoint { name, columns: joints, quantity, slot } = *mapped;
-        let slides = mapped.linear().is_some();
+    /// A cell that may not be blank.
+    fn cell(&self, declared: &Column, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> Cell {
+        let (quantity, range) = declared.of_joint(is_prismatic);
+        let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
+        Cell { index, column, unit, range, is_direction, optional: false, name, difference: None }
+    }
+    fn joints(&mut self, declared: &Column, joints: &JointColumns, arm: &Arm) -> Result<()> {
+        let name = declared.setting;
         let count = arm.joints();
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
             (Some(list), _) => list.clone(),
@@ -237,13 +246,17 @@ impl Binder<'_> {
             (None, None) => return Err(Error::Bug("unchecked joint columns".into())),
         };
         if references.len() != count {
-            self.fault(format!("`{name}` lists {} columns; the robot has {count} joints", references.len()));
+            self.fault(format!(
+                "`{name}` lists {}; the robot has {}",
+                counted(references.len(), "column"),
+                counted(count, "joint")
+            ));
             return Ok(());
         }
         if let Some(pattern) = &joints.column {
             let next = ColumnRef::Name(pattern.replace("{j}", &(count + 1).to_string()));
             if !self.find(&next).is_empty() {
-                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {count} joints only"));
+                self.fault(format!("{next}, by the pattern of `{name}`: the robot has {} only", counted(count, "joint")));
                 return Ok(());
             }
         }
@@ -254,21 +267,22 @@ impl Binder<'_> {
             return Ok(());
         }
         if there > 0 && there < count {
-            self.fault(format!("`{name}` has {there} of its columns; the robot has {count} joints"));
+            self.fault(format!("`{name}` has {there} of its columns; the robot has {}", counted(count, "joint")));
         }
         for (joint, reference) in references.iter().enumerate() {
-            let linear = slides && arm.prismatic.get(joint).copied().unwrap_or(false);
+            let is_prismatic = arm.prismatic.get(joint).copied().unwrap_or(false);
+            let linear = is_prismatic && declared.of_joint(true).0 != declared.quantity;
             let symbol = if linear { &joints.linear_unit } else { &joints.unit };
-            if symbol.is_none() && quantity != Quantity::Number {
+            if symbol.is_none() && declared.quantity != Quantity::Number {
                 let (kind, setting) = if linear { ("prismatic", "linear_unit") } else { ("revolute", "unit") };
                 self.fault(format!("joint {} is {kind}; say `{setting}` for `{name}`", joint + 1));
                 continue;
             }
             let unit = unit(symbol.as_deref())?;
             if let Some(column) = self.column(reference, name, false) {
-                let slot = slot(joint);
-                let (index, optional, name) = (slot.index(count), joints.optional, self.name(column));
-                self.binding.cells.push(Cell { slot, index, column, unit, optional, name, difference: None });
+                let index = arm.slots.of(name).start + joint;
+                let cell = self.cell(declared, is_prismatic, index, column, unit);
+                self.binding.cells.push(Cell { optional: joints.optional, ..cell });
             }
         }
         Ok(())

@@ -1,19 +1,23 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
 use super::Ingest;
-use super::layout::{ColumnRef, Columns, Duplicates, FileLayout, Join, ScalarColumn};
-use super::orientation::{Convention, OrientationColumns};
-use super::slot::PerJoint;
-use crate::error::{Fault, nearest};
+use super::columns::Columns;
+use super::layout::{Duplicates, FileLayout, Join};
+use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
+use crate::error::{Fault, counted, nearest};
+use crate::observation::{Column, Conventions, KINDS, Kind, Part};
+use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 
-/// What a recording cannot be without.
+/// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
 fn needed(settings: &Ingest) -> Vec<&'static str> {
-    let other = |columns: &Columns| columns.distance.is_some() || columns.orientation.is_some();
+    let [first, others @ ..] = KINDS else { return Vec::new() };
+    let mapped = |kind: &&dyn Kind, columns: &Columns| kind.columns(Part::Value).any(|column| columns.has(column.setting));
+    let other = |file: &FileLayout| others.iter().any(|kind| mapped(kind, &file.columns));
     let axes = match &settings.axes {
         Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
-        None if settings.files.iter().any(|file| other(&file.columns)) => Vec::new(),
-        None => vec!["x", "y", "z"],
+        None if settings.files.iter().any(other) => Vec::new(),
+        None => first.columns(Part::Value).map(|column| column.setting).collect(),
     };
     std::iter::once("q").chain(axes).collect()
 }
@@ -58,66 +62,81 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     if columns.names().is_empty() {
         faults.push(Fault::new(format!("{place}.columns"), "no quantity is mapped"));
     }
-    for (name, text) in columns.texts() {
-        let place = format!("{place}.columns.{name}");
+    for (declared, text) in columns.texts() {
+        let place = format!("{place}.columns.{}", declared.setting);
         one_of(text.column.is_some(), text.value.is_some(), "`column` or `value`", &place, faults);
-        if name == "point_id" && text.value.is_some() {
+        if declared.setting == "point_id" && text.value.is_some() {
             faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
         }
         column(text.column.as_ref(), file, &place, faults);
     }
-    if let Some(sequence) = &columns.sequence {
-        column(Some(&sequence.column), file, &format!("{place}.columns.sequence"), faults);
+    for (declared, counted) in columns.counts() {
+        column(Some(&counted.column), file, &format!("{place}.columns.{}", declared.setting), faults);
     }
-    for (name, scalar, quantity, _) in columns.scalars() {
-        scalar_faults(scalar, quantity, file, &format!("{place}.columns.{name}"), faults);
+    for (declared, scalar) in columns.numbers() {
+        scalar_faults(scalar, declared.quantity, file, &format!("{place}.columns.{}", declared.setting), faults);
     }
-    for mapped in columns.per_joint() {
-        joint_faults(&mapped, file, &format!("{place}.columns.{}", mapped.name), faults);
+    for (declared, mapped) in columns.joints() {
+        joint_faults(declared, mapped, file, &format!("{place}.columns.{}", declared.setting), faults);
     }
-    if let Some(orientation) = &columns.orientation {
-        orientation_faults(orientation, file, &format!("{place}.columns.orientation"), faults);
+    for (declared, conventions, mapped) in columns.conventions() {
+        let place = format!("{place}.columns.{}", declared.setting);
+        convention_faults(declared, conventions, mapped, file, &place, faults);
     }
-    for (name, mapped, sigma, noise) in [
-        ("orientation", columns.orientation.is_some(), "sigma_orientation", columns.sigma_orientation.is_some()),
-        ("distance", columns.distance.is_some(), "sigma_distance", columns.sigma_distance.is_some()),
-    ] {
-        if mapped != noise {
-            let message =
-                format!("`{name}` and `{sigma}` go together: its noise weights it, e.g. {sigma}: {{value: 0.02, unit: ...}}");
+    for kind in KINDS {
+        kind_faults(*kind, columns, &format!("{place}.columns"), faults);
+    }
+    // Each group at its first column.
+    for group in recording_columns().filter(|column| column.together.first() == Some(&column.setting)) {
+        let mapped = group.together.iter().filter(|setting| columns.has(setting)).count();
+        if mapped > 0 && mapped < group.together.len() {
+            let message = format!("map all of {}, or none", group.together.join(", "));
             faults.push(Fault::new(format!("{place}.columns"), message));
-        }
-    }
-    if columns.anchor.is_some() && columns.distance.is_none() {
-        faults.push(Fault::new(format!("{place}.columns.anchor"), "an anchor is the end of a `distance`; map that too"));
-    }
-    for (all, names) in [
-        ([&columns.sigma_x, &columns.sigma_y, &columns.sigma_z], "sigma_x, sigma_y, sigma_z"),
-        ([&columns.sim_x, &columns.sim_y, &columns.sim_z], "sim_x, sim_y, sim_z"),
-    ] {
-        let mapped = all.iter().filter(|column| column.is_some()).count();
-        if mapped == 1 || mapped == 2 {
-            faults.push(Fault::new(format!("{place}.columns"), format!("map all of {names}, or none")));
         }
     }
 }
 
-fn orientation_faults(orientation: &OrientationColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
-    let Some((convention, references)) = orientation.columns() else {
-        let message = "say `quaternion: [w, x, y, z]`, `rpy: [roll, pitch, yaw]`, `euler_xyz: [Rx, Ry, Rz]` or `rotation_vector: [x, y, z]`, one of them";
-        faults.push(Fault::new(place, message));
+/// What was measured comes with its standard deviation, and names of what it was measured from with it.
+fn kind_faults(kind: &dyn Kind, columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
+    let settings = |part: Part| kind.columns(part).map(|column| column.setting);
+    let mapped = |part: Part| settings(part).any(|setting| columns.has(setting));
+    let values: Vec<&str> = settings(Part::Value).collect();
+    let values = values.join("`, `");
+    if kind.about().own_sigma && mapped(Part::Value) != mapped(Part::Sigma) {
+        for sigma in settings(Part::Sigma) {
+            let message =
+                format!("`{values}` and `{sigma}` go together: its noise weights it, e.g. {sigma}: {{value: 0.02, unit: ...}}");
+            faults.push(Fault::new(place, message));
+        }
+    }
+    for anchor in settings(Part::Anchor).filter(|setting| columns.has(setting) && !mapped(Part::Value)) {
+        let message = format!("an {anchor} is the end of a `{values}`; map that too");
+        faults.push(Fault::new(format!("{place}.{anchor}"), message));
+    }
+}
+
+fn convention_faults(
+    declared: &Column,
+    conventions: &'static Conventions,
+    mapped: &ConventionColumns,
+    file: &FileLayout,
+    place: &str,
+    faults: &mut Vec<Fault>,
+) {
+    let Some((convention, references)) = mapped.chosen(conventions) else {
+        faults.push(Fault::new(place, conventions.allowed));
         return;
     };
-    if references.len() != convention.numbers() {
-        faults.push(Fault::new(place, format!("{} columns; allowed: {}", references.len(), convention.numbers())));
+    if references.len() != convention.numbers {
+        faults.push(Fault::new(place, format!("{}; allowed: {}", counted(references.len(), "column"), convention.numbers)));
     }
     for reference in references {
         column(Some(reference), file, place, faults);
     }
-    if convention != Convention::Quaternion {
-        unit(orientation.unit.as_deref(), Quantity::Angle, &format!("{place}.unit"), faults);
-    } else if orientation.unit.is_some() {
-        faults.push(Fault::new(format!("{place}.unit"), "a quaternion has no unit"));
+    if !convention.unitless {
+        unit(mapped.unit.as_deref(), declared.quantity, &format!("{place}.unit"), faults);
+    } else if mapped.unit.is_some() {
+        faults.push(Fault::new(format!("{place}.unit"), format!("a {} has no unit", convention.name)));
     }
 }
 
@@ -155,8 +174,8 @@ fn difference_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayou
     }
 }
 
-fn joint_faults(mapped: &PerJoint, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
-    let (joints, quantity) = (mapped.columns, mapped.quantity);
+fn joint_faults(declared: &Column, joints: &JointColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+    let quantity = declared.quantity;
     one_of(
         joints.column.is_some(),
         joints.columns.is_some(),
@@ -181,7 +200,8 @@ fn joint_faults(mapped: &PerJoint, file: &FileLayout, place: &str, faults: &mut 
     if quantity == Quantity::Angle && joints.optional {
         faults.push(Fault::new(format!("{place}.optional"), "no recording without joint positions"));
     }
-    if let Some(linear) = mapped.linear() {
+    let linear = declared.of_joint(true).0;
+    if linear != quantity {
         if joints.unit.is_some() || joints.linear_unit.is_none() {
             unit(joints.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
         }
@@ -269,7 +289,7 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
                 faults.push(Fault::new(format!("files[{index}].columns.{name}"), "mapped in two files; map it in one"));
             }
         }
-        if file.columns.sequence.is_some() {
+        if file.columns.has("sequence") {
             let message = "rows keep the order of the first file; map it there";
             faults.push(Fault::new(format!("files[{index}].columns.sequence"), message));
         }
@@ -300,8 +320,8 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
 }
 
 fn optional_key(file: &FileLayout, key: &str) -> bool {
-    let id = file.columns.point_id.as_ref().is_some_and(|id| id.optional);
-    let time = file.columns.time.as_ref().is_some_and(|time| time.optional || time.column.is_none());
+    let id = file.columns.text("point_id").is_some_and(|id| id.optional);
+    let time = file.columns.number("time").is_some_and(|time| time.optional || time.column.is_none());
     if key == "time" { time } else { id }
 }
 
@@ -310,9 +330,9 @@ fn motion_faults(settings: &Ingest, faults: &mut Vec<Fault>) {
     let Some(motion) = &settings.motion else { return };
     faults.extend(motion.faults());
     let columns = || settings.files.iter().map(|file| &file.columns);
-    let given = columns().any(|columns| columns.velocity.is_some());
-    let timed = |columns: &Columns| columns.time.as_ref().is_some_and(|time| time.column.is_some());
-    if !given && columns().any(|columns| columns.q.is_some() && !timed(columns)) {
+    let given = columns().any(|columns| columns.has("velocity"));
+    let timed = |columns: &Columns| columns.number("time").is_some_and(|time| time.column.is_some());
+    if !given && columns().any(|columns| columns.has("q") && !timed(columns)) {
         let message = "joint velocities follow from the joints over time: map `time` in the file that has `q`, or map `velocity`";
         faults.push(Fault::new("motion", message));
     }

@@ -4,7 +4,7 @@
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
 use super::arm::Arm;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -191,7 +191,7 @@ impl Samples {
             );
             return Err(Error::data(label, message));
         }
-        let alone = if lonely > 0 { format!("; {lonely} rows between gaps have none") } else { String::new() };
+        let alone = if lonely > 0 { format!("; none for {} between gaps", counted(lonely, "row")) } else { String::new() };
         context.services.note(format!(
             "{label}: joint velocities by parabolas through neighbouring rows, {ms:.1} ms apart, never across gaps above {gap:.0} ms; right to about {:.2} %{alone}",
             100.0 * rough

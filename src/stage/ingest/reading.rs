@@ -7,7 +7,7 @@ use super::layout::{Decimal, FileLayout, Limits};
 use super::lines::{Lines, Record, failed};
 use super::parquet::Columns;
 use super::row::{Refusal, Row, RowReader};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::stage::{Context, Source};
 use std::io::{BufRead, BufReader};
 
@@ -71,12 +71,12 @@ impl<'a> Reading<'a> {
         };
         let mut record = Record::default();
         if !rows.next(&mut record)? {
-            let lines = rows.lines();
+            let lines = counted(rows.lines(), "line");
             let message = match (rows.bytes(), header) {
                 (0, true) => "is empty; allowed: a header and at least one data row".to_string(),
                 (0, false) => "is empty; allowed: at least one data row".to_string(),
-                (_, true) => format!("has no header: its {lines} lines are empty, comments or skipped"),
-                (_, false) => format!("has no data row: its {lines} lines are empty, comments or skipped"),
+                (_, true) => format!("has no header: {lines}, all empty, comments or skipped"),
+                (_, false) => format!("has no data row: {lines}, all empty, comments or skipped"),
             };
             return Err(Error::data(label, message));
         }
@@ -126,9 +126,8 @@ pub(super) fn header(layout: &FileLayout, arm: Option<&Arm>, limits: Limits, con
     if let Some(arm) = arm {
         return Reading::open(source, layout, arm, limits).map(drop);
     }
-    let (mut layout, arm) = (layout.clone(), Arm { prismatic: vec![false], limits: vec![[f64::NEG_INFINITY, f64::INFINITY]] });
-    let columns = &mut layout.columns;
-    (columns.q, columns.current, columns.direction, columns.velocity) = (None, None, None, None);
+    let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
+    let arm = Arm::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
     Reading::open(source, &layout, &arm, limits).map(drop)
 }
 

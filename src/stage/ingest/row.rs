@@ -6,13 +6,16 @@ use super::encoding;
 use super::layout::{Decimal, Limits};
 use super::lines::Record;
 use super::number::{self, Fault};
-use super::slot::Slot;
+use super::slots::KindSlots;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
 
 /// More than one and a half turns is no position of a joint in rad, but a common one in degrees.
 const TURNS: f64 = 3.0 * std::f64::consts::PI;
+
+/// A tracker that lost its beam writes these as zero.
+const POINT: [&str; 3] = ["x", "y", "z"];
 
 /// Why a row is not used; the stable word in the table `rejected`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,11 +70,12 @@ pub(super) struct Row {
     pub line: u64,
     /// Empty where there is none.
     pub id: String,
-    pub usage: String,
-    pub target: String,
-    pub anchor: String,
+    /// By [`Slots::texts`]; empty where there is none.
+    ///
+    /// [`Slots::texts`]: super::slots::Slots::texts
+    pub texts: Vec<String>,
     pub sequence: Option<i64>,
-    /// SI, by [`Slot::index`]; NaN where missing.
+    /// SI, by the places of the arm's slots; NaN where missing.
     pub values: Vec<f64>,
     /// The first joint beyond its limits, from 0.
     pub beyond: Option<usize>,
@@ -93,15 +97,14 @@ impl RowReader<'_> {
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
     pub(super) fn read(&mut self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
         row.id.clear();
-        row.usage.clear();
-        row.target.clear();
-        row.anchor.clear();
+        row.texts.resize_with(self.binding.texts.len(), String::new);
+        row.texts.iter_mut().for_each(String::clear);
         row.sequence = None;
         row.beyond = None;
         row.turned = None;
         row.line = record.line;
         row.values.clear();
-        row.values.resize(Slot::count(self.arm.joints()), f64::NAN);
+        row.values.resize(self.arm.slots.count, f64::NAN);
         if record.is_blank(0) {
             return refuse(Reason::Blank, "the whole row is blank".into());
         }
@@ -114,16 +117,16 @@ impl RowReader<'_> {
         if !record.is_blank(width) {
             return refuse(Reason::LongRow, format!("{} fields; allowed: {width}", record.len()));
         }
-        text(&self.binding.usage, record, "usage", true, &mut row.usage)?;
-        text(&self.binding.target, record, "target", true, &mut row.target)?;
-        text(&self.binding.anchor, record, "anchor", true, &mut row.anchor)?;
+        for ((source, name), into) in self.binding.texts.iter().zip(self.arm.slots.texts()).zip(&mut row.texts) {
+            text(source, record, name, true, into)?;
+        }
         for (index, value) in &self.binding.constants {
             if let Some(slot) = row.values.get_mut(*index) {
                 *slot = *value;
             }
         }
         self.numbers(record, row)?;
-        self.turn(row)?;
+        self.conventions(row)?;
         self.measured(row)?;
         self.plausible(row)?;
         if let Some(column) = self.binding.sequence {
@@ -140,14 +143,12 @@ impl RowReader<'_> {
                 let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
                 value += other.sign * other.unit.to_si(added);
             }
-            if let Slot::Q(joint) = cell.slot
-                && self.arm.prismatic.get(joint) == Some(&false)
-                && value.abs() > TURNS
-            {
+            let joint = cell.index.wrapping_sub(self.arm.slots.q.start);
+            if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > TURNS {
                 row.turned.get_or_insert((joint, value));
             }
-            let [lower, upper] = range(cell.slot, self.arm);
-            let direction = matches!(cell.slot, Slot::Direction(_)) && ![-1.0, 0.0, 1.0].contains(&value);
+            let [lower, upper] = cell.range;
+            let direction = cell.is_direction && ![-1.0, 0.0, 1.0].contains(&value);
             if !(lower..=upper).contains(&value) || direction {
                 let unit = cell.unit;
                 let allowed = if direction {
@@ -192,46 +193,52 @@ impl RowReader<'_> {
         refuse(Reason::NotANumber, detail)
     }
 
-    /// Makes the rotation vector of the file's convention.
-    fn turn(&self, row: &mut Row) -> Result<(), Refusal> {
-        let Some(convention) = self.binding.turn else { return Ok(()) };
-        let first = Slot::Turn(0).index(self.arm.joints());
-        let Some(slots) = row.values.get_mut(first..first + 4) else { return Ok(()) };
-        let mut numbers = [f64::NAN; 4];
-        numbers.copy_from_slice(slots);
-        match convention.rotation_vector(numbers) {
-            Ok([x, y, z]) => slots.copy_from_slice(&[x, y, z, f64::NAN]),
-            Err(detail) => return refuse(Reason::OutOfRange, detail),
+    /// Makes what a recording keeps of quantities of several numbers.
+    fn conventions(&self, row: &mut Row) -> Result<(), Refusal> {
+        for (places, declared, convention) in &self.binding.conventions {
+            let Some(numbers) = row.values.get_mut(places.clone()) else { continue };
+            let own = &numbers[..convention.numbers];
+            if own.iter().all(|number| number.is_nan()) {
+                continue;
+            }
+            if own.iter().any(|number| number.is_nan()) {
+                return refuse(Reason::OutOfRange, format!("the {} is incomplete", declared.setting));
+            }
+            match (convention.read)(own) {
+                Ok(kept) => {
+                    numbers.fill(f64::NAN);
+                    numbers[..kept.len()].copy_from_slice(&kept);
+                }
+                Err(detail) => return refuse(Reason::OutOfRange, detail),
+            }
         }
         Ok(())
     }
 
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
     fn measured(&self, row: &Row) -> Result<(), Refusal> {
-        let joints = self.arm.joints();
-        let there = |slot: Slot| row.values.get(slot.index(joints)).is_some_and(|value| !value.is_nan());
-        let gauges = [Slot::Position(0), Slot::Position(1), Slot::Position(2), Slot::Turn(0), Slot::Distance];
-        let mapped = |slot: &Slot| self.binding.cells.iter().any(|cell| cell.slot == *slot);
-        if gauges.iter().any(mapped) && !gauges.into_iter().any(there) {
+        let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
+        let kinds = &self.arm.slots.kinds;
+        if self.binding.measures && !kinds.iter().any(|kind| kind.values.iter().any(there)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for (gauge, sigma, what) in
-            [(Slot::Turn(0), Slot::SigmaTurn, "orientation"), (Slot::Distance, Slot::SigmaDistance, "distance")]
-        {
-            if there(gauge) && !there(sigma) {
-                return refuse(Reason::Blank, format!("a measured {what} without its standard deviation"));
+        for KindSlots { kind, values, sigma } in kinds.iter().filter(|own| own.kind.about().own_sigma) {
+            let (name, measured) = (kind.about().name, values.iter().filter(|index| there(index)).count());
+            if measured > 0 && measured < values.len() {
+                return refuse(Reason::Blank, format!("the {name} is incomplete"));
+            }
+            if measured > 0 && !sigma.iter().all(there) {
+                return refuse(Reason::Blank, format!("a measured {name} without its standard deviation"));
             }
         }
         Ok(())
     }
 
     fn plausible(&self, row: &mut Row) -> Result<(), Refusal> {
-        let joints = self.arm.joints();
-        let (point, first) = (Slot::Position(0).index(joints), Slot::Q(0).index(joints));
-        if row.values.get(point..point + 3).is_some_and(|point| point.iter().all(|axis| *axis == 0.0)) {
+        if POINT.iter().all(|axis| row.values.get(self.arm.slots.of(axis).start) == Some(&0.0)) {
             return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
         }
-        let q = row.values.get(first..first + joints).unwrap_or_default();
+        let q = row.values.get(self.arm.slots.q.clone()).unwrap_or_default();
         for (joint, (q, [lower, upper])) in q.iter().zip(&self.arm.limits).enumerate() {
             if *q < lower - SLACK || *q > upper + SLACK {
                 row.beyond = Some(joint);
@@ -268,25 +275,6 @@ impl RowReader<'_> {
         }
         self.last_sequence = Some(value);
         Ok(value)
-    }
-}
-
-/// What a recording may hold, SI; the same as in its schema, so that a single row cannot spoil the table.
-fn range(slot: Slot, arm: &Arm) -> [f64; 2] {
-    match slot {
-        Slot::Time => [f64::MIN, f64::MAX],
-        Slot::Payload => [0.0, 1e4],
-        Slot::Temperature => [-60.0, 200.0],
-        Slot::Position(_) | Slot::Simulated(_) => [-200.0, 200.0],
-        Slot::Sigma(_) => [0.0, 1.0],
-        Slot::Q(joint) if arm.prismatic.get(joint) == Some(&true) => [-200.0, 200.0],
-        Slot::Q(_) => [-20.0, 20.0],
-        Slot::Current(_) => [-1e4, 1e4],
-        Slot::Direction(_) => [-1.0, 1.0],
-        Slot::Turn(_) => [-TURNS, TURNS],
-        Slot::SigmaTurn | Slot::SigmaDistance => [0.0, 1.0],
-        Slot::Distance => [0.0, 200.0],
-        Slot::Velocity(_) => [-100.0, 100.0],
     }
 }
 

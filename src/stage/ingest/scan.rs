@@ -5,14 +5,14 @@
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{Columns, FileLayout, Join};
+use super::layout::{FileLayout, Join};
 use super::motion::{Samples, Track};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
-use super::slot::Slot;
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What is remembered of a point id: 96 bits of its hash (two ids in 10^7 are confused once in 10^14 files) and its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,23 +64,18 @@ pub(super) struct Packed {
     pub slots: Vec<usize>,
     pub values: Vec<f64>,
     pub ids: Vec<String>,
-    pub usage: Vec<String>,
-    pub target: Vec<String>,
-    pub anchor: Vec<String>,
+    /// By [`Slots::texts`](super::slots::Slots::texts); none of those that the file does not have.
+    pub texts: Vec<Option<Vec<String>>>,
 }
 
 impl Packed {
-    fn push(&mut self, row: &Row, columns: &Columns, named: bool) {
+    fn push(&mut self, row: &Row, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
-        for (into, mapped, text) in [
-            (&mut self.ids, named, &row.id),
-            (&mut self.usage, columns.usage.is_some(), &row.usage),
-            (&mut self.target, columns.target.is_some(), &row.target),
-            (&mut self.anchor, columns.anchor.is_some(), &row.anchor),
-        ] {
-            if mapped {
-                into.push(text.clone());
-            }
+        if named {
+            self.ids.push(row.id.clone());
+        }
+        for (into, text) in self.texts.iter_mut().zip(&row.texts) {
+            into.iter_mut().for_each(|texts| texts.push(text.clone()));
         }
     }
 }
@@ -130,7 +125,8 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
     }
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
-    let packed = (joined && index > 0).then(|| Packed { slots: slots.clone(), ..Packed::default() });
+    let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
+    let packed = (joined && index > 0).then(|| Packed { slots: slots.clone(), texts: texts(), ..Packed::default() });
     let mut scan = Scan {
         label,
         lines: 0,
@@ -148,10 +144,10 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
         track: None,
     };
     let mut samples = is_track(settings, layout).then(Samples::default);
-    let keyed = layout.columns.point_id.is_some() && settings.duplicates != super::layout::Duplicates::Keep;
+    let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
-    let named = layout.columns.point_id.is_some() && !matches!(settings.join, Some(Join::Id {}));
+    let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
     let mut pace = Pace::new(context);
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
@@ -164,7 +160,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
                     scan.keys.push(key(row, index, &scan.label)?);
                 }
                 if timed {
-                    let time = row.values.get(Slot::Time.index(arm.joints())).copied().unwrap_or(f64::NAN);
+                    let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
                     scan.times.push((time, narrow(row.number, &scan.label)?));
                 }
                 scan.odd(row, arm);
@@ -178,7 +174,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
             scan.usable.push(judged.is_ok());
         }
         if let Some(packed) = &mut scan.packed {
-            packed.push(row, &layout.columns, named);
+            packed.push(row, named);
         }
         if !reading.record.is_blank(0) {
             scan.last = row.number;
@@ -199,18 +195,17 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
 
 /// Whether velocities, or what they change by, follow from this file's joints over time.
 fn is_track(settings: &Ingest, layout: &FileLayout) -> bool {
-    let timed = layout.columns.time.as_ref().is_some_and(|time| time.column.is_some());
-    let moving = settings.motion.is_some() || settings.files.iter().any(|file| file.columns.velocity.is_some());
+    let timed = layout.columns.number("time").is_some_and(|time| time.column.is_some());
+    let moving = settings.motion.is_some() || settings.files.iter().any(|file| file.columns.has("velocity"));
     let asked = settings.motion.is_some() || matches!(settings.join, Some(Join::Time { .. }));
-    timed && moving && asked && layout.columns.q.is_some()
+    timed && moving && asked && layout.columns.has("q")
 }
 
 fn sample(samples: &mut Samples, row: &Row, layout: &FileLayout, arm: &Arm) {
-    let joints = arm.joints();
-    let all = |slot: fn(usize) -> Slot| row.values.get(slot(0).index(joints)..slot(0).index(joints) + joints).unwrap_or_default();
-    let time = row.values.get(Slot::Time.index(joints)).copied().unwrap_or(f64::NAN);
-    let given = if layout.columns.velocity.is_some() { all(Slot::Velocity) } else { &[] };
-    samples.push(row.number, time, all(Slot::Q), given);
+    let all = |places: &Range<usize>| row.values.get(places.clone()).unwrap_or_default();
+    let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
+    let given = if layout.columns.has("velocity") { all(&arm.slots.velocity) } else { &[] };
+    samples.push(row.number, time, all(&arm.slots.q), given);
 }
 
 fn narrow(number: u64, label: &str) -> Result<u32> {
@@ -232,7 +227,7 @@ fn content(row: &Row) -> u64 {
     for value in &row.values {
         hasher.update(&value.to_bits().to_le_bytes());
     }
-    for text in [&row.usage, &row.target, &row.anchor] {
+    for text in &row.texts {
         hasher.update(&(text.len() as u64).to_le_bytes());
         hasher.update(text.as_bytes());
     }
@@ -245,8 +240,7 @@ fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
 
 impl Scan {
     fn odd(&mut self, row: &Row, arm: &Arm) {
-        let first = Slot::Q(0).index(arm.joints());
-        let q = row.values.get(first..first + arm.joints()).unwrap_or_default();
+        let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
             self.largest = self.largest.max(value.abs());
         }

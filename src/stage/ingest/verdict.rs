@@ -2,11 +2,12 @@
 
 use super::Ingest;
 use super::arm::Arm;
-use super::layout::{Columns, Join, Limits};
+use super::columns::Columns;
+use super::layout::{Join, Limits};
 use super::pair::Fate;
 use super::row::Reason;
 use super::scan::{Count, Scan};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
@@ -58,7 +59,7 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
 }
 
 fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> {
-    let unit = columns.q.as_ref()?.unit.as_deref().unwrap_or("rad");
+    let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
     let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
     if scan.turns.rows * 2 > judged
         && let Some((line, joint, value)) = scan.turns.first
@@ -160,13 +161,13 @@ fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Con
     {
         let [lower, upper] = arm.limits.get(joint).copied().unwrap_or([f64::NAN; 2]);
         context.services.warn(format!(
-            "{}: {} rows have a joint beyond the robot's limits and are used; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
+            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
             scan.label,
-            scan.beyond.rows,
+            counted(scan.beyond.rows, "row"),
             joint + 1
         ));
     }
-    let degrees = columns.q.as_ref().is_some_and(|q| q.unit.as_deref() == Some("deg"));
+    let degrees = columns.joint("q").is_some_and(|q| q.unit.as_deref() == Some("deg"));
     if degrees && scan.largest > 0.0 && scan.largest.to_degrees() < SMALL_IN_DEGREES && scan.used() >= 10 {
         context.services.warn(format!(
             "{}: no joint is ever beyond {:.2} deg; if the file holds rad, say `unit: rad`",

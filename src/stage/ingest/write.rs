@@ -1,16 +1,17 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
 use super::arm::Arm;
-use super::layout::{Columns, FileLayout, Join};
+use super::layout::{FileLayout, Join};
 use super::pair::{Fate, NONE};
 use super::reading::{Pace, Reading};
 use super::row::{Reason, Refusal, Row};
 use super::scan::Scan;
-use super::slot::Slot;
 use super::{Ingest, verdict};
 use crate::error::{Error, Result};
+use crate::observation::{KINDS, Part};
 use crate::stage::{Context, Sink, StreamedTable};
-use crate::table::{Recording, Rejected, RejectedRow, Table};
+use crate::table::{Recording, Rejected, RejectedRow, Table, recording_frame};
+use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
 const CHUNK: usize = 1 << 16;
@@ -117,7 +118,7 @@ impl Decided<'_> {
     }
     /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
     fn moment(&self, file: usize, row: &Row, fate: &Fate) -> Option<f64> {
-        let time = Slot::Time.index(self.arm.joints());
+        let time = self.arm.slots.time;
         let Some(Join::Time { offset_s, .. }) = &self.settings.join else { return None };
         if file == 0 {
             return row.values.get(time).copied();
@@ -129,7 +130,9 @@ impl Decided<'_> {
     }
     /// How much later (s) than its joints the point of a row was measured.
     fn later(&self, moving: usize, row: &Row, fate: &Fate) -> Option<f64> {
-        let point = self.settings.files.iter().position(|file| file.columns.x.is_some() || file.columns.distance.is_some())?;
+        let values = || KINDS.iter().flat_map(|kind| kind.columns(Part::Value));
+        let files = &self.settings.files;
+        let point = files.iter().position(|file| values().any(|column| file.columns.has(column.setting)))?;
         let later = self.moment(point, row, fate)? - self.moment(moving, row, fate)?;
         Some(later).filter(|later| later.is_finite())
     }
@@ -142,7 +145,7 @@ impl Decided<'_> {
         match &self.settings.join {
             Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
             Some(Join::Time { tolerance_s, .. }) => {
-                let time = row.values.get(Slot::Time.index(self.arm.joints())).copied().unwrap_or(f64::NAN);
+                let time = row.values.get(self.arm.slots.time).copied().unwrap_or(f64::NAN);
                 format!("no row of {other} is its partner within {tolerance_s} s of {time} s")
             }
             _ => format!("data row {} of {other} is missing or rejected", row.number),
@@ -150,24 +153,23 @@ impl Decided<'_> {
     }
 }
 
-/// The texts of a row.
-struct Texts<'a> {
-    id: &'a str,
-    usage: &'a str,
-    target: &'a str,
-    anchor: &'a str,
+/// A stored column that some file fills, as far as it is known.
+struct Stored {
+    name: String,
+    unit: Unit,
+    /// Place in the row's numbers.
+    place: usize,
+    values: Vec<f64>,
 }
 
 /// The recording, chunk by chunk.
 struct Chunks<'a> {
     sink: Box<dyn Sink + 'a>,
-    joints: usize,
-    prismatic: Vec<bool>,
-    /// Slots that some file fills: only those become columns.
-    has: Vec<bool>,
-    /// Whether some file names targets, anchors.
-    named: [bool; 2],
-    chunk: Recording,
+    sequence: Vec<i64>,
+    ids: Vec<String>,
+    /// By setting; none where no file has it.
+    texts: Vec<(&'static str, Option<Vec<Option<String>>>)>,
+    numbers: Vec<Stored>,
     merged: Vec<f64>,
     /// The file with the joints.
     moving: usize,
@@ -181,65 +183,50 @@ struct Chunks<'a> {
 
 impl<'a> Chunks<'a> {
     fn new(decided: &Decided, context: &Context<'a>) -> Result<Self> {
-        let joints = decided.arm.joints();
-        let mut has = vec![false; Slot::count(joints)];
+        let slots = &decided.arm.slots;
+        let mut has = vec![false; slots.count];
         for slot in decided.scans.iter().flat_map(|scan| &scan.slots) {
             if let Some(has) = has.get_mut(*slot) {
                 *has = true;
             }
         }
-        let moving = decided.settings.files.iter().position(|file| file.columns.q.is_some()).unwrap_or_default();
         if decided.settings.motion.is_some() {
-            (0..joints).for_each(|joint| has[Slot::Velocity(joint).index(joints)] = true);
+            has[slots.velocity.clone()].fill(true);
         }
-        let sink = context.services.sink(Recording::KIND)?;
-        let names = |mapped: fn(&Columns) -> bool| decided.settings.files.iter().any(|file| mapped(&file.columns));
-        let prismatic = decided.arm.prismatic.clone();
-        let mut chunks = Self {
-            sink,
-            joints,
-            prismatic,
-            has,
-            named: [names(|columns| columns.target.is_some()), names(|columns| columns.anchor.is_some())],
-            chunk: Recording::default(),
+        let files = &decided.settings.files;
+        // Every recording has points and the names of its rows.
+        let always: Vec<&str> =
+            KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value)).map(|column| column.setting).collect();
+        let text = |name: &&'static str| {
+            let named = *name == "usage" || files.iter().any(|file| file.columns.has(name));
+            (*name, named.then(Vec::new))
+        };
+        let mut numbers = Vec::new();
+        for (column, places) in slots.numbers() {
+            for ((name, unit), place) in column.columns(&decided.arm.prismatic).into_iter().zip(places.clone()) {
+                if has[place] || always.contains(&column.setting) {
+                    numbers.push(Stored { name, unit, place, values: Vec::new() });
+                }
+            }
+        }
+        Ok(Self {
+            sink: context.services.sink(Recording::KIND)?,
+            sequence: Vec::new(),
+            ids: Vec::new(),
+            texts: slots.texts().iter().map(text).collect(),
+            numbers,
             merged: Vec::new(),
-            moving,
+            moving: files.iter().position(|file| file.columns.has("q")).unwrap_or_default(),
             carried: 0.0,
             last_sequence: None,
             written: 0,
             before: 0,
-        };
-        chunks.chunk = chunks.empty();
-        Ok(chunks)
-    }
-    fn has(&self, slot: Slot) -> bool {
-        self.has.get(slot.index(self.joints)).copied().unwrap_or(false)
-    }
-    fn empty(&self) -> Recording {
-        Recording {
-            joints: self.joints,
-            prismatic: self.prismatic.clone(),
-            position_sigma: self.has(Slot::Sigma(0)).then(Vec::new),
-            simulated: self.has(Slot::Simulated(0)).then(Vec::new),
-            time: self.has(Slot::Time).then(Vec::new),
-            payload: self.has(Slot::Payload).then(Vec::new),
-            temperature: self.has(Slot::Temperature).then(Vec::new),
-            current: self.has(Slot::Current(0)).then(Vec::new),
-            direction: self.has(Slot::Direction(0)).then(Vec::new),
-            velocity: self.has(Slot::Velocity(0)).then(Vec::new),
-            target: self.named[0].then(Vec::new),
-            rotation: self.has(Slot::Turn(0)).then(Vec::new),
-            rotation_sigma: self.has(Slot::SigmaTurn).then(Vec::new),
-            distance: self.has(Slot::Distance).then(Vec::new),
-            distance_sigma: self.has(Slot::SigmaDistance).then(Vec::new),
-            anchor: self.named[1].then(Vec::new),
-            ..Recording::default()
-        }
+        })
     }
     fn push(&mut self, row: &Row, index: usize, fate: &Fate, decided: &Decided) -> Result<()> {
         let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
-        let mut texts = Texts { id: &row.id, usage: &row.usage, target: &row.target, anchor: &row.anchor };
+        let (mut id, mut texts) = (&row.id, row.texts.iter().collect::<Vec<&String>>());
         for (partner, scan) in fate.partners.iter().zip(decided.scans.iter().skip(1)) {
             let number = partner.get((row.number - 1) as usize).and_then(|number| number.checked_sub(1));
             let Some((at, packed)) = number.map(|number| number as usize).zip(scan.packed.as_ref()) else { continue };
@@ -251,15 +238,9 @@ impl<'a> Chunks<'a> {
                     *merged = *value;
                 }
             }
-            if let Some(id) = packed.ids.get(at) {
-                texts.id = id;
-            }
-            for (own, other) in
-                [(&mut texts.usage, &packed.usage), (&mut texts.target, &packed.target), (&mut texts.anchor, &packed.anchor)]
-            {
-                if let Some(text) = other.get(at) {
-                    *own = text;
-                }
+            id = packed.ids.get(at).unwrap_or(id);
+            for (own, other) in texts.iter_mut().zip(&packed.texts) {
+                *own = other.as_ref().and_then(|other| other.get(at)).unwrap_or(own);
             }
         }
         self.carry(decided, index, row, fate);
@@ -272,50 +253,26 @@ impl<'a> Chunks<'a> {
             let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
             return Err(Error::data(format!("{label}:{}", row.line), message));
         }
-        let id = if texts.id.is_empty() { format!("row {number}") } else { texts.id.to_string() };
-        self.store(sequence, id, &texts);
-        if self.chunk.rows() >= CHUNK {
+        self.sequence.push(sequence);
+        self.ids.push(if id.is_empty() { format!("row {number}") } else { id.clone() });
+        for ((_, into), text) in self.texts.iter_mut().zip(texts) {
+            into.iter_mut().for_each(|texts| texts.push((!text.is_empty()).then(|| text.clone())));
+        }
+        self.numbers.iter_mut().for_each(|stored| stored.values.push(self.merged[stored.place]));
+        self.written += 1;
+        if self.sequence.len() >= CHUNK {
             self.flush()?;
         }
         Ok(())
     }
-    fn store(&mut self, sequence: i64, id: String, texts: &Texts) {
-        let named = |text: &str| (!text.is_empty()).then(|| text.to_string());
-        let joints = self.joints;
-        let (values, chunk) = (&self.merged, &mut self.chunk);
-        let one = |slot: Slot| values[slot.index(joints)];
-        let axes = |slot: fn(usize) -> Slot| [one(slot(0)), one(slot(1)), one(slot(2))];
-        let all = |slot: fn(usize) -> Slot| (0..joints).map(move |joint| values[slot(joint).index(joints)]);
-        chunk.sequence.push(sequence);
-        chunk.point_id.push(id);
-        chunk.usage.push(named(texts.usage));
-        chunk.q.extend(all(Slot::Q));
-        chunk.position.push(axes(Slot::Position));
-        chunk.position_sigma.iter_mut().for_each(|column| column.push(axes(Slot::Sigma)));
-        chunk.simulated.iter_mut().for_each(|column| column.push(axes(Slot::Simulated)));
-        chunk.time.iter_mut().for_each(|column| column.push(one(Slot::Time)));
-        chunk.payload.iter_mut().for_each(|column| column.push(one(Slot::Payload)));
-        chunk.temperature.iter_mut().for_each(|column| column.push(one(Slot::Temperature)));
-        chunk.current.iter_mut().for_each(|column| column.extend(all(Slot::Current)));
-        chunk.direction.iter_mut().for_each(|column| column.extend(all(Slot::Direction)));
-        chunk.velocity.iter_mut().for_each(|column| column.extend(all(Slot::Velocity)));
-        chunk.target.iter_mut().for_each(|column| column.push(named(texts.target)));
-        chunk.anchor.iter_mut().for_each(|column| column.push(named(texts.anchor)));
-        chunk.rotation.iter_mut().for_each(|column| column.push(axes(Slot::Turn)));
-        chunk.rotation_sigma.iter_mut().for_each(|column| column.push(one(Slot::SigmaTurn)));
-        chunk.distance.iter_mut().for_each(|column| column.push(one(Slot::Distance)));
-        chunk.distance_sigma.iter_mut().for_each(|column| column.push(one(Slot::SigmaDistance)));
-        self.written += 1;
-    }
     /// Velocities that follow from the joints over time; with a join by time joints and velocities at the moment of the point.
     fn carry(&mut self, decided: &Decided, index: usize, row: &Row, fate: &Fate) {
-        let joints = self.joints;
+        let slots = &decided.arm.slots;
         // Of files that continue each other each has its own joints.
         let moving = if fate.partners.is_empty() { index } else { self.moving };
         let track = decided.scans.get(moving).and_then(|scan| scan.track.as_ref()).zip(decided.number(moving, index, row, fate));
-        let rates = Slot::Velocity(0).index(joints);
         if let (Some((track, number)), Some(_)) = (track, &decided.settings.motion)
-            && let Some(velocity) = self.merged.get_mut(rates..rates + joints)
+            && let Some(velocity) = self.merged.get_mut(slots.velocity.clone())
         {
             track.fill(number, velocity);
         }
@@ -325,8 +282,7 @@ impl<'a> Chunks<'a> {
         if later == 0.0 {
             return;
         }
-        for joint in 0..joints {
-            let (q, rate) = (Slot::Q(joint).index(joints), Slot::Velocity(joint).index(joints));
+        for (joint, (q, rate)) in slots.q.clone().zip(slots.velocity.clone()).enumerate() {
             let velocity = self.merged[rate];
             let acceleration = track.map_or(0.0, |(track, number)| track.acceleration(number, joint));
             if velocity.is_finite() {
@@ -337,12 +293,14 @@ impl<'a> Chunks<'a> {
         }
     }
     fn flush(&mut self) -> Result<()> {
-        let empty = self.empty();
-        let full = std::mem::replace(&mut self.chunk, empty);
-        self.sink.push(full.to_frame()?)
+        let texts = self.texts.iter_mut().filter_map(|(name, texts)| Some((*name, std::mem::take(texts.as_mut()?))));
+        let numbers = self.numbers.iter().map(|Stored { name, unit, values, .. }| (name.clone(), *unit, values.iter()));
+        let frame = recording_frame(std::mem::take(&mut self.sequence), std::mem::take(&mut self.ids), texts, numbers)?;
+        self.numbers.iter_mut().for_each(|stored| stored.values.clear());
+        self.sink.push(frame)
     }
     fn finish(mut self, context: &Context) -> Result<StreamedTable<Recording>> {
-        if self.chunk.rows() > 0 {
+        if !self.sequence.is_empty() {
             self.flush()?;
         }
         if self.carried > 0.0 {

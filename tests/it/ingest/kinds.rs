@@ -36,8 +36,8 @@ fn all_conventions_of_orientation_are_one_rotation() {
         let yaml = with(&format!("      orientation: {orientation}\n{lines}"));
         let desk = Desk::default().with("a.csv", format!("q1,q2,a,b,c,d\n1,2,{cells}\n"));
         let taken = take(&desk, &yaml, robot("rr", 1.0)).unwrap();
-        assert!((taken.recording.rotation_sigma.unwrap()[0] - 20.0 / 206_264.806).abs() < 1e-12);
-        Vector3::from(taken.recording.rotation.unwrap()[0])
+        assert!((taken.recording.readings["sigma_orientation"][0] - 20.0 / 206_264.806).abs() < 1e-12);
+        Vector3::from_column_slice(&taken.recording.readings["orientation"])
     };
     let rpy = by("{rpy: [a, b, c], unit: deg}", "30,-20,100,");
     let own = Rotation3::new(rpy) * Vector3::new(1.0, 0.0, 0.0);
@@ -60,8 +60,8 @@ fn distances_need_no_point_and_half_an_orientation_is_refused() {
         "      distance: {column: l, unit: mm}\n      sigma_distance: {value: 0.05, unit: mm}\n      anchor: {column: box}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,l,box\n1,2,1500,N\n3,4,1400.5,S\n");
     let taken = take(&desk, &with(distance), robot("rr", 1.0)).unwrap();
-    assert_eq!(taken.recording.distance, Some(vec![1.5, 1.4005]));
-    assert_eq!(taken.recording.anchor, Some(vec![Some("N".into()), Some("S".into())]));
+    assert_eq!(taken.recording.readings["distance"], [1.5, 1.4005]);
+    assert_eq!(taken.recording.names["anchor"], [Some("N".to_string()), Some("S".into())]);
     assert!(taken.recording.position.iter().flatten().all(|axis| axis.is_nan()));
     let turn = "      orientation: {quaternion: [a, b, c, d], optional: true}\n      sigma_orientation: {value: 1, unit: mrad}\n";
     let desk = Desk::default().with("a.csv", "q1,q2,a,b,c,d\n1,2,1,0,0,\n3,4,1,0,0,0.2\n");
@@ -83,4 +83,17 @@ fn what_belongs_together_is_asked_for_together() {
     assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
     let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
     assert!(anchor.contains("an anchor is the end of a `distance`"), "{anchor}");
+}
+
+#[test]
+fn both_angles_of_a_level_arrive_and_one_alone_is_refused() {
+    let columns = "      tilt_x: {column: a, unit: mrad, optional: true}\n      tilt_y: {column: b, unit: mrad, optional: true}\n      sigma_tilt: {value: 20, unit: arcsec}\n";
+    let desk = Desk::default().with("a.csv", "q1,q2,a,b\n1,2,-12.5,300\n3,4,7,\n5,6,0,1\n7,8,1,2\n");
+    let taken = take(&desk, &with(columns), robot("rr", 1.0)).unwrap();
+    assert_eq!(taken.recording.readings["tilt_x"], [-0.0125, 0.0, 0.001]);
+    assert_eq!(taken.recording.readings["tilt_y"], [0.3, 0.001, 0.002]);
+    assert_eq!(taken.rejected.0[0].detail, "the inclination is incomplete");
+    let alone =
+        settings(&with("      tilt_x: {column: a, unit: mrad}\n")).check().iter().map(ToString::to_string).collect::<String>();
+    assert!(alone.contains("map all of tilt_x, tilt_y, or none"), "{alone}");
 }

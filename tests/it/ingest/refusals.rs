@@ -20,7 +20,7 @@ fn a_missing_column_is_named_with_those_that_are_there() {
 fn a_file_that_is_none_says_what_it_is() {
     assert_eq!(with("", TWO), "a.csv: is empty; allowed: a header and at least one data row");
     assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row; allowed: at least one");
-    assert_eq!(with("\n\n", TWO), "a.csv: has no header: its 2 lines are empty, comments or skipped");
+    assert_eq!(with("\n\n", TWO), "a.csv: has no header: 2 lines, all empty, comments or skipped");
     let utf16 = Desk::default().with("a.csv", [0xff, 0xfe, b'i', 0]);
     assert_eq!(
         refusal(&utf16, TWO, robot("rr", 1.0)),
@@ -47,7 +47,7 @@ fn another_number_of_joints_is_an_error_of_the_file() {
     let more = refusal(&desk(), TWO, robot("rrr", 1.0));
     assert!(more.starts_with("a.csv:1: `q` has 2 of its columns; the robot has 3 joints\na.csv:1: no column `q3`"), "{more}");
     let fewer = refusal(&desk(), TWO, robot("r", 1.0));
-    assert!(fewer.starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joints only"), "{fewer}");
+    assert!(fewer.starts_with("a.csv:1: column `q2`, by the pattern of `q`: the robot has 1 joint only"), "{fewer}");
     let listed = refusal(&desk(), &TWO.replace("column: \"q{j}\"", "columns: [q1, q2]"), robot("rrr", 1.0));
     assert!(listed.starts_with("a.csv:1: `q` lists 2 columns; the robot has 3 joints"), "{listed}");
     let linear = refusal(&desk(), TWO, robot("pr", 1.0));

@@ -14,7 +14,7 @@ fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
     let text = format!("{}B,190,20,1,2,3\n", good(3));
     let desk = rows(&text);
     assert_eq!(take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(), 4);
-    let warning = "a.csv: 1 rows have a joint beyond the robot's limits and are used; first line 5, joint 1 at 3.3161 \
+    let warning = "a.csv: 1 row with a joint beyond the robot's limits, used all the same; first line 5, joint 1 at 3.3161 \
                    (limits -3.1416 to 3.1416, rad or m)";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
     let rejecting = take(&rows(&text), &format!("{TWO}limits: reject\n"), robot("rr", 1.0)).unwrap();

@@ -1,0 +1,182 @@
+//! A row whose arm was placed: where its target is, and how that moves with every parameter of the stack.
+//!
+//! The buffers of an evaluation are in [`Scratch`]; what follows from them is asked of [`PlacedRow`], which holds them.
+
+use super::{Deflection, Direction};
+use crate::robot::{LoadCorrection, Posture, RobotModel, Travel};
+use crate::spatial::{Pose, Twist, hat, left_jacobian};
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
+
+/// Buffers of one evaluation, made once per thread.
+pub struct Scratch {
+    pub(super) deflection: Deflection,
+    /// Commanded travel of each joint.
+    pub(super) commanded: Vec<Travel>,
+    pub(super) load_correction: LoadCorrection,
+    pub(super) posture: Posture,
+    pub(super) stations: Vec<Station>,
+    /// Frame in front of E_k.
+    pub(super) before: Vec<Pose>,
+    /// Velocity of the point by the twist of E_k.
+    pub(super) by_station: Vec<Matrix3x6<f64>>,
+    /// Velocity of the point by the travel of joint k.
+    pub(super) by_joint: Vec<Vector3<f64>>,
+    /// The row's target.
+    pub(super) target: Option<usize>,
+    /// Whether `commanded` is near the next row's joints.
+    pub(super) near: bool,
+    /// Travel of each joint and twist at each station by the constant effects, where only points are wanted, all of the same parameters.
+    pub(super) constant: Option<(Vec<f64>, Vec<Twist>)>,
+}
+
+impl Scratch {
+    pub(super) fn new(joints: usize) -> Self {
+        Self {
+            deflection: Deflection::new(joints),
+            commanded: vec![Travel::default(); joints],
+            load_correction: LoadCorrection::new(joints),
+            posture: Posture::new(joints),
+            stations: vec![Station::of(&Twist::zeros()); joints + 1],
+            before: vec![Pose::identity(); joints + 1],
+            by_station: vec![Matrix3x6::zeros(); joints + 1],
+            by_joint: vec![Vector3::zeros(); joints],
+            target: None,
+            near: false,
+            constant: None,
+        }
+    }
+
+    /// Partials are wanted again.
+    pub(crate) fn points_and_partials(&mut self) {
+        self.deflection.bare = false;
+        self.constant = None;
+    }
+
+    /// Whether the next row's joints are near those placed last; their sines then follow by addition theorems.
+    pub(crate) fn near(&mut self, near: bool) {
+        self.near = near;
+    }
+}
+
+/// What follows from a station's summed twist. Kept until the twist changes: most are the same in every row.
+#[derive(Clone)]
+pub(super) struct Station {
+    pub twist: Twist,
+    /// Whether nothing moves here: most stations of most models.
+    pub still: bool,
+    pub motion: Pose,
+    jacobian: Matrix6<f64>,
+}
+
+impl Station {
+    pub fn of(twist: &Twist) -> Self {
+        Self { twist: *twist, still: *twist == Twist::zeros(), motion: Pose::exp(twist), jacobian: left_jacobian(twist) }
+    }
+}
+
+/// A row's arm and target, tracker frame, under the parameters that it was placed with.
+///
+/// Derivatives come through `emit(parameter, derivative)`. A parameter may be emitted more than once; derivatives of one parameter
+/// add up. Torques are treated as constant: their change with the parameters is of second order.
+pub struct PlacedRow<'a> {
+    pub(super) robot: &'a RobotModel,
+    pub(super) scratch: &'a mut Scratch,
+    /// The target's point, m.
+    pub point: Vector3<f64>,
+}
+
+impl PlacedRow<'_> {
+    /// The target's orientation.
+    pub fn orientation(&self) -> Matrix3<f64> {
+        self.scratch.posture.behind[self.robot.joints()].rotation * self.robot.seat(self.scratch.target).rotation
+    }
+
+    /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
+    pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
+        let gauging = self.robot.gauging();
+        let anchor = gauging.anchors.get(gauging.anchor(anchor)?)?;
+        Some(self.point - anchor.place - self.scratch.deflection.anchor)
+    }
+
+    /// The tool frame, and the velocity (v; w) of its origin by each joint.
+    pub(crate) fn tool(&self, velocities: &mut [Twist]) -> Pose {
+        let behind = &self.scratch.posture.behind;
+        let tool = behind[self.robot.joints()] * *self.robot.home();
+        for (joint, velocity) in velocities.iter_mut().enumerate() {
+            *velocity = self.robot.velocity(joint, &behind[joint], &tool.translation);
+        }
+        tool
+    }
+
+    /// Derivatives of the point, m.
+    pub fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+        self.scratch.velocities(self.robot, &self.point);
+        let Scratch { deflection, by_station, by_joint, .. } = &*self.scratch;
+        for (parameter, direction) in &deflection.partials {
+            emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
+        }
+    }
+
+    /// Derivatives of the orientation as small rotations about the tracker's axes, rad.
+    pub fn rotations(&self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+        let Scratch { deflection, posture, stations, before, .. } = &*self.scratch;
+        let joint = |joint: usize| {
+            if self.robot.is_revolute(joint) { posture.behind[joint].rotation * self.robot.axis(joint) } else { Vector3::zeros() }
+        };
+        for (parameter, direction) in &deflection.partials {
+            let rotation = match direction {
+                Direction::Joint(k, rate) => joint(*k) * *rate,
+                Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
+                Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
+                Direction::Anchor(_) => continue,
+            };
+            emit(*parameter, rotation);
+        }
+    }
+
+    /// Derivatives of the vector from the row's anchor to the point, m.
+    pub fn partials_from_anchor(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+        self.scratch.velocities(self.robot, &self.point);
+        let Scratch { deflection, by_station, by_joint, .. } = &*self.scratch;
+        for (parameter, direction) in &deflection.partials {
+            let velocity = match direction {
+                Direction::Anchor(rate) => -rate,
+                other => along(other, by_joint, by_station, &deflection.compliance),
+            };
+            emit(*parameter, velocity);
+        }
+    }
+}
+
+impl Scratch {
+    /// How the point moves with every joint and station.
+    pub(super) fn velocities(&mut self, robot: &RobotModel, point: &Vector3<f64>) {
+        let Self { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = self;
+        for ((velocity, frame), station) in by_station.iter_mut().zip(&*before).zip(&*stations) {
+            // Of a twist (v; w) in the frame: R v + R w x arm.
+            let mut spatial = Matrix3x6::zeros();
+            spatial.fixed_view_mut::<3, 3>(0, 0).copy_from(&frame.rotation);
+            spatial.fixed_view_mut::<3, 3>(0, 3).copy_from(&(hat(&(frame.translation - point)) * frame.rotation));
+            *velocity = spatial * station.jacobian;
+        }
+        for (joint, velocity) in by_joint.iter_mut().enumerate() {
+            let axis = behind[joint].rotation * robot.axis(joint);
+            *velocity =
+                if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
+        }
+    }
+}
+
+pub(super) fn along(
+    direction: &Direction,
+    by_joint: &[Vector3<f64>],
+    by_station: &[Matrix3x6<f64>],
+    yielding: &[f64],
+) -> Vector3<f64> {
+    match direction {
+        Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
+        Direction::Station(station, rate) => by_station[*station] * rate,
+        Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
+        Direction::Anchor(_) => Vector3::zeros(),
+    }
+}

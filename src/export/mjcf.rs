@@ -1,0 +1,91 @@
+//! MJCF, MuJoCo's own format: every body's frame parallel to the base at the zero pose and on its joint's axis, so that no angle is
+//! converted and a joint at 0 is the robot at 0. The measured point is a site.
+
+use super::model::{PLACEHOLDER, placeholder_inertia};
+use super::xml::{self, Xml, empty, numbers, offset};
+use super::{Export, Format};
+use crate::error::{Result, one_line};
+use crate::robot::description::{JointDescription, JointKind, RobotDescription};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use std::io;
+
+/// Mass, kg, and inertia, kg m2, that no body has less of: MuJoCo refuses moving bodies without.
+const LEAST: [(&str, &str); 2] = [("boundmass", "0.001"), ("boundinertia", "1e-6")];
+
+pub(super) struct Mjcf;
+
+impl Format for Mjcf {
+    fn name(&self) -> &'static str {
+        "mjcf"
+    }
+
+    fn help(&self) -> &'static str {
+        "MuJoCo model: bodies and joints at the corrected axes, the tool as a site"
+    }
+
+    fn text(&self, export: &Export) -> Result<String> {
+        let robot = &export.corrected;
+        let mut remarks = export.remarks();
+        if !robot.couplings.is_empty() {
+            remarks.push("couplings of joints are not part of it: they stand in the original robot file".into());
+        }
+        if robot.joints.iter().any(|joint| inertial(joint).is_none()) {
+            remarks.push(format!("bodies whose mass is not known have {} kg", LEAST[0].1));
+        }
+        let name = one_line(&robot.name);
+        xml::document(&remarks, |xml| {
+            xml.create_element("mujoco").with_attribute(("model", name.as_str())).write_inner_content(|xml| {
+                empty(xml, "compiler", &[&[("angle", "radian")][..], &LEAST].concat())?;
+                empty(xml, "option", &[("gravity", &numbers(robot.gravity))])?;
+                xml.create_element("worldbody").write_inner_content(|xml| {
+                    let base = xml.create_element("body").with_attribute(("name", "base_link"));
+                    base.write_inner_content(|xml| beyond(xml, robot, 0)).map(drop)
+                })?;
+                Ok(())
+            })?;
+            Ok(())
+        })
+    }
+}
+
+/// What hangs on the body before joint `index` (from 0): the next body with all behind it, at last the tool.
+fn beyond(xml: &mut Xml, robot: &RobotDescription, index: usize) -> io::Result<()> {
+    let before = index.checked_sub(1).map_or([0.0; 3], |before| robot.joints[before].point);
+    let Some(joint) = robot.joints.get(index) else {
+        let r = &robot.tool_rotation;
+        let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, k| r[i][k]));
+        let turn = UnitQuaternion::from_rotation_matrix(&rotation);
+        let quaternion = numbers([turn.w, turn.i, turn.j, turn.k]);
+        return empty(xml, "site", &[("name", "tool0"), ("pos", &offset(robot.tool, before)), ("quat", &quaternion)]);
+    };
+    let (name, place) = (format!("link_{}", index + 1), offset(joint.point, before));
+    let body = xml.create_element("body").with_attributes([("name", name.as_str()), ("pos", place.as_str())]);
+    body.write_inner_content(|xml| {
+        if let Some((mass, centre)) = inertial(joint) {
+            let inertia = numbers([placeholder_inertia(mass); 3]);
+            xml::comment(xml, PLACEHOLDER)?;
+            let parts = [("pos", offset(centre, joint.point)), ("mass", numbers([mass])), ("diaginertia", inertia)];
+            empty(xml, "inertial", &parts.each_ref().map(|(name, value)| (*name, value.as_str())))?;
+        }
+        hinge(xml, joint)?;
+        beyond(xml, robot, index + 1)
+    })?;
+    Ok(())
+}
+
+/// Mass and its centre, where both are known.
+fn inertial(joint: &JointDescription) -> Option<(f64, [f64; 3])> {
+    joint.mass.filter(|mass| *mass > 0.0).zip(joint.centre)
+}
+
+fn hinge(xml: &mut Xml, joint: &JointDescription) -> io::Result<()> {
+    let (name, axis) = (one_line(&joint.name), numbers(joint.axis));
+    let kind = if joint.kind == JointKind::Revolute { "hinge" } else { "slide" };
+    let mut attributes = vec![("name", name.as_str()), ("type", kind), ("pos", "0 0 0"), ("axis", &axis)];
+    let range = joint.limits.map(numbers);
+    match &range {
+        Some(range) => attributes.extend([("limited", "true"), ("range", range)]),
+        None => attributes.push(("limited", "false")),
+    }
+    empty(xml, "joint", &attributes)
+}

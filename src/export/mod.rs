@@ -1,0 +1,25 @@
+//! The identified model for other programs, one file per format. A format carries rigid geometry or less: what it leaves out stands in it.
+
+mod controller;
+mod dh;
+mod json;
+mod mjcf;
+mod model;
+mod urdf;
+mod xml;
+
+pub use model::Export;
+
+use crate::error::Result;
+
+/// A way to write the model down.
+pub trait Format: Sync {
+    /// What `--format` calls it.
+    fn name(&self) -> &'static str;
+    /// What it is, in one line.
+    fn help(&self) -> &'static str;
+    fn text(&self, export: &Export) -> Result<String>;
+}
+
+/// All formats, in the order of the help.
+pub const FORMATS: &[&dyn Format] = &[&urdf::Urdf, &dh::Dh, &dh::Mdh, &json::Json, &mjcf::Mjcf, &controller::Controller];

@@ -1,0 +1,68 @@
+//! What is exported: the corrected geometry, and how well it stands for the whole model.
+
+use crate::compensate::{LeftOut, distance, left_out, rigid};
+use crate::error::one_line;
+use crate::estimate::choose::spread;
+use crate::identified::Identified;
+use crate::robot::description::RobotDescription;
+
+/// Poses over which geometry and model are compared where no recording is at hand.
+const POSES: usize = 500;
+
+/// The model that is exported.
+pub struct Export {
+    pub(super) identified: Identified,
+    pub(super) corrected: RobotDescription,
+    pub(super) left_out: Vec<LeftOut>,
+    /// Rms and maximum distance of the corrected description from the model, m, and over how many poses.
+    pub(super) residual: (f64, f64),
+    pub(super) poses: usize,
+    /// Whether these are the recorded ones.
+    recorded: bool,
+}
+
+impl Export {
+    pub fn of(identified: Identified) -> Self {
+        let recording = identified.data.as_ref().filter(|data| data.rows() > 0);
+        let recorded = recording.is_some();
+        let data = recording.cloned().unwrap_or_else(|| spread(&identified.model.robot, POSES));
+        let corrected = rigid(&identified.model);
+        Self {
+            left_out: left_out(&identified.model, &data),
+            residual: distance(&identified.model, &corrected, &data),
+            corrected,
+            poses: data.rows(),
+            recorded,
+            identified,
+        }
+    }
+
+    /// What the reader of an export must know, a sentence a line.
+    pub fn remarks(&self) -> Vec<String> {
+        let which = if self.recorded { "recorded poses" } else { "poses spread over the joint limits" };
+        let mut lines = vec![
+            format!("corrected geometry of {}, {}", one_line(&self.corrected.name), self.identified.origin),
+            format!(
+                "rigid geometry alone stands {:.4} mm rms, {:.4} mm at most from the identified model over {} {which}",
+                self.residual.0 * 1e3,
+                self.residual.1 * 1e3,
+                self.poses
+            ),
+        ];
+        for LeftOut { effect, place, rms, most } in &self.left_out {
+            lines.push(format!("not carried: {effect} at {place}, {:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
+        }
+        if self.identified.correction.is_some() {
+            lines.push("not carried: the learned correction".into());
+        }
+        lines
+    }
+}
+
+/// What is to be said of [`placeholder_inertia`].
+pub(super) const PLACEHOLDER: &str = "the inertia is a placeholder: recordings at rest do not show it";
+
+/// The inertia of a ball of 0.1 m, kg m2.
+pub(super) fn placeholder_inertia(mass: f64) -> f64 {
+    0.4 * mass * 0.01
+}

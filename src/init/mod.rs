@@ -1,0 +1,72 @@
+//! What a folder of files is, and the pipeline that reads it: columns by their names and values, how files belong together, and a robot
+//! file to start from. All of it is a proposal; lines to look at are marked CHECK, numbers to fill in REPLACE.
+
+mod columns;
+mod marks;
+mod names;
+mod pipeline;
+mod points;
+mod robots;
+mod sheet;
+mod together;
+mod words;
+
+pub use marks::marked;
+pub use robots::{KINDS, Kind};
+
+use crate::error::{Error, Result, counted};
+use columns::Found;
+use pipeline::missing;
+use std::path::{Path, PathBuf};
+
+/// What is there and what is wanted.
+pub struct Request<'a> {
+    /// The folder of robot.yaml and pipeline.yaml.
+    pub folder: &'a Path,
+    /// Recordings: one file, or the controller's and the tracker's.
+    pub data: &'a [PathBuf],
+    pub robot: Kind,
+    /// The robot instead, and its last link.
+    pub urdf: Option<&'a Path>,
+    pub tip: &'a str,
+}
+
+/// Files to start from.
+pub struct Start {
+    pub robot: String,
+    pub pipeline: String,
+    /// What was found in each recording.
+    pub accounts: Vec<String>,
+    /// What no recording has.
+    pub missing: Vec<&'static str>,
+}
+
+/// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
+pub fn start(request: &Request) -> Result<Start> {
+    let mut found = request.data.iter().map(|path| Found::read(path)).collect::<Result<Vec<Found>>>()?;
+    let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
+    let robot = match request.urdf {
+        Some(_) => robots::of_urdf(request.tip),
+        None => {
+            let own = request.robot.joints();
+            if let Some(n) = joints.filter(|n| *n != own) {
+                let (name, own) = (request.robot.name(), counted(own, "joint"));
+                return Err(Error::spec("--robot", format!("{name} has {own}, the recording {n}; choose another kind")));
+            }
+            request.robot.text()
+        }
+    };
+    let joined = together::join(&mut found);
+    let pipeline = pipeline::text(request, &found, &joined);
+    let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
+    Ok(Start {
+        robot,
+        pipeline,
+        accounts: found.iter().map(Found::account).collect(),
+        missing: if found.is_empty() {
+            Vec::new()
+        } else {
+            unknown.filter(|(_, missing)| *missing).map(|(what, _)| what).collect()
+        },
+    })
+}

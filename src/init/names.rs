@@ -1,0 +1,212 @@
+//! What the name of a column says: words, a unit, the number of a joint, an axis of a point.
+
+use super::words;
+use crate::units::{Header, Unit};
+
+/// A column's name taken apart.
+#[derive(Debug, Clone)]
+pub(super) struct Name {
+    /// In small letters, without the unit.
+    pub words: Vec<String>,
+    /// Symbol of the unit that the name ends in.
+    pub unit: Option<&'static str>,
+    /// The unit as it stands there, where no bracket says that it is one: the `a` of `x_a`.
+    ending: Option<String>,
+}
+
+impl Name {
+    pub fn of(text: &str) -> Self {
+        let lower = text.trim().to_lowercase();
+        let Header { stem, unit, ending } = Header::of(&lower);
+        let words = stem.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_string).collect();
+        Self { words, unit: unit.map(Unit::symbol), ending: ending.map(str::to_string) }
+    }
+
+    pub fn stem(&self) -> String {
+        self.words.join("_")
+    }
+
+    /// The unit, if it is one of these.
+    pub fn unit_of(&self, allowed: &[&str]) -> Option<&'static str> {
+        self.unit.filter(|unit| allowed.contains(unit))
+    }
+
+    /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
+    pub fn is(&self, listed: &[&str]) -> bool {
+        let listed = |text: &str| listed.contains(&text);
+        // A letter alone says little beside other words: `x_t` is no time.
+        let mut ends = [self.words.first(), self.words.last()].into_iter().flatten().filter(|word| word.len() > 1);
+        listed(&self.stem()) || ends.any(|word| listed(word))
+    }
+
+    /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
+    pub fn joint(&self) -> Option<(String, usize)> {
+        let at = self.words.iter().rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
+        let stem = self.words[at].trim_end_matches(|c: char| c.is_ascii_digit());
+        let number = self.words[at][stem.len()..].parse().ok()?;
+        let before = self.words[..at].iter().map(String::as_str);
+        let after = self.words[at + 1..].iter().map(String::as_str);
+        let place = format!("{stem}#");
+        Some((before.chain([place.as_str()]).chain(after).collect::<Vec<_>>().join("_").replace("_#", "#"), number))
+    }
+
+    /// The axis (0 to 2) that this is the coordinate of, and what else the name says: `x_ist`, `Goal X`, `dx`, `Xsoll`.
+    pub fn axis(&self) -> Option<(usize, Vec<String>)> {
+        let (at, (axis, more)) = self.words.iter().enumerate().find_map(|(at, word)| Some((at, axis(word)?)))?;
+        let rest = self.words.iter().enumerate().filter(|(k, _)| *k != at).map(|(_, word)| word.clone());
+        let lengthless = self.unit.is_some() && self.unit_of(&LENGTHS).is_none();
+        // No length, so that a single letter behind the name is a word: the point A of `x_a`.
+        let ending = self.ending.clone().filter(|ending| lengthless && ending.len() == 1);
+        if lengthless && ending.is_none() {
+            return None;
+        }
+        Some((axis, rest.chain((!more.is_empty()).then(|| more.to_string())).chain(ending).collect()))
+    }
+}
+
+/// Units of a coordinate.
+pub(super) const LENGTHS: [&str; 4] = ["mm", "m", "um", "in"];
+
+/// The axis that a word names, and what it says besides: `x`, `dx`, `xist`, `x2`.
+fn axis(word: &str) -> Option<(usize, &str)> {
+    let known = |more: &str| {
+        let listed =
+            [&words::MEASURED[..], &words::WANTED, &words::DIFFERENCE, &words::SIGMA, &["pos", "p", "coord", "tcp", "t"]];
+        more.is_empty() || more.bytes().all(|byte| byte.is_ascii_digit()) || listed.iter().any(|list| list.contains(&more))
+    };
+    let named = ["x", "y", "z"].iter().enumerate().find_map(|(axis, letter)| {
+        let more = [word.strip_prefix(letter), word.strip_suffix(letter)].into_iter().flatten().find(|more| known(more))?;
+        Some((axis, more))
+    });
+    named.filter(|(_, more)| more.len() < word.len())
+}
+
+/// Rows of columns that may be the joints, best first: those of usual names, else the longest of four or more that `angle` takes for angles.
+pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+    let mut found: Vec<Vec<usize>> = words::NAMED_JOINTS.iter().filter_map(|listed| named(names, listed)).collect();
+    // The letters of a Yaskawa with seven axes hold those of one with six.
+    found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
+    found.truncate(1);
+    let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
+    let mut keys: Vec<&String> = parts.iter().flatten().map(|(key, _)| key).collect();
+    keys.sort();
+    keys.dedup();
+    let run = |key: &str| -> Vec<usize> {
+        let column = |n: usize| parts.iter().position(|part| part.as_ref().is_some_and(|(name, k)| name == key && *k == n));
+        let first = usize::from(column(0).is_none());
+        (first..).map_while(column).collect()
+    };
+    let runs: Vec<(&str, Vec<usize>)> = keys.iter().map(|key| (key.as_str(), run(key))).collect();
+    let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
+    for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
+        if let Some(rank) = usual_name(key) {
+            usual.push((rank, columns[0], columns.clone()));
+        }
+    }
+    // The longest first; of equal ones those with the plainest name.
+    usual.sort_by_key(|(rank, first, columns)| (std::cmp::Reverse(columns.len()), *rank, *first));
+    found.extend(usual.into_iter().map(|(_, _, columns)| columns));
+    if found.is_empty() {
+        let foreign = runs.into_iter().filter(|(key, columns)| {
+            let other = key.split(['_', '#']).any(|word| words::NO_JOINTS.contains(&word));
+            columns.len() >= 4 && !other && columns.iter().all(|column| angle(*column))
+        });
+        found.extend(foreign.map(|(_, columns)| columns));
+        found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
+    }
+    let longest = found.first().map_or(0, Vec::len);
+    found.retain(|columns| columns.len() == longest);
+    found
+}
+
+/// Columns of joints that have names instead of numbers, in the order of the arm.
+fn named(names: &[Name], listed: &[&str]) -> Option<Vec<usize>> {
+    let letters = listed.iter().all(|name| name.len() == 1);
+    let column = |wanted: &&str| {
+        names.iter().position(|name| {
+            let stem = name.stem();
+            if letters { stem == *wanted } else { stem.contains(wanted) }
+        })
+    };
+    listed.iter().map(column).collect()
+}
+
+/// How plain a usual name of joints is: 0 for the name and number alone, 1 with `ist` or the like, 2 with `soll` or the like.
+fn usual_name(key: &str) -> Option<usize> {
+    const SAID: [&str; 8] = ["pos", "position", "angle", "ang", "winkel", "value", "deg", "rad"];
+    let mut pieces: Vec<&str> = key.split(['_', '#']).filter(|word| !word.is_empty() && !SAID.contains(word)).collect();
+    let before = pieces.len();
+    pieces.retain(|word| !words::MEASURED.contains(word));
+    let measured = pieces.len() < before;
+    let before = pieces.len();
+    pieces.retain(|word| !words::WANTED.contains(word));
+    let wanted = pieces.len() < before;
+    let joined = pieces.join("_");
+    (words::JOINTS.contains(&joined.as_str()) && key.contains('#')).then_some(match (measured, wanted) {
+        (_, true) => 2,
+        (true, false) => 1,
+        _ => 0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(texts: &[&str]) -> Vec<Name> {
+        texts.iter().map(|text| Name::of(text)).collect()
+    }
+
+    #[test]
+    fn units_stand_at_the_end_of_a_name_in_many_forms() {
+        for (text, stem, unit) in [
+            ("Achse1 [\u{b0}]", "achse1", Some("deg")),
+            ("X_ist [mm]", "x_ist", Some("mm")),
+            ("q1_deg", "q1", Some("deg")),
+            ("Temp (\u{b0}C)", "temp", Some("C")),
+            ("load kg", "load", Some("kg")),
+            ("X/mm", "x", Some("mm")),
+            ("X in mm", "x", Some("mm")),
+            ("Y [\u{b5}m]", "y", Some("um")),
+            ("m", "m", None),
+            ("remark", "remark", None),
+        ] {
+            let name = Name::of(text);
+            assert_eq!((name.stem().as_str(), name.unit), (stem, unit), "{text}");
+        }
+    }
+
+    #[test]
+    fn joints_are_found_under_names_that_nobody_foresaw() {
+        let all = names(&["Nr", "wrist_1", "R1", "R2", "R3", "R4", "R5", "X_soll", "Y_soll", "Z_soll", "X_ist"]);
+        assert_eq!(joints(&all, |_| true), [[2, 3, 4, 5, 6]]);
+        assert!(joints(&all, |column| column != 4).is_empty());
+        assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), |_| false), [[2, 3]]);
+        assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), |_| false), [[1, 2, 3, 4, 5, 0]]);
+        assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), |_| true), [[2, 3], [0, 1]]);
+        assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), |_| true), [[2, 3]]);
+        let robot = ["ur_shoulder_pan_joint", "ur_shoulder_lift_joint", "ur_elbow_joint"];
+        let wrist = ["ur_wrist_1_joint", "ur_wrist_2_joint", "ur_wrist_3_joint"];
+        assert_eq!(joints(&names(&[robot, wrist].concat()), |_| true), [[0, 1, 2, 3, 4, 5]]);
+    }
+
+    #[test]
+    fn an_axis_is_told_from_words_that_end_in_its_letter() {
+        for (text, expected) in [
+            ("X", Some((0, vec![]))),
+            ("Goal y", Some((1, vec!["goal"]))),
+            ("z_dif", Some((2, vec!["dif"]))),
+            ("dX [mm]", Some((0, vec!["d"]))),
+            ("Zsoll", Some((2, vec!["soll"]))),
+            ("x_A", Some((0, vec!["a"]))),
+            ("x_m", Some((0, vec![]))),
+            ("index", None),
+            ("max", None),
+            ("measurement_rx", None),
+            ("Rz", None),
+        ] {
+            let expected = expected.map(|(axis, rest)| (axis, rest.into_iter().map(String::from).collect()));
+            assert_eq!(Name::of(text).axis(), expected, "{text}");
+        }
+    }
+}

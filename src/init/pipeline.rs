@@ -1,0 +1,204 @@
+//! The text of the pipeline that `init` writes.
+
+use super::Request;
+use super::columns::{Choice, Found, Mapping};
+use super::together::Joined;
+use crate::error::one_line;
+use crate::yaml::quoted;
+use std::path::Path;
+
+/// How the pipeline's folder names a file.
+fn from_folder(folder: &Path, file: &Path) -> String {
+    let whole = |path: &Path| path.canonicalize().ok();
+    let inside = whole(folder).zip(whole(file)).and_then(|(folder, file)| Some(file.strip_prefix(folder).ok()?.to_path_buf()));
+    let path = inside.or_else(|| whole(file)).unwrap_or_else(|| file.to_path_buf());
+    quoted(&path.display().to_string())
+}
+
+pub(super) fn text(request: &Request, found: &[Found], joined: &Joined) -> String {
+    // A folder that is still to be made has its name already.
+    let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
+    let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name: String = name.unwrap_or_default().chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).collect();
+    let name = if name.is_empty() { "cell".into() } else { name };
+    let mut out = format!(
+        "# A calibration, step by step. `calib check` tells every fault with its line, `calib run` does what is not already done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
+    );
+    let urdf = request.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
+    out.push_str(&format!("  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n", urdf.unwrap_or_default()));
+    out.push_str("  # Which column holds what, in which unit. Nothing is guessed when this runs: what stands here counts.\n");
+    out.push_str("  - uses: ingest\n    with:\n      files:\n");
+    if found.is_empty() {
+        out.push_str(EMPTY);
+    }
+    let missing = missing(found);
+    for (k, (path, file)) in request.data.iter().zip(found).enumerate() {
+        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, path)));
+        // Joints come first, in the controller's file; the tracker's is the last.
+        let lacks =
+            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints() };
+        out.push_str(&file_text(file, &lacks));
+    }
+    joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
+    let by_usage = found.iter().any(|file| file.get("usage").is_some());
+    out.push_str(if by_usage { BY_USAGE } else { EVERY });
+    out.push_str(STAGES);
+    out
+}
+
+/// Whether no file has columns of joints, or of the measured point.
+pub(super) fn missing(found: &[Found]) -> [bool; 2] {
+    ["q", "x"].map(|quantity| found.iter().all(|file| file.get(quantity).is_none()))
+}
+
+/// What the user must name in a file.
+struct Lacks {
+    joints: bool,
+    point: bool,
+    /// Joints of the robot.
+    count: usize,
+}
+
+/// The settings of one file under `files`.
+fn file_text(file: &Found, lacks: &Lacks) -> String {
+    let sheet = &file.sheet;
+    let mut out = String::new();
+    let mut put = |line: &str| out.push_str(&format!("          {line}\n"));
+    if let Some(trouble) = &sheet.trouble {
+        put(&format!("# REPLACE what follows by the file's own columns: {}", one_line(trouble)));
+    }
+    match sheet.delimiter {
+        ',' => {}
+        ' ' => put("delimiter: whitespace"),
+        '\t' => put("delimiter: tab"),
+        other => put(&format!("delimiter: {}", quoted(&other.to_string()))),
+    }
+    if sheet.comma {
+        put("decimal: comma");
+    }
+    if !sheet.header {
+        put("header: false");
+    }
+    if sheet.skip > 0 {
+        put(&format!("skip: {}                 # lines above the {}", sheet.skip, if sheet.header { "header" } else { "data" }));
+    }
+    if sheet.unit_row {
+        put("skip_below_header: 1    # a row of units");
+    }
+    if let Some(mark) = sheet.comment {
+        put(&format!("comment: {}", quoted(mark)));
+    }
+    if sheet.header_in_comment {
+        put("header_in_comment: true");
+    }
+    put("columns:");
+    for quantity in ORDER {
+        if let Some(mapping) = file.get(quantity) {
+            out.push_str(&mapped(mapping));
+        }
+    }
+    let mut put = |line: &str| out.push_str(&format!("            {line}\n"));
+    lacking(file, lacks, &mut put);
+    file.remarks.iter().for_each(|remark| put(&format!("# {}", one_line(remark))));
+    if sheet.header && sheet.trouble.is_none() {
+        for (column, name) in sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column)) {
+            let name = if name.is_empty() { format!("column {}", column + 1) } else { quoted(name) };
+            put(&format!("# not used: {name}"));
+        }
+    } else {
+        (0..sheet.names.len()).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
+    }
+    out
+}
+
+/// Quantities in the order in which they are written.
+const ORDER: [&str; 11] =
+    ["point_id", "time", "q", "usage", "target", "current", "direction", "velocity", "x", "payload", "temperature"];
+
+/// A mapping with what else may stand for it.
+fn mapped(mapping: &Mapping) -> String {
+    let mut out = String::new();
+    let check = |why: &str| format!("   # CHECK: {}", one_line(why));
+    for (k, Choice { lines, .. }) in mapping.choices.iter().enumerate() {
+        let mark = match (k, &mapping.check) {
+            (0, Some(why)) => check(why),
+            (0, None) => String::new(),
+            _ => check("or this"),
+        };
+        for (n, line) in lines.iter().enumerate() {
+            let comment = if k > 0 { "# " } else { "" };
+            let mark = if n == 0 { mark.as_str() } else { "" };
+            out.push_str(&format!("            {comment}{line}{mark}\n"));
+        }
+    }
+    out
+}
+
+/// Lines to replace where no file has the joints, or the point.
+fn lacking(file: &Found, lacks: &Lacks, put: &mut impl FnMut(&str)) {
+    let header = file.sheet.header;
+    if lacks.joints && header {
+        put("q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number");
+    } else if lacks.joints {
+        let list: Vec<String> = (1..=lacks.count).map(|number| number.to_string()).collect();
+        put(&format!(
+            "q: {{columns: [{}], unit: deg}}   # REPLACE: the numbers of the joints' columns, and the unit",
+            list.join(", ")
+        ));
+    }
+    if lacks.point {
+        let first = if lacks.joints { lacks.count } else { 0 };
+        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let column = if header { axis.to_string() } else { (first + k + 1).to_string() };
+            put(&format!("{axis}: {{column: {column}, unit: mm}}   # REPLACE: the measured point was not recognised"));
+        }
+    }
+    if !lacks.joints && !lacks.point && file.mappings.is_empty() {
+        let column = if header { "name" } else { "1" };
+        put(&format!("point_id: {{column: {column}}}   # REPLACE: no column was recognised"));
+    }
+}
+
+const EMPTY: &str = "        - file: measurements.csv        # REPLACE
+          columns:
+            point_id: {column: name}      # REPLACE each column by yours
+            q: {column: \"q{j}\", unit: deg}
+            x: {column: x, unit: mm}
+            y: {column: y, unit: mm}
+            z: {column: z, unit: mm}
+";
+
+const EVERY: &str = "
+  # A quarter of the points is never fitted to: they say how accurate the robot is at new poses.
+  - uses: split
+    with: {by: every, n: 4}
+";
+
+const BY_USAGE: &str = "
+  # The recording says itself what each row is for; rows of the set `fit` are fitted to, all others judge.
+  - uses: split
+    with: {by: usage, blank: fit}
+";
+
+const STAGES: &str = "
+  # Where the robot stands in the tracker's frame: the error before calibration.
+  - id: nominal
+    uses: identify
+    with: {effects: [base_frame]}
+
+  # Lengths, twists, zeros and reduction ratios.
+  - id: geometry
+    uses: identify
+    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry, reduction_ratio, coupling_ratio]}
+
+  # What else is wrong with the robot, and the model with it.
+  - uses: diagnose
+
+  - uses: validate
+
+  - uses: report
+    with:
+      # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is kept
+      # identity: {operator: REPLACE, robot serial: REPLACE, tracker: REPLACE, date: REPLACE}     # stands on the report as given
+      title: null                              # the heading; null: the robot's name
+";

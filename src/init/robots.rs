@@ -1,0 +1,112 @@
+//! Robot files to start from: typical arms, every number of which the user replaces.
+
+use crate::yaml::quoted;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Spherical6,
+    Offset6,
+    Seven,
+    Dh6,
+}
+
+/// All of them, in the order of the help.
+pub const KINDS: [Kind; 4] = [Kind::Spherical6, Kind::Offset6, Kind::Seven, Kind::Dh6];
+
+impl Kind {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spherical6 => "spherical6",
+            Self::Offset6 => "offset6",
+            Self::Seven => "seven",
+            Self::Dh6 => "dh6",
+        }
+    }
+
+    /// What it is, in one line.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::Spherical6 => "Six joints, the last three axes meet in a point (most industrial arms)",
+            Self::Offset6 => "Six joints, offset wrist (most cobots)",
+            Self::Seven => "Seven joints, alternating axes",
+            Self::Dh6 => "Six joints as a table of DH parameters",
+        }
+    }
+
+    pub fn joints(self) -> usize {
+        if self == Self::Seven { 7 } else { 6 }
+    }
+
+    pub(super) fn text(self) -> String {
+        let (kinematics, tool) = match self {
+            Self::Spherical6 => (SPHERICAL6, "{point: [1854, 50, 1340]}"),
+            Self::Offset6 => (OFFSET6, "{point: [-1184.3, -300, 11.6]}"),
+            Self::Seven => (SEVEN, "{point: [60, 30, 1300]}"),
+            Self::Dh6 => (DH6, "{point: [60, 0, 30]}"),
+        };
+        let where_given = if self == Self::Dh6 { "in the last frame" } else { "at the zero pose, base frame" };
+        let mut out = format!(
+            "{HEAD}{kinematics}tool: {tool}       # REPLACE: the measured point, {where_given}; off the last axis, else that joint cannot be seen\njoints:                           # REPLACE limits; reduction_ratio (motor turns per turn) only if known\n"
+        );
+        for joint in 1..=self.joints() {
+            out.push_str(&format!("  - {{name: A{joint}, limits: [-170, 170]}}\n"));
+        }
+        out + TAIL
+    }
+}
+
+/// The robot file beside a URDF.
+pub(super) fn of_urdf(tip: &str) -> String {
+    format!(
+        "{HEAD}  urdf: {{base: base_link, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{TAIL}",
+        quoted(tip)
+    )
+}
+
+const HEAD: &str = "# The robot as its data sheet describes it; calib identifies how the real one differs.
+calib_robot: 1
+name: my robot                    # REPLACE
+units: {length: mm, angle: deg}   # of this file
+kinematics:
+";
+
+const SPHERICAL6: &str =
+    "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, -1, 0], point: [312, 0, 0]}
+    - {axis: [0, -1, 0], point: [312, 0, 1075]}
+    - {axis: [1, 0, 0], point: [0, 0, 1310]}
+    - {axis: [0, -1, 0], point: [1594, 0, 1310]}
+    - {axis: [1, 0, 0], point: [0, 0, 1310]}
+";
+const OFFSET6: &str =
+    "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, -1, 0], point: [0, 0, 127.3]}
+    - {axis: [0, -1, 0], point: [-612, 0, 127.3]}
+    - {axis: [0, -1, 0], point: [-1184.3, 0, 127.3]}
+    - {axis: [0, 0, -1], point: [-1184.3, -163.9, 127.3]}
+    - {axis: [0, -1, 0], point: [-1184.3, -163.9, 11.6]}
+";
+const SEVEN: &str = "  screws:                         # REPLACE: axis and a point on it, zero pose (all joints at 0), base frame
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 340]}
+    - {axis: [0, 0, 1], point: [0, 0, 540]}
+    - {axis: [0, -1, 0], point: [0, 0, 740]}
+    - {axis: [0, 0, 1], point: [0, 0, 940]}
+    - {axis: [0, 1, 0], point: [0, 0, 1140]}
+    - {axis: [0, 0, 1], point: [0, 0, 1266]}
+";
+const DH6: &str = "  dh:                             # REPLACE: Rz(theta) Tz(d) Tx(a) Rx(alpha); `mdh` takes Craig's table
+    - {theta: 0, d: 0, a: 312, alpha: 90}
+    - {theta: 90, d: 0, a: 1075, alpha: 0}
+    - {theta: 0, d: 0, a: 235, alpha: 90}
+    - {theta: 0, d: 1282, a: 0, alpha: -90}
+    - {theta: 0, d: 0, a: 0, alpha: 90}
+    - {theta: 0, d: 260, a: 0, alpha: 0}
+";
+
+const TAIL: &str = "# links:                          # masses of the bodies that the joints move, for compliance under gravity; null where not known
+#   - {mass: 340, centre: [150, 0, -120]}
+# payload: {mass: 210, offset: [140, -30, 10]}     # rated, kg; from the tool point to its centre
+";

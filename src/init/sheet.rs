@@ -1,0 +1,315 @@
+//! A delimited text as a table of cells, as far as it can be understood without being told.
+
+use crate::error::{Error, Result};
+use crate::raw;
+use crate::stage::ingest::encoding;
+use crate::units::{Unit, written};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Bytes and lines that are looked at.
+const LOOKED: u64 = 16 << 20;
+const LINES: usize = 20_000;
+
+/// So many lines say what separates fields.
+const ENOUGH: usize = 500;
+
+/// How comments begin.
+const COMMENTS: [&str; 4] = ["//", "#", "%", "!"];
+
+/// Fewer columns are no table of joints or points.
+const NARROWEST: usize = 3;
+
+#[derive(Default)]
+pub(super) struct Sheet {
+    pub delimiter: char,
+    /// Decimal comma.
+    pub comma: bool,
+    /// Lines above the header, or above the data where there is none.
+    pub skip: usize,
+    /// Whether a row of units stands below the header.
+    pub unit_row: bool,
+    pub comment: Option<&'static str>,
+    pub header_in_comment: bool,
+    pub header: bool,
+    /// Of a file without a header the numbers from 1.
+    pub names: Vec<String>,
+    /// From a row of units.
+    pub units: Vec<Option<&'static str>>,
+    pub rows: Vec<Vec<String>>,
+    /// Why nothing was understood, and what stands in the file.
+    pub trouble: Option<String>,
+}
+
+/// A line that is neither blank nor a comment, and its number from 0.
+struct Content<'a> {
+    at: usize,
+    text: &'a str,
+}
+
+/// A number as people write it: finite, with a point or one comma.
+pub(super) fn number(text: &str) -> Option<f64> {
+    let value = text.parse::<f64>().ok().or_else(|| text.replacen(',', ".", 1).parse().ok().filter(|_| !text.ends_with(',')));
+    value.filter(|value| value.is_finite())
+}
+
+fn numeric(cells: &[String]) -> usize {
+    cells.iter().filter(|cell| number(cell).is_some()).count()
+}
+
+/// The fields of a line; a quoted one may hold the delimiter. A blank stands for any run of blanks and tabs.
+fn cells(line: &str, delimiter: char) -> Vec<String> {
+    let mut cells = vec![String::new()];
+    let mut quoted = false;
+    for letter in line.trim_end().chars() {
+        let ends = if delimiter == ' ' { letter == ' ' || letter == '\t' } else { letter == delimiter };
+        if letter == '"' {
+            quoted = !quoted;
+        } else if ends && !quoted {
+            cells.push(String::new());
+        } else if let Some(cell) = cells.last_mut() {
+            cell.push(letter);
+        }
+    }
+    let trimmed = cells.into_iter().map(|cell| cell.trim().to_string());
+    trimmed.filter(|cell| delimiter != ' ' || !cell.is_empty()).collect()
+}
+
+/// Without the blank cells that a delimiter at the end of a line makes.
+fn filled(mut cells: Vec<String>) -> Vec<String> {
+    while cells.last().is_some_and(String::is_empty) {
+        cells.pop();
+    }
+    cells
+}
+
+impl Sheet {
+    pub fn read(path: &Path) -> Result<Self> {
+        let place = path.display().to_string();
+        let file = raw::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+        let mut lines: Vec<String> = Vec::new();
+        let mut reader = BufReader::new(file.take(LOOKED));
+        let head = reader.fill_buf().map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
+        if let Some(kind) = no_text(head) {
+            return Ok(Self { trouble: Some(kind.into()), delimiter: ',', header: true, ..Self::default() });
+        }
+        for line in reader.split(b'\n').take(LINES) {
+            let line = line.map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
+            lines.push(encoding::shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+        }
+        Ok(Self::of(&lines))
+    }
+
+    fn of(lines: &[String]) -> Self {
+        let comment = comment(lines);
+        let is_comment = |line: &str| comment.is_some_and(|mark| line.starts_with(mark));
+        let content: Vec<Content> = (lines.iter().enumerate())
+            .filter(|(_, line)| !line.trim().is_empty() && !is_comment(line))
+            .map(|(at, text)| Content { at, text })
+            .collect();
+        let delimiter = delimiter(&content);
+        let mut sheet = Self { delimiter, comment, header: true, ..Self::default() };
+        let table: Vec<Vec<String>> = content.iter().map(|line| cells(line.text, delimiter)).collect();
+        let begins = if let Some(k) = plain_header(&table) {
+            sheet.skip = content[k].at;
+            sheet.names = filled(table[k].clone());
+            k + 1
+        } else if let Some((at, names, mark)) = commented_header(lines, &sheet, &content, &table) {
+            (sheet.skip, sheet.names, sheet.header_in_comment) = (at, names, mark);
+            sheet.comment = sheet.comment.filter(|_| mark);
+            content.iter().position(|line| line.at > at).unwrap_or(content.len())
+        } else if let Some(k) = bare_rows(&table) {
+            sheet.skip = content[k].at;
+            sheet.header = false;
+            sheet.names = (1..=table[k].len()).map(|number| number.to_string()).collect();
+            sheet.trouble = Some("no header found".into());
+            k
+        } else {
+            let seen = content.iter().take(3).map(|line| format!("`{}`", line.text.trim().chars().take(60).collect::<String>()));
+            let seen: Vec<String> = seen.collect();
+            let seen = if seen.is_empty() { "the file is empty".into() } else { format!("it begins {}", seen.join(", ")) };
+            sheet.trouble = Some(format!("no header found and no rows of numbers; {seen}"));
+            return sheet;
+        };
+        let first = begins + usize::from(table.get(begins).is_some_and(|row| is_units(row)) && sheet.header);
+        sheet.unit_row = first > begins;
+        sheet.units = match table.get(begins).filter(|_| sheet.unit_row) {
+            Some(row) => row.iter().map(|cell| unit(cell)).collect(),
+            None => Vec::new(),
+        };
+        let width = sheet.names.len();
+        let rows = table.into_iter().skip(first).map(filled).filter(|row| !row.is_empty() && row.len() <= width);
+        sheet.rows = rows.map(|row| row.into_iter().chain(std::iter::repeat(String::new())).take(width).collect()).collect();
+        let marks = |mark: char| {
+            let numbers = sheet.rows.iter().flatten().filter(|cell| cell.contains(mark) && number(cell).is_some());
+            numbers.count()
+        };
+        sheet.comma = marks(',') > marks('.');
+        sheet
+    }
+
+    pub fn numbers(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
+        self.rows.iter().filter_map(move |row| row.get(column).and_then(|cell| number(cell)))
+    }
+
+    pub fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
+        self.rows.iter().filter_map(move |row| row.get(column)).map(String::as_str).filter(|cell| !cell.is_empty())
+    }
+
+    /// Whether nine of ten cells are numbers.
+    pub fn is_numeric(&self, column: usize) -> bool {
+        !self.rows.is_empty() && 10 * self.numbers(column).count() >= 9 * self.rows.len()
+    }
+
+    /// Largest number without its sign.
+    pub fn largest(&self, column: usize) -> f64 {
+        self.numbers(column).map(f64::abs).fold(0.0, f64::max)
+    }
+
+    /// What a column holds, for a person: `column 3: -12.5 to 80`, `column 1: P1, P2, ...`.
+    pub fn seen(&self, column: usize) -> String {
+        if self.is_numeric(column) {
+            let (lower, upper) = self.numbers(column).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+            return format!("column {}: {lower} to {upper}", column + 1);
+        }
+        let texts: Vec<String> = self.texts(column).take(3).map(|text| text.chars().take(20).collect()).collect();
+        format!("column {}: {}, ...", column + 1, texts.join(", "))
+    }
+}
+
+/// What a file is that is no delimited text.
+fn no_text(head: &[u8]) -> Option<&'static str> {
+    match head {
+        [b'P', b'K', 3, 4, ..] => Some("a workbook or archive, no delimited text; save it as CSV"),
+        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file: its columns are not looked at; name them"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("a text in UTF-16; save it as UTF-8"),
+        _ if head.contains(&0) => Some("no text"),
+        _ => None,
+    }
+}
+
+/// How comments begin here, if some lines are such and most are not.
+fn comment(lines: &[String]) -> Option<&'static str> {
+    let filled = lines.iter().filter(|line| !line.trim().is_empty()).count();
+    let begun = |mark: &str| lines.iter().filter(|line| line.starts_with(mark)).count();
+    COMMENTS.into_iter().find(|mark| begun(mark) > 0 && 2 * begun(mark) < filled)
+}
+
+/// What separates fields: what makes most lines rows of one width with most numbers in them.
+fn delimiter(content: &[Content]) -> char {
+    let worth = |delimiter: char| {
+        let rows: Vec<Vec<String>> = content.iter().take(ENOUGH).map(|line| cells(line.text, delimiter)).collect();
+        let mut widths = std::collections::BTreeMap::new();
+        rows.iter().for_each(|row| *widths.entry(row.len()).or_insert(0) += 1);
+        let usual = widths.into_iter().filter(|(width, _)| *width >= NARROWEST).max_by_key(|(_, rows)| *rows);
+        let usual = usual.map_or(0, |(width, _)| width);
+        let of_width = rows.iter().filter(|row| row.len() == usual);
+        of_width.map(|row| (1 + numeric(row)) as f64 / (1 + row.len()) as f64).sum::<f64>()
+    };
+    let mut best = (0.0, ',');
+    for delimiter in [';', '\t', ',', '|', ' '] {
+        let worth = worth(delimiter);
+        if worth > best.0 + 1e-9 {
+            best = (worth, delimiter);
+        }
+    }
+    best.1
+}
+
+/// Whether a row of numbers stands here, as wide as most below it.
+fn is_data(table: &[Vec<String>], k: usize, width: usize) -> bool {
+    let Some(row) = table.get(k) else { return false };
+    let below = &table[k..];
+    let alike = below.iter().filter(|other| other.len() == row.len()).count();
+    row.len() >= NARROWEST && filled(row.clone()).len() <= width && numeric(row) >= 2 && 2 * alike >= below.len()
+}
+
+fn is_names(row: &[String]) -> bool {
+    let named = row.iter().filter(|cell| !cell.is_empty()).count();
+    filled(row.to_vec()).len() >= NARROWEST && numeric(row) == 0 && 2 * named > row.len()
+}
+
+/// The unit that a cell holds, with brackets or without.
+fn unit(cell: &str) -> Option<&'static str> {
+    written(cell.to_lowercase().trim_matches(['[', ']', '(', ')', ' '])).map(Unit::symbol)
+}
+
+fn is_units(row: &[String]) -> bool {
+    let mut said = row.iter().filter(|cell| !cell.is_empty() && *cell != "-").peekable();
+    said.peek().is_some() && said.all(|cell| unit(cell).is_some())
+}
+
+/// The line of names above the first line of numbers as wide as itself.
+fn plain_header(table: &[Vec<String>]) -> Option<usize> {
+    (0..table.len()).find(|k| {
+        let width = filled(table[*k].clone()).len();
+        let data = k + 1 + usize::from(table.get(k + 1).is_some_and(|row| is_units(row)));
+        is_names(&table[*k]) && is_data(table, data, width) && table[data].len() <= table[*k].len()
+    })
+}
+
+/// A header that is written as a comment: line, names, and whether the mark is no part of the first name. The one next to the data goes
+/// before others.
+fn commented_header(
+    lines: &[String],
+    sheet: &Sheet,
+    content: &[Content],
+    table: &[Vec<String>],
+) -> Option<(usize, Vec<String>, bool)> {
+    let mark = sheet.comment?;
+    let fits = |names: &[String], at: usize| {
+        let Some(next) = content.iter().position(|line| line.at > at) else { return false };
+        is_names(names) && !names[0].is_empty() && is_data(table, next, names.len()) && table[next].len() == names.len()
+    };
+    let first = content.first()?.at;
+    (0..first).rev().chain(first..lines.len()).filter(|at| lines[*at].starts_with(mark)).find_map(|at| {
+        let [bare, whole] = [&lines[at][mark.len()..], &lines[at]].map(|text| filled(cells(text, sheet.delimiter)));
+        let is_mark = fits(&bare, at);
+        (is_mark || fits(&whole, at)).then_some((at, if is_mark { bare } else { whole }, is_mark))
+    })
+}
+
+/// The first row of a file without a header.
+fn bare_rows(table: &[Vec<String>]) -> Option<usize> {
+    (0..table.len()).find(|k| is_data(table, *k, table[*k].len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sheet(text: &str) -> Sheet {
+        Sheet::of(&text.lines().map(String::from).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn delimiter_decimal_mark_and_header_follow_from_the_rows() {
+        let german = sheet("Messung vom Dienstag\n\nName;A1;A2;ok\nP1;10,5;-3,25;ja\nP2;11,0;3;ja\n");
+        assert_eq!((german.delimiter, german.comma, german.skip, german.names.len()), (';', true, 2, 4));
+        let quoted = sheet("Name,A1,A2\n\"P,1\",\"1,5\",\"2,5\"\n\"P,2\",\"1,5\",\"2,5\"\n");
+        assert_eq!((quoted.delimiter, quoted.comma, quoted.rows[0][0].as_str()), (',', true, "P,1"));
+        let blanks = sheet("Name  X   Y  Z\nP1  1.0 2.0 3.0\nP2  1.0 2.0 3.0\n");
+        assert_eq!((blanks.delimiter, blanks.comma, blanks.rows.len()), (' ', false, 2));
+        let units = sheet("Name;X;Y;Z\n;[mm];[mm];[mm]\nP1;1;2;3\nP2;1;2;3\n");
+        assert_eq!((units.unit_row, units.units[1], units.rows.len()), (true, Some("mm"), 2));
+    }
+
+    #[test]
+    fn a_header_may_be_a_comment_and_a_mark_may_be_a_name() {
+        let exported = sheet(
+            "// made today\n// Collection Group Target X Y Z\nA G P1 1 2 3\nA G P2 1 2 3\nA G P3 1 2 3\n// end\nA G P4 1 2 3\n",
+        );
+        assert_eq!((exported.comment, exported.header_in_comment, exported.skip), (Some("//"), true, 1));
+        assert_eq!((exported.names[2].as_str(), exported.rows.len()), ("Target", 4));
+        let number = sheet("#,X,Y,Z\n1,1,2,3\n2,1,2,3\n3,1,2,3\n");
+        assert_eq!((number.comment, number.header_in_comment, number.names[0].as_str()), (None, false, "#"));
+    }
+
+    #[test]
+    fn without_a_header_columns_have_numbers() {
+        let bare = sheet("1.5;2.5;3.5\n4;5;6\n");
+        assert_eq!((bare.header, bare.names.join(" ").as_str(), bare.rows.len()), (false, "1 2 3", 2));
+        assert_eq!(bare.seen(0), "column 1: 1.5 to 4");
+        assert!(sheet("nothing\n").trouble.is_some());
+    }
+}

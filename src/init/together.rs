@@ -1,0 +1,247 @@
+//! How two files belong together: by points' names, found by equal values whatever the header; else by time; else row by row.
+
+use super::columns::Found;
+use super::sheet::number;
+use super::words;
+use crate::statistics;
+use std::collections::BTreeSet;
+
+/// Names that fewer rows share than this are not the same names.
+const LEAST_SHARED: f64 = 0.5;
+/// Fewer shared names than this are asked about.
+const PLENTY: f64 = 0.95;
+
+/// Lines of the pipeline below `files`.
+#[derive(Debug, Default)]
+pub(super) struct Joined {
+    pub lines: Vec<String>,
+}
+
+/// Columns of both files that name points alike.
+#[derive(Debug, Clone, PartialEq)]
+struct Pair {
+    columns: [usize; 2],
+    /// Text, not running numbers.
+    text: bool,
+    /// Share of the names of the shorter file that stand in the other, in hundredths.
+    shared: u32,
+    named: usize,
+}
+
+/// Decides, and leaves every quantity in one of the files.
+pub(super) fn join(found: &mut [Found]) -> Joined {
+    let [one, two] = found else {
+        if let [only] = found {
+            return alone(only);
+        }
+        return Joined::default();
+    };
+    // A file that was not understood says nothing; ids and points are written as lines to replace.
+    let blind = [&*one, &*two].iter().any(|file| file.sheet.trouble.is_some());
+    single(one, two);
+    let pairs = pairs(one, two);
+    let timing = timing(one, two);
+    let sizes = [one.sheet.rows.len(), two.sheet.rows.len()];
+    // Rows that are only counted: where files are of unequal length, numbers say no more than the order of rows.
+    let running = pairs.first().is_some_and(|pair| !pair.text && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
+    let doubtful = running && sizes[0] != sizes[1];
+    if let Some(best) = pairs.first().filter(|_| !doubtful || timing.is_none()).cloned() {
+        if one.get("time").is_some() {
+            two.drop("time", "rows are joined by name; time is that of the first file");
+        }
+        return by_id(one, two, &best, &pairs, running);
+    }
+    if let Some(timing) = timing.filter(|timing| timing.overlap || sizes[0] != sizes[1]) {
+        label(one, two);
+        return by_time(&timing, [one, two]);
+    }
+    if one.get("time").is_some() {
+        two.drop("time", "time is that of the first file");
+    }
+    label(one, two);
+    let [a, b] = sizes;
+    let why = match (blind, a == b) {
+        (true, _) => {
+            "REPLACE: how rows belong together; {by: id} by the points' names, {by: time, tolerance_s: 0.5} or {by: order}"
+                .to_string()
+        }
+        (_, true) => format!("CHECK: row by row, since neither names nor times were found in both; {a} rows each"),
+        _ => format!("REPLACE: neither names nor times were found in both, and {a} and {b} rows cannot be joined by order"),
+    };
+    Joined { lines: vec![format!("      join: {{by: order}}       # {why}")] }
+}
+
+/// Names and repeats of a file that stands alone.
+fn alone(found: &mut Found) -> Joined {
+    let ids = found.ids();
+    let Some(first) = ids.first().copied() else { return Joined::default() };
+    found.map("point_id", &ids, None, None);
+    let (rows, distinct) = (found.sheet.rows.len(), found.distinct(first));
+    let line =
+        format!("      duplicates: keep       # CHECK: {distinct} names for {rows} rows; each row counts as a measurement");
+    Joined { lines: if distinct < rows { vec![line] } else { Vec::new() } }
+}
+
+/// Every quantity once: joints and what belongs to them from the first file that has them, the point from the file without joints.
+fn single(one: &mut Found, two: &mut Found) {
+    let both = |quantity: &str, one: &Found, two: &Found| one.get(quantity).is_some() && two.get(quantity).is_some();
+    for quantity in ["q", "current", "direction", "velocity", "payload", "temperature", "usage", "target"] {
+        if both(quantity, one, two) {
+            two.drop(quantity, "in both files; this one or that of the first?");
+        }
+    }
+    if both("x", one, two) {
+        let first = two.get("q").is_some() && one.get("q").is_none();
+        let (from, other) = if first { (two, &*one) } else { (one, &*two) };
+        let why = format!("the measured point, or the controller's own? that of {} is taken", other.name);
+        from.drop("x", &why);
+    }
+}
+
+/// Pairs of columns with equal values, best first.
+fn pairs(one: &Found, two: &Found) -> Vec<Pair> {
+    let [left, right] = [one, two].map(|file| {
+        (0..file.said.len())
+            .filter(|column| may_name(file, *column))
+            .map(|column| (column, cells(file, column)))
+            .collect::<Vec<_>>()
+    });
+    let mut pairs = Vec::new();
+    for (a, names) in &left {
+        for (b, others) in &right {
+            let shared = names.intersection(others).count() as f64 / names.len().min(others.len()).max(1) as f64;
+            if shared >= LEAST_SHARED {
+                let text = names.iter().any(|name| number(name).is_none());
+                let listed = |file: &Found, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
+                let named = listed(one, *a) + listed(two, *b);
+                pairs.push(Pair { columns: [*a, *b], text, shared: (100.0 * shared) as u32, named });
+            }
+        }
+    }
+    pairs.sort_by_key(|pair| std::cmp::Reverse((pair.text, pair.shared, pair.named)));
+    pairs
+}
+
+fn cells(file: &Found, column: usize) -> BTreeSet<&str> {
+    file.sheet.texts(column).collect()
+}
+
+/// Whether a column can name points: most cells differ, and none has decimals unless the header says that these are names.
+fn may_name(file: &Found, column: usize) -> bool {
+    let distinct = file.distinct(column);
+    let rows = file.sheet.rows.len();
+    let whole =
+        file.sheet.texts(column).all(|cell| number(cell).is_none_or(|value| value.fract() == 0.0 && !cell.contains(['.', ','])));
+    let listed = words::IDS.contains(&file.said[column].stem().as_str());
+    !file.is_taken(column) && distinct >= 2 && 2 * distinct >= rows && (whole || listed)
+}
+
+/// Whether the cells are numbers that go up by one.
+fn runs(file: &Found, column: usize) -> bool {
+    let numbers: Vec<f64> = file.sheet.numbers(column).collect();
+    numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+}
+
+fn by_id(one: &mut Found, two: &mut Found, best: &Pair, pairs: &[Pair], running: bool) -> Joined {
+    let alike = |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
+    let columns = |file: usize| {
+        let fixed = 1 - file;
+        let fit = pairs.iter().filter(alike).filter(|pair| pair.columns[fixed] == best.columns[fixed]);
+        fit.map(|pair| pair.columns[file]).collect::<Vec<usize>>()
+    };
+    one.map("point_id", &columns(0), None, None);
+    two.map("point_id", &columns(1), None, None);
+    let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
+    let repeated = [&*one, &*two].iter().zip(best.columns).any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
+    let question = if running && a == b {
+        "CHECK: running numbers, which join row by row".into()
+    } else if running {
+        format!("CHECK: running numbers, but {a} and {b} rows: is the row that lacks one the last?")
+    } else if f64::from(best.shared) < 100.0 * PLENTY {
+        format!("CHECK: {} % of the names stand in both files", best.shared)
+    } else if repeated {
+        "CHECK: names stand more than once in a file; such rows are not used".into()
+    } else {
+        "by the point's name".into()
+    };
+    Joined { lines: vec![format!("      join: {{by: id}}          # {question}")] }
+}
+
+/// Where files are not joined by id, the names of one of them may stand.
+fn label(one: &mut Found, two: &mut Found) {
+    for file in [two, one] {
+        let ids = file.ids();
+        if let Some(first) = ids.first().copied().filter(|first| file.distinct(*first) == file.sheet.rows.len()) {
+            file.map("point_id", &[first], None, None);
+            return;
+        }
+    }
+}
+
+/// What two clocks say.
+struct Timing {
+    /// Half of the rows of the file with fewer have one of the other nearer than this, s.
+    near: f64,
+    /// Usual time between rows of the file with fewer, s.
+    step: f64,
+    overlap: bool,
+    /// First time of the second file less that of the first, s.
+    apart: f64,
+    rows: [usize; 2],
+}
+
+fn timing(one: &Found, two: &Found) -> Option<Timing> {
+    let times = |file: &Found| -> Option<Vec<f64>> {
+        let column = *file.get("time")?.choices.first()?.columns.first()?;
+        let mut times: Vec<f64> = file.sheet.numbers(column).map(|time| time * file.second).collect();
+        times.sort_by(f64::total_cmp);
+        (times.len() > 1).then_some(times)
+    };
+    let (first, second) = (times(one)?, times(two)?);
+    let (few, many) = if first.len() <= second.len() { (&first, &second) } else { (&second, &first) };
+    let nearest = |time: &f64| {
+        let at = many.partition_point(|other| other < time);
+        let around = [at.checked_sub(1), Some(at)].into_iter().flatten().filter_map(|at| many.get(at));
+        around.map(|other| (other - time).abs()).fold(f64::INFINITY, f64::min)
+    };
+    let median = |mut values: Vec<f64>| statistics::nearest(&mut values, 0.5);
+    let near = median(few.iter().map(nearest).collect())?;
+    let step = median(few.windows(2).map(|pair| pair[1] - pair[0]).collect())?;
+    Some(Timing { near, step, overlap: near <= 0.5 * step, apart: second[0] - first[0], rows: [first.len(), second.len()] })
+}
+
+fn by_time(timing: &Timing, files: [&Found; 2]) -> Joined {
+    // Three times the usual distance, rounded up, but never as far as the next row.
+    let wide = if timing.overlap { (3.0 * timing.near).max(1e-3) } else { 0.1 * timing.step };
+    let tolerance = rounded_up(wide.min(0.5 * timing.step).max(1e-4)).min(0.5 * timing.step);
+    let line = if timing.overlap {
+        format!(
+            "      join: {{by: time, tolerance_s: {tolerance}}}       # CHECK: half of the rows have their partner within {:.3} s",
+            timing.near
+        )
+    } else {
+        format!(
+            "      join: {{by: time, tolerance_s: {tolerance}, offset_s: {:.3}}}       # CHECK: the clocks do not overlap; this offset puts the first rows together",
+            timing.apart
+        )
+    };
+    let mut lines = vec![line];
+    let [a, b] = timing.rows;
+    let (many, few, name) = if a > b { (a, b, &files[0].name) } else { (b, a, &files[1].name) };
+    // Beyond a half, by default, a file is refused; here up to half of the other file's rows may lack their partner.
+    if 5 * few < 3 * many {
+        let fraction = ((1.0 - 0.5 * few as f64 / many as f64) * 1e4).ceil() / 1e4;
+        lines.push(format!(
+            "      max_rejected_fraction: {fraction}   # CHECK: {name} has {many} rows for the {few} of the other file"
+        ));
+    }
+    Joined { lines }
+}
+
+/// Up to the next 1, 2 or 5 times a power of ten.
+fn rounded_up(value: f64) -> f64 {
+    let power = 10f64.powf(value.log10().floor());
+    let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|digit| digit * power >= value * (1.0 - 1e-9)).unwrap_or(10.0);
+    // Without the digits of the power's own rounding.
+    format!("{:.6}", digit * power).parse().unwrap_or(value)
+}

@@ -1,0 +1,142 @@
+//! A column of the recording: what `ingest` calls it and expects of it, and how the table stores it.
+
+use crate::units::{Quantity, Unit};
+
+/// A setting below `columns` of `ingest`, with what a recording keeps of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Column {
+    pub setting: &'static str,
+    /// For the documentation of the setting.
+    pub about: &'static str,
+    pub shape: Shape,
+    /// What its numbers are; [`Quantity::Number`] for texts, and for directions: 1, -1 or 0.
+    pub quantity: Quantity,
+    /// What a number may be, SI: one row beyond it would spoil the table.
+    pub range: [f64; 2],
+    /// Names in the table, without the ending that says the unit; `{j}` is the joint's number from 1.
+    pub stored: &'static [&'static str],
+    /// Settings, itself among them, of which all are mapped or none.
+    pub together: &'static [&'static str],
+    pub part: Part,
+}
+
+/// How a file writes a quantity.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    Text,
+    /// Whole numbers.
+    Count,
+    /// One number a row.
+    Number,
+    /// A number for each joint; of prismatic ones it may be another quantity with a range of its own.
+    Joints {
+        prismatic: Option<(Quantity, [f64; 2])>,
+    },
+    /// Several numbers in one of several conventions.
+    Conventions(&'static Conventions),
+}
+
+/// Ways to write a quantity of several numbers.
+#[derive(Debug)]
+pub struct Conventions {
+    /// The settings' type in the pipeline's schema, and its documentation.
+    pub name: &'static str,
+    pub about: &'static str,
+    /// Documentation of the setting `unit`.
+    pub unit: &'static str,
+    pub all: &'static [Convention],
+    /// What to say where none or several are given.
+    pub allowed: &'static str,
+}
+
+/// One way to write a quantity of several numbers.
+#[derive(Debug)]
+pub struct Convention {
+    /// The setting, e.g. `quaternion`.
+    pub name: &'static str,
+    pub about: &'static str,
+    pub numbers: usize,
+    /// Without a unit; the column's quantity otherwise.
+    pub unitless: bool,
+    /// The stored numbers from those of a row (SI); fails with what is wrong.
+    pub read: fn(&[f64]) -> Result<[f64; 3], String>,
+}
+
+/// What a column is to its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A circumstance of the measurement.
+    Circumstance,
+    /// What was measured.
+    Value,
+    /// The standard deviation of that.
+    Sigma,
+    /// The name of what it was measured from.
+    Anchor,
+}
+
+impl Column {
+    /// A column with one number a row, stored by one name.
+    pub const fn number(
+        setting: &'static str,
+        stored: &'static [&'static str],
+        quantity: Quantity,
+        range: [f64; 2],
+        about: &'static str,
+    ) -> Self {
+        Self { setting, about, shape: Shape::Number, quantity, range, stored, together: &[], part: Part::Circumstance }
+    }
+
+    /// A text, stored by the name of its setting.
+    pub const fn text(setting: &'static str, about: &'static str) -> Self {
+        Self { shape: Shape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
+    }
+
+    pub const fn as_part(self, part: Part) -> Self {
+        Self { part, ..self }
+    }
+
+    pub const fn together(self, together: &'static [&'static str]) -> Self {
+        Self { together, ..self }
+    }
+
+    pub fn is_text(&self) -> bool {
+        matches!(self.shape, Shape::Text)
+    }
+
+    /// Numbers that reading a row of a robot with so many joints takes at most.
+    pub fn numbers(&self, joints: usize) -> usize {
+        match self.shape {
+            Shape::Text | Shape::Count => 0,
+            Shape::Number => 1,
+            Shape::Joints { .. } => joints,
+            Shape::Conventions(conventions) => {
+                conventions.all.iter().map(|convention| convention.numbers).max().unwrap_or_default()
+            }
+        }
+    }
+
+    /// Quantity and range of a joint's number; of the only one where it is not by joint.
+    pub fn of_joint(&self, is_prismatic: bool) -> (Quantity, [f64; 2]) {
+        match self.shape {
+            Shape::Joints { prismatic: Some(other) } if is_prismatic => other,
+            _ => (self.quantity, self.range),
+        }
+    }
+
+    /// Names and units of the table's columns that hold its numbers.
+    pub fn columns(&self, prismatic: &[bool]) -> Vec<(String, Unit)> {
+        let named = |name: &str, quantity: Quantity| {
+            let unit = Unit::stored(quantity);
+            let ending = unit.symbol().replace('/', "_").to_lowercase();
+            (if quantity == Quantity::Number { name.into() } else { format!("{name}_{ending}") }, unit)
+        };
+        match self.shape {
+            Shape::Joints { .. } => (1..)
+                .zip(prismatic)
+                .map(|(joint, slides)| named(&self.stored[0].replace("{j}", &format!("{joint}")), self.of_joint(*slides).0))
+                .collect(),
+            _ => self.stored.iter().map(|name| named(name, self.quantity)).collect(),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Kinds of measurement: each owns in a file of its own its columns, residual, noise, derivatives and rank; one line each in [`KINDS`].
+//!
+//! A kind predicts from where the target is: its derivative by a parameter is a linear map of how the parameter moves the point, turns
+//! the target or moves the vector from the anchor (a [`Sensitivity`]), which the effect stack says of every parameter.
+
+mod column;
+mod distance;
+mod inclination;
+mod orientation;
+mod point;
+mod residual;
+mod weight;
+
+pub use column::{Column, Convention, Conventions, Part, Shape};
+pub use distance::Distance;
+pub use inclination::Inclination;
+pub use orientation::Orientation;
+pub use point::Point;
+pub use residual::{ExcessSigma, Residual};
+pub use weight::Weight;
+
+use crate::effect::PlacedRow;
+use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel};
+use crate::spatial::Pose;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::RangeInclusive;
+
+/// Every kind of measurement; a recording that maps no other holds the first.
+pub const KINDS: &[&dyn Kind] = &[&Point, &Orientation, &Distance, &Inclination];
+
+/// What a kind's residual is a size of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// m
+    Length,
+    /// rad
+    Angle,
+}
+
+/// What a kind says of itself.
+#[derive(Debug)]
+pub struct About {
+    /// E.g. `distance`.
+    pub name: &'static str,
+    /// What a prediction calls it that measured it.
+    pub word: &'static str,
+    pub dimension: Dimension,
+    /// Values of a row.
+    pub axes: usize,
+    /// In the recording.
+    pub columns: &'static [Column],
+    /// Whether it must come with its standard deviation; else the instrument's noise is taken.
+    pub own_sigma: bool,
+    pub rank: Rank,
+    /// Whether rows that stand out by it are named and set aside; else they only count less, by Huber's loss.
+    pub is_screened: bool,
+}
+
+/// What a kind can see of the geometry, by theory.
+#[derive(Debug, Clone, Copy)]
+pub struct Rank {
+    /// Whether it sees where axes and targets are; else directions alone.
+    pub places: bool,
+    /// Whether it sees how targets are turned.
+    pub rotations: bool,
+    /// Translations and rotations of the whole cell that it does not see.
+    pub blind: [usize; 2],
+}
+
+/// What of a target's motion a kind sees, in standard deviations: of the point, the orientation, the vector from the anchor.
+pub enum Sensitivity {
+    Point(Weight),
+    Rotation(Weight),
+    FromAnchor(Weight),
+}
+
+impl Sensitivity {
+    /// Derivatives of what was measured by every parameter, in standard deviations, through `emit(parameter, derivative)`.
+    pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, Vector3<f64>)) {
+        match self {
+            Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity))),
+            Self::Rotation(weight) => placed.rotations(|k, rotation| emit(k, weight.apply(&rotation))),
+            Self::FromAnchor(weight) => placed.partials_from_anchor(|k, velocity| emit(k, weight.apply(&velocity))),
+        }
+    }
+}
+
+/// A kind of measurement.
+pub trait Kind: Sync {
+    fn about(&self) -> &'static About;
+
+    /// Measured - predicted (m or rad, zero on lines without a value) and the variance of each value; `None` where the row measured
+    /// none, or the robot lacks what it was measured from.
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)>;
+
+    /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
+    fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity;
+
+    /// Values that a row has of it.
+    fn axes(&self, data: &Measurements, row: usize) -> usize {
+        if self.reading(data, row).is_some() { self.about().axes } else { 0 }
+    }
+
+    /// Turns its residual into standard deviations, with `excess` (m or rad) beside its own variance.
+    fn weight(&self, _data: &Measurements, _row: usize, variance: f64, excess: f64) -> Weight {
+        Weight::uniform((variance + excess * excess).sqrt())
+    }
+
+    /// Length of one sigma of what a row measured, m or rad.
+    fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
+        self.reading(data, row).map(|reading| reading.sigma)
+    }
+
+    /// Whether the rows may measure it at all.
+    fn is_in(&self, data: &Measurements) -> bool {
+        data.readings.iter().any(|readings| readings.kind == self.about().name)
+    }
+
+    fn reading<'a>(&self, data: &'a Measurements, row: usize) -> Option<Reading<'a>> {
+        data.reading(self.about().name, row)
+    }
+
+    /// Words for what a row measured of it.
+    fn words(&self, data: &Measurements, row: usize) -> Vec<&'static str> {
+        if self.axes(data, row) > 0 { vec![self.about().word] } else { Vec::new() }
+    }
+
+    /// The numbers of a reading from those of the table (SI; NaN where a row measured none).
+    fn keep(&self, stored: &[f64], kept: &mut Vec<f64>) {
+        kept.extend(stored);
+    }
+
+    /// For a start: a matrix that, summed over rows, is nearest to how the target is turned on the last body, whose rotation at the
+    /// row is `body` (tracker frame).
+    fn attitude(&self, _data: &Measurements, _row: usize, _body: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+        None
+    }
+
+    /// For a start: where anchors are. Fails with a sentence where too little was measured from one.
+    fn anchors(&self, _robot: &RobotModel, _data: &Measurements, _rows: &[usize], _base: &Pose) -> Result<Vec<Anchor>, String> {
+        Ok(Vec::new())
+    }
+}
+
+impl dyn Kind + '_ {
+    /// Its columns of a part.
+    pub fn columns(&self, part: Part) -> impl Iterator<Item = &'static Column> {
+        self.about().columns.iter().filter(move |column| column.part == part)
+    }
+
+    /// What rows measured of it beside points, of the recording's `numbers` (SI, row-major) and `names` by setting.
+    pub fn readings<'a>(
+        &self,
+        numbers: impl Fn(&str) -> Option<&'a [f64]>,
+        named: impl Fn(&str) -> Option<Named>,
+    ) -> Option<Readings> {
+        let values: Vec<(&[f64], usize)> = self
+            .columns(Part::Value)
+            .map(|column| Some((numbers(column.setting)?, column.stored.len())))
+            .collect::<Option<_>>()?;
+        let sigma = numbers(self.columns(Part::Sigma).next()?.setting)?.to_vec();
+        let (mut kept, mut stored) = (Vec::new(), Vec::new());
+        for row in 0..sigma.len() {
+            stored.clear();
+            values.iter().for_each(|(all, width)| stored.extend_from_slice(&all[row * width..(row + 1) * width]));
+            self.keep(&stored, &mut kept);
+        }
+        let anchor = self.columns(Part::Anchor).next().map(|column| named(column.setting).unwrap_or_default());
+        Some(Readings { kind: self.about().name, width: kept.len() / sigma.len().max(1), values: kept, sigma, anchor })
+    }
+}
+
+/// Kinds that the rows may measure.
+pub fn kinds(data: &Measurements) -> Vec<&'static dyn Kind> {
+    KINDS.iter().copied().filter(|kind| kind.is_in(data)).collect()
+}
+
+/// Length (m) of one sigma of what a row measured: of its point, or else of another length; zero where it measured none.
+pub fn noise(data: &Measurements, row: usize) -> f64 {
+    let mut lengths = KINDS.iter().filter(|kind| kind.about().dimension == Dimension::Length);
+    lengths.find_map(|kind| kind.noise(data, row)).unwrap_or(0.0)
+}
+
+/// Parameters of the geometry that the rows see by theory; none where some saw axes of a point only, of which theory has no word.
+///
+/// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor; less
+/// what moves the whole cell unseen.
+pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<usize> {
+    let axes = |kind: &dyn Kind, wanted: RangeInclusive<usize>| rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)));
+    let used: Vec<&dyn Kind> = KINDS.iter().copied().filter(|kind| axes(*kind, 1..=kind.about().axes)).collect();
+    let (whole, rest): (Vec<&dyn Kind>, Vec<&dyn Kind>) =
+        used.iter().copied().partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
+    let blind = |k: usize| whole.iter().map(|kind| kind.about().rank.blind[k]).min();
+    let (translations, rotations) = (blind(0)?, blind(1)?);
+    // Beside what fixes the whole cell it does not matter what single axes show.
+    if translations + rotations > 0 && !rest.is_empty() {
+        return None;
+    }
+    let places = used.iter().any(|kind| kind.about().rank.places);
+    let axis = |joint: usize| match (robot.is_revolute(joint), places) {
+        (true, true) => 4,
+        (true, false) | (false, true) => 2,
+        (false, false) => 0,
+    };
+    let gauging = robot.gauging();
+    let place = if places { 3 } else { 0 };
+    let targets: usize = gauging.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
+    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * gauging.anchors.len();
+    Some(seen - if places { translations } else { 0 } - rotations)
+}

@@ -1,0 +1,78 @@
+//! Points: where a target is in the tracker's frame, all of its axes or some of them.
+
+use super::{About, Column, Dimension, Kind, Part, Rank, Sensitivity, Weight};
+use crate::effect::PlacedRow;
+use crate::robot::Measurements;
+use crate::units::Quantity::Length;
+use nalgebra::Vector3;
+
+#[derive(Debug, Clone, Copy)]
+pub struct Point;
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+const SIGMAS: &[&str] = &["sigma_x", "sigma_y", "sigma_z"];
+/// m; no tracker sees farther.
+const FAR: [f64; 2] = [-200.0, 200.0];
+
+const fn axis(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
+    Column::number(setting, stored, Length, FAR, about).as_part(Part::Value)
+}
+
+const fn sigma(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
+    Column::number(setting, stored, Length, [0.0, 1.0], about).as_part(Part::Sigma).together(SIGMAS)
+}
+
+static ABOUT: About = About {
+    name: "point",
+    word: "point",
+    dimension: Dimension::Length,
+    axes: 3,
+    columns: &[
+        axis("x", &["x"], "Measured point, x in the tracker's frame."),
+        axis("y", &["y"], "Measured point, y in the tracker's frame."),
+        axis("z", &["z"], "Measured point, z in the tracker's frame."),
+        sigma("sigma_x", &["sigma_x"], "Standard deviation of x."),
+        sigma("sigma_y", &["sigma_y"], "Standard deviation of y."),
+        sigma("sigma_z", &["sigma_z"], "Standard deviation of z."),
+    ],
+    own_sigma: false,
+    rank: Rank { places: true, rotations: false, blind: [0, 0] },
+    is_screened: true,
+};
+
+impl Kind for Point {
+    fn about(&self) -> &'static About {
+        &ABOUT
+    }
+
+    fn residual(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<(Vector3<f64>, f64)> {
+        // Each axis has a variance of its own: see `weight`.
+        (data.axes(row) > 0).then(|| (data.residual(row, &placed.point), f64::NAN))
+    }
+
+    fn sensitivity(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow, weight: Weight) -> Sensitivity {
+        Sensitivity::Point(weight)
+    }
+
+    fn axes(&self, data: &Measurements, row: usize) -> usize {
+        data.axes(row)
+    }
+
+    fn weight(&self, data: &Measurements, row: usize, _variance: f64, excess: f64) -> Weight {
+        Weight::of(data, row, excess)
+    }
+
+    fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
+        (data.axes(row) > 0).then(|| data.noise(row))
+    }
+
+    /// Every recording has its columns.
+    fn is_in(&self, _data: &Measurements) -> bool {
+        true
+    }
+
+    fn words(&self, data: &Measurements, row: usize) -> Vec<&'static str> {
+        let measured = AXES.into_iter().enumerate().filter(|(axis, _)| data.sigma[row][*axis].is_finite());
+        measured.map(|(_, name)| name).collect()
+    }
+}

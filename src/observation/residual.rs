@@ -1,0 +1,65 @@
+//! What is left of what a row measured of one kind.
+
+use super::{Dimension, Kind, Sensitivity, Weight};
+use crate::effect::PlacedRow;
+use crate::robot::Measurements;
+use nalgebra::Vector3;
+
+/// Standard deviation that rows show beyond their own noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ExcessSigma {
+    /// Per axis of a point and of other lengths, m.
+    pub length: f64,
+    /// About each axis, rad.
+    pub angle: f64,
+}
+
+impl ExcessSigma {
+    pub fn of(&self, dimension: Dimension) -> f64 {
+        match dimension {
+            Dimension::Length => self.length,
+            Dimension::Angle => self.angle,
+        }
+    }
+}
+
+/// Measured - predicted of one kind in one row.
+#[derive(Clone, Copy)]
+pub struct Residual {
+    pub kind: &'static dyn Kind,
+    /// Of the recording.
+    pub row: usize,
+    /// m or rad; on the first `axes` lines or, of a point, on those measured.
+    pub error: Vector3<f64>,
+    /// How many values were measured.
+    pub axes: usize,
+    /// Of each value, where the kind has one for all.
+    variance: f64,
+}
+
+impl Residual {
+    /// What is left of a row that was placed; `None` as by [`Kind::residual`].
+    pub fn of(kind: &'static dyn Kind, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Self> {
+        let (error, variance) = kind.residual(data, row, placed)?;
+        Some(Self { kind, row, error, axes: kind.axes(data, row), variance })
+    }
+
+    pub fn dimension(&self) -> Dimension {
+        self.kind.about().dimension
+    }
+
+    /// Turns the error into standard deviations, with `excess` (m or rad) beside the noise.
+    pub fn weight(&self, data: &Measurements, excess: f64) -> Weight {
+        self.kind.weight(data, self.row, self.variance, excess)
+    }
+
+    /// The error in standard deviations.
+    pub fn whitened(&self, data: &Measurements, excess: f64) -> Vector3<f64> {
+        self.weight(data, excess).apply(&self.error)
+    }
+
+    /// What the kind sees of the target's motion, in standard deviations by `weight`.
+    pub fn sensitivity(&self, data: &Measurements, placed: &PlacedRow, weight: Weight) -> Sensitivity {
+        self.kind.sensitivity(data, self.row, placed, weight)
+    }
+}

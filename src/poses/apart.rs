@@ -1,0 +1,251 @@
+//! `calib poses --run`: poses that tell a finding of a diagnosis from a rival, at the sizes that the run found.
+
+mod show;
+
+use super::site::site;
+use super::{Request, wish};
+use crate::audit::diagnosis;
+use crate::diagnose::{DiagnosedModel, contest};
+use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
+use crate::error::{Error, Result, nearest};
+use crate::estimate::choose::{Aim, Circumstances, Site, Told, median, tell};
+use crate::pipeline::StageReport;
+use crate::robot::description::RobotDescription;
+use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::store::{Store, TableRef};
+use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
+use nalgebra::Vector3;
+
+/// Payloads of the recording that are asked for at most.
+const PAYLOADS: usize = 4;
+
+/// An effect at a place.
+type Name = (String, String);
+
+/// A finding and a rival, and what tells them apart.
+pub struct Apart<'a> {
+    request: &'a Request,
+    run: String,
+    finding: FindingRow,
+    rival: Name,
+    /// None where the two are one by an identity.
+    form: Option<Form>,
+    robot: RobotDescription,
+    ranges: Vec<[f64; 2]>,
+    rows: usize,
+    /// mm.
+    sigma: f64,
+    circumstances: Circumstances,
+    told: Told,
+}
+
+/// A run by its name, and which of its diagnoses.
+pub struct RunStage<'a> {
+    pub run: &'a str,
+    pub step: Option<&'a str>,
+}
+
+/// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
+pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
+    let (manifest, stage) = diagnosis(store, of.run, of.step)?;
+    let place = format!("run {}", manifest.run_id);
+    let findings: Findings = written(store, &stage)?;
+    let rivals: Rivals = written(store, &stage)?;
+    let (finding, mut rival) = pair(&place, &findings, &rivals, names)?;
+    let forms: Vec<Form> =
+        serde_json::from_str(&finding.forms).map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
+    if forms.is_empty() {
+        let message = format!("finding {}, {}, is a fault of the recording: no pose mends it", finding.rank, finding.effect);
+        return Err(Error::spec(place, message));
+    }
+    let robot = read::<Robot>(store, &stage)?.to_description()?;
+    let parameters: Parameters = written(store, &stage)?;
+    let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
+    let recording: Recording = read(store, &stage)?;
+    let mut data = recording.measurements(&Instrument::default());
+    let predicted = model.predict(&data);
+    let rows = as_fitted(&mut data, &written(store, &stage)?, &predicted);
+    let estimated = |name: &String| parameters.0.iter().any(|row| row.name == *name && row.status == "free");
+    let free: Vec<usize> = (0..model.x.len()).filter(|k| estimated(&model.stack.specs()[*k].name)).collect();
+    let diagnosed = DiagnosedModel { model: &model, data: &data, rows: &rows, free: &free };
+    let recorded = ranges(&data, &rows);
+    let mut site = site(request, &robot, &place, Some(&recorded))?;
+    if request.payloads.is_empty() {
+        site.payloads = payloads(&data, &rows);
+    }
+    let usual = median(rows.iter().map(|row| data.sigma[*row].x).collect());
+    let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
+    let circumstances = circumstances(&data, &rows);
+    let listed = rivals.0.iter().any(|row| row.rank == finding.rank && (&row.effect, &row.place) == (&rival.0, &rival.1));
+    let mut tried = None;
+    let told = match contest(&diagnosed, &forms, (&rival.0, &rival.1)) {
+        Ok((contest, form)) => {
+            rival = (form.name().to_string(), form.place().to_string());
+            // A free curve is known where points were fitted, and nowhere else.
+            if forms.iter().chain([&form]).any(|form| form.is(&JointTable) || form.cause().is_nameless()) {
+                within(&mut site, &recorded);
+            }
+            tried = Some(form);
+            let wish = wish(request, Aim::Information, sigma);
+            tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
+        }
+        // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
+        Err(_) if listed => Told { before: [0.0; 2], alike: [true; 2], proposed: None },
+        Err(fault) => return Err(Error::spec("--separate", fault)),
+    };
+    Ok(Apart {
+        request,
+        run: manifest.run_id,
+        finding,
+        rival,
+        form: tried,
+        robot,
+        ranges: site.ranges,
+        rows: rows.len(),
+        sigma: sigma * 1e3,
+        circumstances,
+        told,
+    })
+}
+
+fn written<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
+    let own = stage.outputs.iter().find(|output| output.kind == T::KIND).map(|output| &output.table);
+    table(store, own)
+}
+
+fn read<T: Table>(store: &Store, stage: &StageReport) -> Result<T> {
+    table(store, stage.inputs.iter().find(|input| input.port == T::KIND).map(|input| &input.table))
+}
+
+fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
+    let table = table.ok_or_else(|| Error::Bug(format!("a diagnosis without a table `{}`", T::KIND)))?;
+    T::from_frame(&store.load(table)?)
+}
+
+/// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place.
+fn name(text: &str) -> Result<(&str, Option<&str>)> {
+    let (effect, place) = match text.split_once('@').or_else(|| text.split_once(" at ")) {
+        Some((effect, place)) => (effect.trim(), Some(place.trim())),
+        None => (text.trim(), None),
+    };
+    let known = || CAUSES.iter().map(|cause| cause.name());
+    if known().any(|name| name == effect) {
+        return Ok((effect, place));
+    }
+    let near = nearest(effect, known()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
+    Err(Error::spec("--separate", format!("unknown effect `{effect}`; {near}`calib effects` lists them")))
+}
+
+/// The finding that is meant, and what to tell it from.
+fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, Name)> {
+    let list: Vec<String> = findings.0.iter().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place)).collect();
+    if list.is_empty() {
+        return Err(Error::spec(place, "found nothing that could be told from something else"));
+    }
+    // Of equals the first by name, as the table is sorted.
+    let closest = |row: &FindingRow| {
+        let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
+        own.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic)).map(|rival| (rival.effect.clone(), rival.place.clone()))
+    };
+    let name_one = |found: &FindingRow| {
+        let message = format!(
+            "{} at {} has no rival: this recording tells it from all others; name one as a second, e.g. 'link_compliance@link 2'",
+            found.effect, found.place
+        );
+        Error::spec("--separate", message)
+    };
+    let Some(first) = names.first() else {
+        let found = findings.0.iter().find_map(|row| Some((row.clone(), closest(row)?)));
+        let message = format!("no finding has a rival; name a finding and what to tell it from: --separate {list:?}");
+        return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
+    };
+    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first)) {
+        (Ok(rank), _) => row.rank == rank,
+        (_, Ok((effect, place))) => row.effect == effect && place.is_none_or(|place| is_place(&row.place, place)),
+        _ => false,
+    };
+    let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
+    let [found] = fitting[..] else {
+        if first.trim().parse::<i64>().is_err() {
+            name(first)?;
+        }
+        let many = if fitting.is_empty() { "no finding" } else { "several findings" };
+        return Err(Error::spec("--separate", format!("`{first}` is {many} of {place}; it has {}", list.join(", "))));
+    };
+    let Some(second) = names.get(1) else {
+        let rival = closest(found).ok_or_else(|| name_one(found))?;
+        return Ok((found.clone(), rival));
+    };
+    let (effect, at) = name(second)?;
+    let Some(at) = at else {
+        return Err(Error::spec("--separate", format!("`{second}`: say where, e.g. '{effect}@{}'", found.place)));
+    };
+    let own = rivals.0.iter().find(|rival| rival.effect == effect && is_place(&rival.place, at));
+    if effect == found.effect && is_place(&found.place, at) {
+        return Err(Error::spec("--separate", format!("`{second}` is the finding itself")));
+    }
+    Ok((found.clone(), (effect.into(), own.map_or(at, |rival| &rival.place).into())))
+}
+
+/// Whether `text` means a place: in its words, or as in names of parameters, e.g. `j2` for `joint 2`.
+fn is_place(place: &str, text: &str) -> bool {
+    let short = place.replace("joint ", "j").replace("link ", "l").replace("->", "_j").replace('-', "_");
+    place == text || short == text
+}
+
+/// Puts noise and residuals as they were fitted into the recording; returns the fitted rows.
+fn as_fitted(data: &mut Measurements, prediction: &Prediction, predicted: &[Vector3<f64>]) -> Vec<usize> {
+    let mut rows = Vec::new();
+    for (row, seen) in prediction.0.iter().enumerate().take(data.rows()) {
+        let sigma = seen.noise_mm * 1e-3 / 3f64.sqrt();
+        if seen.measured.is_some() || !(sigma.is_finite() && sigma > 0.0) {
+            continue;
+        }
+        data.position[row] = predicted[row] + Vector3::new(seen.dx_mm, seen.dy_mm, seen.dz_mm) * 1e-3;
+        data.sigma[row] = Vector3::repeat(sigma);
+        if !seen.held_out && !seen.suspect {
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+/// Range of every joint over some rows, rad or m.
+fn ranges(data: &Measurements, rows: &[usize]) -> Vec<[f64; 2]> {
+    let of = |joint: usize| {
+        let all = rows.iter().map(|row| data.q(*row)[joint]);
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+    };
+    (0..data.joints).map(of).collect()
+}
+
+fn within(site: &mut Site, recorded: &[[f64; 2]]) {
+    for (range, [low, high]) in site.ranges.iter_mut().zip(recorded) {
+        *range = [range[0].max(*low).min(*high), range[1].min(*high).max(*low)];
+    }
+}
+
+/// The payloads of the recording, or some of them, evenly taken.
+fn payloads(data: &Measurements, rows: &[usize]) -> Vec<f64> {
+    let mut all: Vec<f64> = rows.iter().map(|row| data.payload[*row]).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    let last = all.len().saturating_sub(1);
+    match all.len() {
+        0..=PAYLOADS => all,
+        _ => (0..PAYLOADS).map(|k| all[k * last / (PAYLOADS - 1)]).collect(),
+    }
+}
+
+/// After the recording, the arm as far from its first temperature as it came.
+fn circumstances(data: &Measurements, rows: &[usize]) -> Circumstances {
+    let last = rows.iter().map(|row| data.time(*row)).fold(0.0, f64::max);
+    let temperatures = || rows.iter().filter_map(|row| data.temperature(*row));
+    let first = temperatures().next();
+    let away = |t: &f64| first.map_or(0.0, |first| (t - first).abs());
+    Circumstances {
+        time: Some(last + 1.0),
+        temperature: temperatures().max_by(|a, b| away(a).total_cmp(&away(b))),
+        target: data.target.as_ref().and_then(|_| rows.first().map(|row| data.target(*row).to_string())),
+    }
+}

@@ -1,0 +1,111 @@
+//! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them, deg and mm.
+
+use crate::error::{Error, Result};
+use crate::raw::ending;
+use crate::robot::Measurements;
+use crate::robot::description::{JointKind, RobotDescription};
+use crate::units::Unit;
+use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
+use parquet::arrow::ArrowWriter;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Poses to drive to.
+pub struct Drive<'a> {
+    pub robot: &'a RobotDescription,
+    /// rad or m.
+    pub ranges: &'a [[f64; 2]],
+    pub poses: &'a Measurements,
+    /// +1 or -1, row-major.
+    pub direction: &'a [f64],
+}
+
+/// A column: its name, its values, and the decimals that people read (none: whole numbers).
+struct Column {
+    name: String,
+    values: Vec<f64>,
+    decimals: usize,
+}
+
+/// Decimals of joint positions: 1e-4 deg is 0.004 mm at 2.5 m.
+const JOINT_DECIMALS: usize = 4;
+
+fn columns(drive: &Drive) -> Vec<Column> {
+    let Drive { robot, ranges, poses, direction } = *drive;
+    let n = poses.joints;
+    let rows = 0..poses.rows();
+    let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| Column {
+        name,
+        values: rows.clone().map(value).collect(),
+        decimals,
+    };
+    let mut out = vec![column("sequence".into(), 0, &|row| (row + 1) as f64)];
+    for (j, (joint, range)) in robot.joints.iter().zip(ranges).enumerate() {
+        let (ending, unit) = match joint.kind {
+            JointKind::Revolute => ("deg", Unit::Degree),
+            JointKind::Prismatic => ("mm", Unit::Millimetre),
+        };
+        let middle = 0.5 * (range[0] + range[1]);
+        // Rounded towards the middle, so that what is written keeps within the limits.
+        out.push(column(format!("q{}_{ending}", j + 1), JOINT_DECIMALS, &|row| {
+            let (value, scale) = (poses.q[row * n + j], 10f64.powi(JOINT_DECIMALS as i32));
+            let scaled = unit.from_si(value) * scale;
+            (if value > middle { scaled.floor() } else { scaled.ceil() }) / scale
+        }));
+    }
+    out.push(column("payload_kg".into(), 3, &|row| poses.payload[row]));
+    for j in 0..n {
+        out.push(column(format!("dir{}", j + 1), 0, &|row| direction[row * n + j]));
+    }
+    for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
+        out.push(column(name.into(), 3, &|row| Unit::Millimetre.from_si(poses.position[row][axis])));
+    }
+    out
+}
+
+/// What is wrong with the ending, if anything.
+pub fn fault(path: &Path) -> Option<String> {
+    kind(path).is_none().then(|| format!("`{}` ends in neither .csv nor .parquet", path.display()))
+}
+
+fn kind(path: &Path) -> Option<&'static str> {
+    let ending = ending(path);
+    ["csv", "parquet"].into_iter().find(|known| *known == ending)
+}
+
+pub fn write(path: &Path, drive: &Drive) -> Result<()> {
+    let bytes = if kind(path) == Some("parquet") { parquet(drive)? } else { csv(drive).into_bytes() };
+    std::fs::write(path, bytes).map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))
+}
+
+/// The poses as JSON, an object each.
+pub(super) fn objects(drive: &Drive) -> Vec<serde_json::Value> {
+    let columns = columns(drive);
+    let object = |row: usize| columns.iter().map(|column| (column.name.clone(), serde_json::json!(column.values[row]))).collect();
+    (0..drive.poses.rows()).map(|row| serde_json::Value::Object(object(row))).collect()
+}
+
+fn csv(drive: &Drive) -> String {
+    let columns = columns(drive);
+    let mut text = columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",") + "\n";
+    for row in 0..drive.poses.rows() {
+        let cells = columns.iter().map(|column| format!("{:.*}", column.decimals, column.values[row]));
+        text.push_str(&(cells.collect::<Vec<_>>().join(",") + "\n"));
+    }
+    text
+}
+
+fn parquet(drive: &Drive) -> Result<Vec<u8>> {
+    let bug = |error: &dyn std::fmt::Display| Error::Bug(error.to_string());
+    let arrays = columns(drive).into_iter().map(|column| {
+        let array: ArrayRef = match column.name.as_str() {
+            "sequence" => Arc::new(column.values.iter().map(|value| *value as i64).collect::<Int64Array>()),
+            _ => Arc::new(Float64Array::from(column.values)),
+        };
+        (column.name, array)
+    });
+    let batch = RecordBatch::try_from_iter(arrays).map_err(|error| bug(&error))?;
+    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), None).map_err(|error| bug(&error))?;
+    writer.write(&batch).map_err(|error| bug(&error))?;
+    writer.into_inner().map_err(|error| bug(&error))
+}

@@ -1,0 +1,111 @@
+//! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
+
+use super::site::site;
+use super::{Request, recorded, wish};
+use crate::effect::{EffectStack, Load, Setting, identified, whole};
+use crate::error::{Error, Result};
+use crate::estimate::Model;
+use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
+use crate::identified::robot_file;
+use crate::robot::description::RobotDescription;
+use crate::robot::{Measurements, RobotModel};
+use crate::spatial::Pose;
+use crate::units::Unit;
+use nalgebra::Vector3;
+use std::path::Path;
+
+/// What was proposed and what for; made once, shown as text, JSON or file.
+pub struct Work<'a> {
+    pub(super) request: &'a Request,
+    pub(super) robot: RobotDescription,
+    pub(super) ranges: Vec<[f64; 2]>,
+    pub(super) effects: Vec<&'static str>,
+    /// Effects left out, with the reason.
+    pub(super) left_out: Vec<(&'static str, String)>,
+    /// Names and units of the stack's parameters.
+    pub(super) parameters: Vec<(String, Unit)>,
+    /// mm.
+    pub(super) sigma: f64,
+    pub(super) proposal: Proposal,
+    pub(super) recorded: Option<Score>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// mm.
+const SIGMA: f64 = 0.02;
+
+/// A robot file, and the URDF that it refers to.
+pub struct RobotFiles<'a> {
+    pub file: &'a Path,
+    pub urdf: Option<&'a Path>,
+}
+
+/// Proposes poses; `pair` are two effects to tell apart, or none, `against` a recording to compare with.
+pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
+    let imported = robot_file(robot.file, robot.urdf)?;
+    let place = robot.file.display().to_string();
+    let site = site(request, &imported, &place, None)?;
+    let robot = RobotModel::new(imported.clone());
+    let (effects, left_out) = effects(&request.effects, &robot, &site);
+    let model = || model(&robot, &effects);
+    let aim = match pair {
+        [a, b] => Aim::Separation([a.clone(), b.clone()]),
+        _ => Aim::Information,
+    };
+    for name in pair {
+        if let Some((_, reason)) = left_out.iter().find(|(left, _)| left == name) {
+            return Err(Error::spec("--separate", format!("`{name}` cannot be told: {reason}")));
+        }
+    }
+    let shown = request.sigma.unwrap_or(SIGMA);
+    let sigma = shown * 1e-3;
+    let recording = against.map(|path| recorded::recording(path, &imported, sigma)).transpose()?;
+    let proposal = propose(model(), &site, &wish(request, aim, sigma)).map_err(|fault| Error::spec(place, fault))?;
+    let score = |data: &Measurements| proposal.jacobian.score(&model(), data, &proposal.workspace);
+    let recorded = recording.as_ref().map(|(data, _)| score(data));
+    let warnings = recording.and_then(|(_, warning)| warning).into_iter().collect();
+    let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
+    let ranges = site.ranges;
+    Ok(Work { request, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded, warnings })
+}
+
+type Named = (Vec<&'static str>, Vec<(&'static str, String)>);
+
+/// The chosen effects that poses can tell of this robot, and those left out.
+fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> Named {
+    let heaviest = site.payloads.iter().copied().fold(0.0, f64::max);
+    let data = Measurements {
+        joints: robot.joints(),
+        q: vec![0.0; robot.joints()],
+        position: vec![Vector3::zeros()],
+        sigma: vec![Vector3::zeros()],
+        payload: vec![heaviest],
+        ..Measurements::default()
+    };
+    let setting = setting();
+    let (mut kept, mut left) = (Vec::new(), Vec::new());
+    for effect in identified().filter_map(|cause| cause.whole(&setting)) {
+        if chosen.is_empty() || chosen.iter().any(|name| name == effect.name()) {
+            match effect.missing(robot, &data) {
+                Some(reason) => left.push((effect.name(), reason)),
+                None => kept.push(effect.name()),
+            }
+        }
+    }
+    (kept, left)
+}
+
+/// Whether poses can be asked for an effect of this name.
+pub fn is_known(effect: &str) -> bool {
+    whole(effect, &setting()).is_some()
+}
+
+fn setting() -> Setting {
+    Setting { base: Pose::identity(), load: Load::GravityTorque }
+}
+
+fn model(robot: &RobotModel, effects: &[&str]) -> Model {
+    let setting = setting();
+    let made = effects.iter().filter_map(|name| whole(name, &setting)).collect();
+    Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, made))
+}

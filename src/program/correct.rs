@@ -1,0 +1,60 @@
+//! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
+
+use super::{Language, Note, Partial, Program, Refusal, Rewritten, solve};
+use crate::compensate::Corrector;
+use crate::error::{Error, Fault, Result};
+use crate::robot::RobotModel;
+use crate::robot::description::RobotDescription;
+
+/// Joints that both languages have targets for.
+const JOINTS: usize = 6;
+
+/// Faults told of a program: more are of a file that is none.
+const MOST_FAULTS: usize = 500;
+
+/// A program as a file has it.
+pub struct ProgramFile<'a> {
+    /// How messages name it.
+    pub place: &'a str,
+    pub text: &'a [u8],
+    pub language: Language,
+}
+
+impl ProgramFile<'_> {
+    /// File, line and column.
+    pub fn at(&self, note: &Note) -> String {
+        format!("{}:{}:{}", self.place, note.line, note.column)
+    }
+
+    fn refused(&self, refusal: Refusal) -> Error {
+        let told = refusal.faults.iter().take(MOST_FAULTS);
+        let mut faults: Vec<Fault> = told.map(|note| Fault::new(self.at(note), &note.message)).collect();
+        if refusal.faults.len() > MOST_FAULTS {
+            faults.push(Fault::new(self.place, format!("and {} more", refusal.faults.len() - MOST_FAULTS)));
+        }
+        if refusal.partial > 0 {
+            faults.push(Fault::new(self.place, "partial targets stay as they are with --leave-partial"));
+        }
+        Error::Data(faults)
+    }
+}
+
+/// The program with its targets corrected; fails with every fault of it.
+pub fn corrected(
+    source: &ProgramFile,
+    partial: Partial,
+    robot: &RobotDescription,
+    corrector: &mut Corrector,
+) -> Result<Rewritten> {
+    let robot = RobotModel::new(robot.clone());
+    if robot.joints() != JOINTS {
+        let message = format!("programs have targets of {JOINTS} joints, the robot has {}", robot.joints());
+        return Err(Error::spec(source.place, message));
+    }
+    let program = Program::parse(source.text, source.language, partial).map_err(|refusal| source.refused(refusal))?;
+    if program.literals().is_empty() {
+        return Err(Error::data(source.place, "has no targets"));
+    }
+    let answers = solve(program.literals(), &robot, corrector);
+    program.rewritten(answers).map_err(|refusal| source.refused(refusal))
+}

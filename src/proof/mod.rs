@@ -1,0 +1,11 @@
+//! The proof of a diagnosis: sets of concealed recordings written and sealed, and diagnoses held against the truth once it is opened.
+
+mod marks;
+mod recorded;
+mod seal;
+mod set;
+
+pub use marks::{board, write_scoreboard};
+pub use recorded::recorded;
+pub use seal::{RECORDINGS, SEAL, SEALED, Seal};
+pub use set::{conceal, vacant};

@@ -1,0 +1,199 @@
+//! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
+
+use crate::robot::readings::{Named, Reading, Readings};
+use nalgebra::{Matrix3, Vector3};
+
+/// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
+#[derive(Debug, Clone, Default)]
+pub struct Measurements {
+    pub joints: usize,
+    /// rad or m.
+    pub q: Vec<f64>,
+    /// Measured point, tracker frame, m; 0 along an axis that was not measured.
+    pub position: Vec<Vector3<f64>>,
+    /// Standard deviation per axis, m; infinite along an axis that was not measured.
+    pub sigma: Vec<Vector3<f64>>,
+    /// kg; 0 where nothing was said.
+    pub payload: Vec<f64>,
+    /// A.
+    pub current: Option<Vec<f64>>,
+    /// s; where no row has one, the number of the row stands for it.
+    pub time: Option<Vec<f64>>,
+    /// Of the arm, C.
+    pub temperature: Option<Vec<f64>>,
+    /// Direction of the last move of each joint, +1 / -1; without it the order of the rows tells.
+    pub direction: Option<Vec<f64>>,
+    /// Velocity of each joint when the point was measured, rad/s or m/s; without it the arm stood.
+    pub velocity: Option<Vec<f64>>,
+    /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
+    pub spread: Option<Vec<Matrix3<f64>>>,
+    /// The target that each row measured; the tool point where rows name none.
+    pub target: Option<Named>,
+    /// What was measured beside points; one entry a kind.
+    pub readings: Vec<Readings>,
+}
+
+impl Measurements {
+    pub fn rows(&self) -> usize {
+        self.position.len()
+    }
+
+    pub fn q(&self, row: usize) -> &[f64] {
+        &self.q[row * self.joints..(row + 1) * self.joints]
+    }
+
+    pub fn current(&self, row: usize) -> Option<&[f64]> {
+        self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
+    }
+
+    /// Length (m) of the one-sigma noise of a row's point: root of the summed variances of what was measured of it.
+    pub fn noise(&self, row: usize) -> f64 {
+        if self.whole(row) {
+            let beyond = self.spread.as_ref().map_or(0.0, |all| all[row].trace());
+            return (self.sigma[row].norm_squared() + beyond).sqrt();
+        }
+        let measured = (0..3).filter(|axis| self.sigma[row][*axis].is_finite());
+        let beyond = |axis: usize| self.spread.as_ref().map_or(0.0, |all| all[row][(axis, axis)]);
+        let variance: f64 = measured.map(|axis| self.sigma[row][axis].powi(2) + beyond(axis)).sum();
+        variance.sqrt()
+    }
+
+    /// Whether any row has a time: else [`Measurements::time`] counts rows.
+    pub fn has_clock(&self) -> bool {
+        self.time.as_ref().is_some_and(|all| all.iter().any(|time| time.is_finite()))
+    }
+
+    /// s from some start, that of the last row that has one where this row has none; without a clock the number of the row, from 0.
+    pub fn time(&self, row: usize) -> f64 {
+        self.time.as_ref().and_then(|all| nearest(all, row)).unwrap_or(row as f64)
+    }
+
+    /// C; that of the last row that has one where this row has none.
+    pub fn temperature(&self, row: usize) -> Option<f64> {
+        nearest(self.temperature.as_ref()?, row)
+    }
+
+    /// What joint `joint` moved (rad or m) from the row before to this one; 0 in the first row.
+    pub fn last_move(&self, row: usize, joint: usize) -> f64 {
+        if row == 0 { 0.0 } else { self.q(row)[joint] - self.q(row - 1)[joint] }
+    }
+
+    /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of the rows; 0 if it never moved.
+    pub fn direction(&self, row: usize, joint: usize) -> f64 {
+        let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
+        if let Some(direction) = recorded.filter(|value| value.is_finite() && *value != 0.0) {
+            return direction.signum();
+        }
+        let moves = (0..=row).rev().map(|k| self.last_move(k, joint));
+        moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
+    }
+
+    /// Velocity of a joint, rad/s or m/s; 0 where none was recorded.
+    pub fn velocity(&self, row: usize, joint: usize) -> f64 {
+        let all = self.velocity.as_ref();
+        all.and_then(|all| all.get(row * self.joints + joint)).copied().filter(|value| value.is_finite()).unwrap_or(0.0)
+    }
+
+    /// Whether these rows are a recording of motion: in one of ten at least a joint moved.
+    pub fn in_motion(&self, rows: &[usize]) -> bool {
+        let moves = |row: &&usize| (0..self.joints).any(|joint| self.velocity(**row, joint) != 0.0);
+        self.velocity.is_some() && 10 * rows.iter().filter(moves).count() > rows.len()
+    }
+
+    /// The name of the target that a row measured; empty for the tool point.
+    pub fn target(&self, row: usize) -> &str {
+        self.target.as_ref().map_or("", |target| target.name(row))
+    }
+
+    /// Whether all three axes of a row's point were measured.
+    pub fn whole(&self, row: usize) -> bool {
+        self.sigma[row].iter().all(|sigma| sigma.is_finite())
+    }
+
+    /// How many axes of a row's point were measured.
+    pub fn axes(&self, row: usize) -> usize {
+        self.sigma[row].iter().filter(|sigma| sigma.is_finite()).count()
+    }
+
+    /// Measured - predicted (m); zero along axes that were not measured.
+    pub fn residual(&self, row: usize, predicted: &Vector3<f64>) -> Vector3<f64> {
+        let residual = self.position[row] - predicted;
+        if self.whole(row) {
+            return residual;
+        }
+        Vector3::from_fn(|axis, _| if self.sigma[row][axis].is_finite() { residual[axis] } else { 0.0 })
+    }
+
+    /// What a row measured of a kind beside points, by the kind's name.
+    pub fn reading(&self, kind: &str, row: usize) -> Option<Reading<'_>> {
+        self.readings.iter().find(|readings| readings.kind == kind)?.row(row)
+    }
+
+    /// The anchor that a row measured from; empty where it has no name.
+    pub fn anchor(&self, row: usize) -> Option<&str> {
+        let mut anchored = self.readings.iter().filter(|readings| readings.anchor.is_some());
+        anchored.find_map(|readings| readings.row(row)).map(|reading| reading.anchor)
+    }
+
+    /// Whether rows `a` and `b` are the same pose under the same payload.
+    pub fn same_pose(&self, a: usize, b: usize) -> bool {
+        let near = |(x, y): (&f64, &f64)| (x - y).abs() < SAME_JOINT;
+        self.payload[a] == self.payload[b] && self.q(a).iter().zip(self.q(b)).all(near)
+    }
+}
+
+/// The value of a row, of the last one that has one, or of the next.
+fn nearest(all: &[f64], row: usize) -> Option<f64> {
+    (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
+}
+
+/// Joint positions (rad or m) closer than this are one command: below any controller's resolution.
+const SAME_JOINT: f64 = 1e-9;
+
+/// The tracker's point noise: (constant + per_metre * range) / coverage is one sigma per axis.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Instrument {
+    /// Constant part of the stated noise, um.
+    #[serde(default = "constant")]
+    pub constant_um: f64,
+    /// Part that grows with range, um per metre.
+    #[serde(default = "per_metre")]
+    pub per_metre_um: f64,
+    /// How many sigmas the stated figures are.
+    #[serde(default = "coverage")]
+    pub coverage: f64,
+}
+
+// The tracker of the paper (Sec. 6): 10 um + 2.5 um/m, a 2-sigma figure.
+fn constant() -> f64 {
+    10.0
+}
+fn per_metre() -> f64 {
+    2.5
+}
+fn coverage() -> f64 {
+    2.0
+}
+
+impl Default for Instrument {
+    fn default() -> Self {
+        Self { constant_um: constant(), per_metre_um: per_metre(), coverage: coverage() }
+    }
+}
+
+impl Instrument {
+    /// One standard deviation per axis (m) at a point in the tracker's frame.
+    pub fn sigma(&self, position: &Vector3<f64>) -> f64 {
+        (self.constant_um + self.per_metre_um * position.norm()) * 1e-6 / self.coverage
+    }
+
+    /// What is wrong with the figures, if anything.
+    pub fn fault(&self) -> Option<&'static str> {
+        let fine = self.constant_um >= 0.0 && self.per_metre_um >= 0.0 && self.coverage > 0.0;
+        let something = self.constant_um + self.per_metre_um > 0.0;
+        (!fine || !something).then_some(
+            "expected a noise above zero and a coverage above zero, e.g. {constant_um: 10, per_metre_um: 2.5, coverage: 2}",
+        )
+    }
+}

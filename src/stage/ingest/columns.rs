@@ -1,0 +1,267 @@
+//! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
+
+use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
+use crate::observation::{Column, Convention, Conventions, Shape};
+use crate::table::recording_columns;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::LazyLock;
+
+/// Which column holds which quantity; what is not named here is not read. In the order of the declared columns.
+#[derive(Debug, Clone, Default)]
+pub struct Columns(Vec<(&'static Column, Mapped)>);
+
+/// Where a quantity stands in a file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+enum Mapped {
+    Text(TextColumn),
+    Count(CountColumn),
+    Number(ScalarColumn),
+    Joints(JointColumns),
+    Conventions(ConventionColumns),
+}
+
+macro_rules! mapped {
+    ($(#[$doc:meta])* $all:ident, $one:ident, $variant:ident, $type:ty) => {
+        $(#[$doc])*
+        pub(super) fn $all(&self) -> impl Iterator<Item = (&'static Column, &$type)> {
+            self.0.iter().filter_map(|(column, mapped)| match mapped {
+                Mapped::$variant(mapped) => Some((*column, mapped)),
+                _ => None,
+            })
+        }
+        pub(super) fn $one(&self, setting: &str) -> Option<&$type> {
+            self.$all().find(|(column, _)| column.setting == setting).map(|(_, mapped)| mapped)
+        }
+    };
+}
+
+impl Columns {
+    mapped!(
+        #[doc = "The mapped texts."]
+        texts,
+        text,
+        Text,
+        TextColumn
+    );
+    mapped!(
+        #[doc = "The mapped whole numbers."]
+        counts,
+        count,
+        Count,
+        CountColumn
+    );
+    mapped!(
+        #[doc = "The mapped single numbers."]
+        numbers,
+        number,
+        Number,
+        ScalarColumn
+    );
+    mapped!(
+        #[doc = "The mapped numbers per joint."]
+        joints,
+        joint,
+        Joints,
+        JointColumns
+    );
+
+    /// The mapped quantities of several numbers.
+    pub(super) fn conventions(&self) -> impl Iterator<Item = (&'static Column, &'static Conventions, &ConventionColumns)> {
+        self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
+            (Shape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
+            _ => None,
+        })
+    }
+
+    pub(super) fn has(&self, setting: &str) -> bool {
+        self.0.iter().any(|(column, _)| column.setting == setting)
+    }
+
+    /// Names of all mapped quantities.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        self.0.iter().map(|(column, _)| column.setting).collect()
+    }
+
+    /// What does not depend on the robot's joints.
+    pub(super) fn without_joints(&self) -> Self {
+        let others = self.0.iter().filter(|(_, mapped)| !matches!(mapped, Mapped::Joints(_)));
+        Self(others.cloned().collect())
+    }
+}
+
+impl PartialEq for Columns {
+    fn eq(&self, other: &Self) -> bool {
+        let own = self.0.iter().map(|(column, mapped)| (column.setting, mapped));
+        own.eq(other.0.iter().map(|(column, mapped)| (column.setting, mapped)))
+    }
+}
+
+impl ConventionColumns {
+    /// The convention with its columns; none unless exactly one is given.
+    pub(super) fn chosen(&self, conventions: &'static Conventions) -> Option<(&'static Convention, &[ColumnRef])> {
+        let mut given = self.columns.iter();
+        let (name, columns) = given.next().filter(|_| given.next().is_none())?;
+        let convention = conventions.all.iter().find(|convention| convention.name == *name)?;
+        Some((convention, columns.as_slice()))
+    }
+}
+
+impl Serialize for Columns {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(column, mapped)| (column.setting, mapped)))
+    }
+}
+
+/// Settings of the block, and of the conventions of each.
+static SETTINGS: LazyLock<Vec<&'static str>> = LazyLock::new(|| recording_columns().map(|column| column.setting).collect());
+static CONVENTIONS: LazyLock<BTreeMap<&'static str, Vec<&'static str>>> = LazyLock::new(|| {
+    let named = |column: &Column| match column.shape {
+        Shape::Conventions(conventions) => conventions.all.iter().map(|one| one.name).chain(["unit", "optional"]).collect(),
+        _ => Vec::new(),
+    };
+    recording_columns().map(|column| (column.setting, named(column))).collect()
+});
+
+impl<'de> Deserialize<'de> for Columns {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_struct("Columns", &SETTINGS, Block)
+    }
+}
+
+struct Block;
+
+impl<'de> Visitor<'de> for Block {
+    type Value = Columns;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("struct Columns")
+    }
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Columns, A::Error> {
+        let mut found: BTreeMap<&'static str, Mapped> = BTreeMap::new();
+        while let Some(setting) = access.next_key_seed(Key(&SETTINGS))? {
+            let Some(column) = recording_columns().find(|column| column.setting == setting) else { continue };
+            let mapped = match column.shape {
+                Shape::Text => access.next_value::<Option<_>>()?.map(Mapped::Text),
+                Shape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
+                Shape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
+                Shape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
+                Shape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
+            };
+            if mapped.is_some_and(|mapped| found.insert(column.setting, mapped).is_some()) {
+                return Err(A::Error::duplicate_field(column.setting));
+            }
+        }
+        Ok(Columns(recording_columns().filter_map(|column| Some((column, found.remove(column.setting)?))).collect()))
+    }
+}
+
+/// A key that is one of these.
+struct Key(&'static [&'static str]);
+
+impl<'de> DeserializeSeed<'de> for Key {
+    type Value = &'static str;
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
+        let name = Cow::<str>::deserialize(deserializer)?;
+        self.0.iter().copied().find(|known| *known == name).ok_or_else(|| D::Error::unknown_field(&name, self.0))
+    }
+}
+
+/// Columns of a quantity of several numbers.
+struct OneConvention(&'static Column);
+
+impl<'de> DeserializeSeed<'de> for OneConvention {
+    type Value = Option<ConventionColumns>;
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
+        deserializer.deserialize_option(self)
+    }
+}
+
+impl<'de> Visitor<'de> for OneConvention {
+    type Value = Option<ConventionColumns>;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a block of keys")
+    }
+    fn visit_none<E>(self) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
+        deserializer.deserialize_map(self)
+    }
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
+        let mut out = ConventionColumns::default();
+        let known = CONVENTIONS.get(self.0.setting).map(Vec::as_slice).unwrap_or_default();
+        while let Some(key) = access.next_key_seed(Key(known))? {
+            match key {
+                "unit" => out.unit = access.next_value()?,
+                "optional" => out.optional = access.next_value()?,
+                convention => {
+                    if let Some(columns) = access.next_value::<Option<Vec<ColumnRef>>>()? {
+                        out.columns.insert(convention, columns);
+                    }
+                }
+            }
+        }
+        Ok(Some(out))
+    }
+}
+
+impl JsonSchema for Columns {
+    fn schema_name() -> Cow<'static, str> {
+        "Columns".into()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut properties = serde_json::Map::new();
+        for column in recording_columns() {
+            let mut schema = match column.shape {
+                Shape::Text => generator.subschema_for::<Option<TextColumn>>(),
+                Shape::Count => generator.subschema_for::<Option<CountColumn>>(),
+                Shape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
+                Shape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
+                Shape::Conventions(conventions) => {
+                    let block = convention_schema(column.setting, conventions, generator);
+                    generator.definitions_mut().insert(conventions.name.into(), block.to_value());
+                    let reference = format!("#/definitions/{}", conventions.name);
+                    json_schema!({ "anyOf": [{ "$ref": reference }, { "type": "null" }] })
+                }
+            };
+            schema.insert("description".into(), column.about.into());
+            schema.insert("default".into(), serde_json::Value::Null);
+            properties.insert(column.setting.into(), schema.to_value());
+        }
+        json_schema!({
+            "description": "Which column holds which quantity; what is not named here is not read.",
+            "type": "object",
+            "properties": properties,
+            "additionalProperties": false,
+        })
+    }
+}
+
+fn convention_schema(setting: &str, conventions: &Conventions, generator: &mut SchemaGenerator) -> Schema {
+    let described = |mut schema: Schema, about: &str, default: serde_json::Value| {
+        schema.insert("description".into(), about.into());
+        schema.insert("default".into(), default);
+        schema.to_value()
+    };
+    let mut properties = serde_json::Map::new();
+    for convention in conventions.all {
+        let columns = generator.subschema_for::<Option<Vec<ColumnRef>>>();
+        properties.insert(convention.name.into(), described(columns, convention.about, serde_json::Value::Null));
+    }
+    let unit = generator.subschema_for::<Option<String>>();
+    properties.insert("unit".into(), described(unit, conventions.unit, serde_json::Value::Null));
+    let optional = generator.subschema_for::<bool>();
+    let about = format!("The cells may be blank: the row has no {setting}.");
+    properties.insert("optional".into(), described(optional, &about, false.into()));
+    json_schema!({
+        "description": conventions.about,
+        "type": "object",
+        "properties": properties,
+        "additionalProperties": false,
+    })
+}

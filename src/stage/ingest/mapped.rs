@@ -1,0 +1,142 @@
+//! Where a quantity stands in a file: a column or several of them, or one value for every row.
+
+use schemars::JsonSchema;
+use serde::de::{self, Deserializer, Unexpected, Visitor};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// A column by its name in the header, or by its number from 1.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ColumnRef {
+    /// Number from 1.
+    Number(u32),
+    /// Name in the header, as it stands there (blanks around it do not count).
+    Name(String),
+}
+
+impl<'de> Deserialize<'de> for ColumnRef {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        // By hand, so that the message says what is allowed.
+        deserializer.deserialize_any(NameOrNumber)
+    }
+}
+
+struct NameOrNumber;
+
+impl Visitor<'_> for NameOrNumber {
+    type Value = ColumnRef;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the name of a column, or its number from 1")
+    }
+    fn visit_str<E: de::Error>(self, name: &str) -> Result<ColumnRef, E> {
+        Ok(ColumnRef::Name(name.into()))
+    }
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<ColumnRef, E> {
+        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Unsigned(number), &self))
+    }
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<ColumnRef, E> {
+        u32::try_from(number).map(ColumnRef::Number).map_err(|_| E::invalid_value(Unexpected::Signed(number), &self))
+    }
+}
+
+impl fmt::Display for ColumnRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "column {number}"),
+            Self::Name(name) => write!(f, "column `{name}`"),
+        }
+    }
+}
+
+/// A column of text, or the same text for every row of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TextColumn {
+    /// Name or number of the column.
+    #[serde(default)]
+    pub column: Option<ColumnRef>,
+    /// The text of every row, instead of a column.
+    #[serde(default)]
+    pub value: Option<String>,
+    /// The column may be missing from the file, and its cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// A column of whole numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CountColumn {
+    /// Name or number of the column.
+    pub column: ColumnRef,
+}
+
+/// A column of numbers, or the same number for every row of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScalarColumn {
+    /// Name or number of the column.
+    #[serde(default)]
+    pub column: Option<ColumnRef>,
+    /// A column whose number is taken off, for lengths: where the file holds the target in `column` and, instead of the measured
+    /// point, target less measured point here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub minus: Option<ColumnRef>,
+    /// A column whose number is added, for lengths: measured point less target.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plus: Option<ColumnRef>,
+    /// Unit of the column `minus` or `plus`; without it `unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub difference_unit: Option<String>,
+    /// The number of every row, instead of a column.
+    #[serde(default)]
+    pub value: Option<f64>,
+    /// Unit of the file's numbers, e.g. `mm`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// The column may be missing from the file, and its cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// Columns of numbers, one for each joint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointColumns {
+    /// A pattern for the names, `{j}` being the joint's number from 1: `q{j}_deg`.
+    #[serde(default)]
+    pub column: Option<String>,
+    /// Names or numbers of the columns from the first joint to the last, instead of a pattern.
+    #[serde(default)]
+    pub columns: Option<Vec<ColumnRef>>,
+    /// Unit of the file's numbers; for positions and velocities that of the revolute joints, e.g. `deg`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// Unit of the positions or velocities of prismatic joints, e.g. `mm`.
+    #[serde(default)]
+    pub linear_unit: Option<String>,
+    /// The columns may be missing from the file, and their cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+/// Columns of a quantity of several numbers, by convention.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ConventionColumns {
+    #[serde(flatten)]
+    pub columns: BTreeMap<&'static str, Vec<ColumnRef>>,
+    /// Unit of the numbers, e.g. `deg`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// The cells may be blank: the row has none.
+    pub optional: bool,
+}
+
+impl ScalarColumn {
+    /// The column that is added to `column`, or taken off (-1).
+    pub(super) fn difference(&self) -> Option<(&ColumnRef, f64)> {
+        self.minus.as_ref().map(|column| (column, -1.0)).or_else(|| self.plus.as_ref().map(|column| (column, 1.0)))
+    }
+}

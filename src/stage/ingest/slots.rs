@@ -1,0 +1,68 @@
+//! Where the quantities of a row live in its list of numbers and of texts: one after another, as the recording declares them.
+
+use crate::observation::{Column, KINDS, Kind, Part};
+use crate::table::recording_columns;
+use std::ops::Range;
+
+/// The layout of a row, of a robot with so many joints.
+pub(super) struct Slots {
+    columns: Vec<(&'static Column, Range<usize>)>,
+    texts: Vec<&'static str>,
+    /// Numbers in a row.
+    pub count: usize,
+    pub time: usize,
+    pub q: Range<usize>,
+    pub velocity: Range<usize>,
+    /// What each kind of measurement takes.
+    pub kinds: Vec<KindSlots>,
+}
+
+/// Where a kind's numbers are.
+pub(super) struct KindSlots {
+    pub kind: &'static dyn Kind,
+    pub values: Vec<usize>,
+    pub sigma: Vec<usize>,
+}
+
+impl Slots {
+    pub(super) fn new(joints: usize) -> Self {
+        let mut count = 0;
+        let place = |column: &'static Column| {
+            let first = count;
+            count += column.numbers(joints);
+            (column, first..count)
+        };
+        let columns: Vec<(&'static Column, Range<usize>)> = recording_columns().map(place).collect();
+        let texts = recording_columns().filter(|column| column.is_text() && column.setting != "point_id");
+        let mut slots = Self {
+            texts: texts.map(|column| column.setting).collect(),
+            columns,
+            count,
+            time: 0,
+            q: 0..0,
+            velocity: 0..0,
+            kinds: Vec::new(),
+        };
+        (slots.time, slots.q, slots.velocity) = (slots.of("time").start, slots.of("q"), slots.of("velocity"));
+        let part = |kind: &dyn Kind, part: Part| -> Vec<usize> {
+            kind.columns(part).flat_map(|column| slots.of(column.setting).take(column.stored.len())).collect()
+        };
+        let kinds =
+            KINDS.iter().map(|kind| KindSlots { kind: *kind, values: part(*kind, Part::Value), sigma: part(*kind, Part::Sigma) });
+        slots.kinds = kinds.collect();
+        slots
+    }
+    /// The places of a setting's numbers.
+    pub(super) fn of(&self, setting: &str) -> Range<usize> {
+        let found = self.columns.iter().find(|(column, _)| column.setting == setting);
+        found.map_or(0..0, |(_, places)| places.clone())
+    }
+    /// All columns with numbers, and their places.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static Column, Range<usize>)> {
+        self.columns.iter().filter(|(_, places)| !places.is_empty())
+    }
+    /// Settings of the texts of a row beside its id.
+    pub(super) fn texts(&self) -> &[&'static str] {
+        &self.texts
+    }
+}

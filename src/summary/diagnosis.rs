@@ -1,0 +1,178 @@
+//! A diagnosis from its tables, as text and as JSON.
+
+use crate::error::{Error, Result};
+use crate::pipeline::StageReport;
+use crate::shell::typed;
+use crate::stage::{Diagnose, Stage};
+use crate::store::Store;
+use crate::table::{FindingNumbers, Findings, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow};
+use serde_json::{Value, json};
+
+/// The tables of a diagnosis.
+pub struct DiagnosisSummary {
+    run: String,
+    step: String,
+    verdict: VerdictRow,
+    findings: Findings,
+    numbers: FindingNumbers,
+    rivals: Rivals,
+    shares: Shares,
+}
+
+/// Rivals of a finding that poses are offered for.
+const ASKED: usize = 2;
+
+/// Whether poses may tell an effect from others: steps and drifts have had their time, faults of rows have none.
+fn by_poses(effect: &str) -> bool {
+    !matches!(
+        effect,
+        "zero_shift" | "tool_shift" | "base_shift" | "tracker_drift" | "joint_log_lag" | "outlier" | "mislabelled_point"
+    )
+}
+
+/// Places and variables that are shown.
+const SHOWN: usize = 5;
+
+fn table<T: Table + Default>(stage: &StageReport, store: &Store) -> Result<T> {
+    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
+    own.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
+}
+
+impl DiagnosisSummary {
+    /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
+    pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
+        let verdict: Verdict = table(stage, store)?;
+        let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
+        let (findings, numbers) = (table(stage, store)?, table(stage, store)?);
+        let (run, step) = (run.to_string(), stage.id.clone());
+        Ok(Self { run, step, verdict, findings, numbers, rivals: table(stage, store)?, shares: table(stage, store)? })
+    }
+
+    /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
+    fn next(&self, store: &str) -> Option<Vec<String>> {
+        let mut lines: Vec<String> = self.verdict.next_measurements.as_deref()?.lines().map(String::from).collect();
+        let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", typed(&self.step)) };
+        for finding in self.findings.0.iter().filter(|finding| by_poses(&finding.effect)) {
+            let mut own: Vec<&RivalRow> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).collect();
+            own.retain(|rival| by_poses(&rival.effect));
+            own.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+            for rival in own.iter().take(ASKED) {
+                let name = format!("{}@{}", rival.effect, rival.place);
+                lines.push(format!(
+                    "poses for finding {} or {} at {}: calib poses --run {}{step}{store} --separate {} {}",
+                    finding.rank,
+                    rival.effect,
+                    rival.place,
+                    self.run,
+                    finding.rank,
+                    typed(&name)
+                ));
+            }
+        }
+        Some(lines)
+    }
+
+    /// What could explain the most of the residual before the findings, more than chance, largest first.
+    fn located(&self, by: &str) -> Vec<&ShareRow> {
+        let all = self.shares.0.iter().filter(|row| row.moment == "before" && row.by == by && row.delta_bic > 0.0);
+        let mut all: Vec<&ShareRow> = all.collect();
+        all.sort_by(|a, b| b.share.total_cmp(&a.share));
+        all.truncate(SHOWN);
+        all
+    }
+
+    /// `store` is where the run is, as one types it.
+    pub fn document(&self, store: &str) -> Value {
+        let v = &self.verdict;
+        let errors = |mean: Option<f64>, rms: Option<f64>, max: Option<f64>| json!({ "validate_mean_mm": mean, "validate_rms_mm": rms, "validate_max_mm": max });
+        let findings = self.findings.0.iter().map(|finding| {
+            let numbers = self.numbers.0.iter().filter(|number| number.rank == finding.rank);
+            let numbers = numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma }));
+            let rivals = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank);
+            let rivals =
+                rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic }));
+            let valid = match (finding.valid_joint, finding.valid_from_rad, finding.valid_to_rad) {
+                (Some(joint), Some(from), Some(to)) => {
+                    json!({ format!("q{joint}_deg"): [from.to_degrees(), to.to_degrees()] })
+                }
+                _ => json!({}),
+            };
+            json!({
+                "effect": finding.effect, "where": finding.place, "statement": finding.statement,
+                "parameters": numbers.collect::<Vec<_>>(),
+                "evidence": {
+                    "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
+                    "heldout_gain_mm": finding.heldout_gain_mm, "effect_rms_mm": finding.effect_rms_mm,
+                },
+                "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,
+            })
+        });
+        let lines = |text: &str| text.lines().map(String::from).collect::<Vec<_>>();
+        json!({
+            "verdict": v.verdict,
+            "noise_floor_mm": v.noise_floor_mm,
+            "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
+            "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
+            "held_out": v.held_out,
+            "clock": v.clock,
+            "located": { "places": self.located_json("place"), "variables": self.located_json("variable") },
+            "findings": findings.collect::<Vec<_>>(),
+            "withdrawn": v.withdrawn.as_deref().map(lines).unwrap_or_default(),
+            "not_observable": lines(&v.not_observable),
+            "leftover": {
+                "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
+            },
+            "next_measurements": self.next(store),
+            "noise": { "repeatability_rad": v.repeatability_rad, "repeats": v.repeats },
+        })
+    }
+
+    fn located_json(&self, by: &str) -> Vec<Value> {
+        let one = |row: &&ShareRow| json!({ "name": row.name, "share": row.share, "delta_bic": row.delta_bic });
+        self.located(by).iter().map(one).collect()
+    }
+
+    pub fn text(&self, store: &str) -> String {
+        let v = &self.verdict;
+        let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
+        let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
+        let mut text = format!("{}\n\n", v.verdict.replace('_', " "));
+        text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
+        for (name, mean, rms, max) in [
+            ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
+            ("after", v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
+        ] {
+            text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
+        }
+        text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
+        for (by, what) in [("place", "where"), ("variable", "goes with")] {
+            let all = self.located(by);
+            let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
+            if !all.is_empty() {
+                text.push_str(&format!("{what:9}  {}\n", all.join(", ")));
+            }
+        }
+        if !self.shares.0.is_empty() {
+            text.push_str("           (of the squared residual, what one cause there could explain at most)\n\n");
+        }
+        for finding in &self.findings.0 {
+            text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
+            let rivals: Vec<String> = (self.rivals.0.iter().filter(|rival| rival.rank == finding.rank))
+                .map(|rival| format!("{} at {}", rival.effect, rival.place))
+                .collect();
+            if !rivals.is_empty() {
+                text.push_str(&format!("   these data cannot tell it from: {}\n", rivals.join(", ")));
+            }
+        }
+        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+            text.push_str(&format!("taken back: {line}\n"));
+        }
+        for line in v.not_observable.lines() {
+            text.push_str(&format!("not observable: {line}\n"));
+        }
+        for line in self.next(store).into_iter().flatten() {
+            text.push_str(&format!("measure next: {line}\n"));
+        }
+        text
+    }
+}

@@ -1,0 +1,217 @@
+//! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
+
+use crate::audit::{Answer, Value};
+use crate::error::{counted, one_line};
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+/// Significant digits of the largest number of a column.
+const DIGITS: i32 = 6;
+/// Decimals of a length in mm at least: a tracker tells micrometres also far away.
+const LENGTH: i32 = 4;
+/// Digits that the smallest one keeps at least; below, every number of the column is written by itself.
+const LEAST: i32 = 3;
+/// A text that is longer is cut on every terminal: some tables hold whole documents.
+const LONGEST: usize = 80;
+/// A text is not cut shorter than this to make room.
+const SHORTEST: usize = 12;
+
+struct Drawn {
+    name: String,
+    right: bool,
+    cells: Vec<String>,
+    width: usize,
+}
+
+/// The first rows, and how many are left out.
+pub fn grid(answer: &Answer, rows: usize, width: Option<usize>) -> String {
+    let shown = rows.min(answer.rows());
+    let columns = answer.names().zip(answer.columns(shown)).map(|(name, values)| drawn(name, &values)).collect();
+    let mut text = draw(columns, shown, width);
+    if answer.rows() > shown {
+        text.push_str(&format!(
+            "{}: --rows N shows N of them, --csv and --json all\n",
+            counted(answer.rows() - shown, "more row")
+        ));
+    } else if answer.rows() == 0 {
+        text.push_str("no rows\n");
+    }
+    text
+}
+
+fn draw(mut columns: Vec<Drawn>, rows: usize, width: Option<usize>) -> String {
+    let left_out = width.map_or_else(Vec::new, |width| fit(&mut columns, width));
+    let mut text = line(columns.iter().map(|column| (column, column.name.as_str())));
+    for row in 0..rows {
+        text.push_str(&line(columns.iter().map(|column| (column, column.cells.get(row).map_or("", String::as_str)))));
+    }
+    if !left_out.is_empty() {
+        text.push_str(&format!("too narrow for: {}\n", left_out.join(", ")));
+    }
+    text
+}
+
+fn line<'a>(cells: impl Iterator<Item = (&'a Drawn, &'a str)>) -> String {
+    let cells = cells.map(|(column, cell)| {
+        let cell = cut(cell, column.width);
+        let blank = " ".repeat(column.width.saturating_sub(cell.width()));
+        if column.right { blank + &cell } else { cell + &blank }
+    });
+    let line = cells.collect::<Vec<_>>().join("  ");
+    format!("{}\n", line.trim_end())
+}
+
+/// Cuts long texts first, then leaves out the last columns; gives the names of these.
+fn fit(columns: &mut Vec<Drawn>, width: usize) -> Vec<String> {
+    let excess = |columns: &[Drawn]| {
+        let all: usize = columns.iter().map(|column| column.width + 2).sum();
+        all.saturating_sub(width + 2)
+    };
+    while excess(columns) > 0 {
+        let too_much = excess(columns);
+        let long = columns.iter_mut().filter(|column| !column.right && column.width > SHORTEST);
+        let Some(widest) = long.max_by_key(|column| column.width) else { break };
+        widest.width = widest.width.saturating_sub(too_much).max(SHORTEST);
+    }
+    let mut left_out = Vec::new();
+    while excess(columns) > 0 && columns.len() > 1 {
+        left_out.extend(columns.pop().map(|column| column.name));
+    }
+    left_out.reverse();
+    left_out
+}
+
+fn drawn(name: &str, values: &[Value]) -> Drawn {
+    let right = values.iter().all(|value| matches!(value, Value::Null | Value::Integer(_) | Value::Number(_)));
+    let decimals = decimals(values, if name.ends_with("_mm") { LENGTH } else { 0 });
+    let mut cells: Vec<String> = values
+        .iter()
+        .map(|value| match value {
+            Value::Null => String::new(),
+            Value::Boolean(truth) => truth.to_string(),
+            Value::Integer(number) => number.to_string(),
+            Value::Number(number) => written(*number, decimals),
+            Value::Text(text) => cut(&one_line(text), LONGEST),
+        })
+        .collect();
+    if right && decimals.is_some() {
+        shorten(&mut cells);
+    }
+    let width = cells.iter().map(|cell| cell.width()).chain([name.width()]).max().unwrap_or(0);
+    Drawn { name: name.into(), right, cells, width }
+}
+
+/// Decimals that suit all numbers of a column, at least so many; nothing where they are of too different sizes.
+fn decimals(values: &[Value], least: i32) -> Option<usize> {
+    let sizes = values.iter().filter_map(|value| if let Value::Number(number) = value { Some(number.abs()) } else { None });
+    let sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > 0.0).collect();
+    let (Some(largest), Some(smallest)) = (sizes.iter().copied().reduce(f64::max), sizes.iter().copied().reduce(f64::min)) else {
+        return Some(0);
+    };
+    let decimals = (DIGITS - 1 - power(largest)).max(least);
+    let alike = power(smallest) + decimals >= LEAST - 1 && decimals <= 9 && power(largest) < 9;
+    usize::try_from(decimals).ok().filter(|_| alike)
+}
+
+/// 2 of 345.0, -3 of 0.0012.
+fn power(size: f64) -> i32 {
+    format!("{size:e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
+}
+
+fn written(number: f64, decimals: Option<usize>) -> String {
+    match decimals {
+        Some(decimals) => format!("{number:.decimals$}"),
+        None if number == 0.0 => "0".into(),
+        None if (1e-4..1e9).contains(&number.abs()) => {
+            let decimals = usize::try_from(DIGITS - 1 - power(number.abs())).unwrap_or(0);
+            format!("{number:.decimals$}")
+        }
+        None => format!("{number:.*e}", usize::try_from(DIGITS - 1).unwrap_or(0)),
+    }
+}
+
+/// Takes away zeros that end every number of a column.
+fn shorten(cells: &mut [String]) {
+    let number = |cell: &&mut String| cell.contains('.');
+    while cells.iter().any(|cell| cell.contains('.')) && cells.iter_mut().filter(number).all(|cell| cell.ends_with(['0', '.'])) {
+        cells.iter_mut().filter(number).for_each(|cell| {
+            cell.pop();
+        });
+    }
+}
+
+/// A text of this width at most, `…` for what is cut off.
+fn cut(text: &str, width: usize) -> String {
+    if text.width() <= width {
+        return text.into();
+    }
+    let mut out = String::new();
+    for c in text.chars() {
+        if out.width() + c.width().unwrap_or(0) + 1 > width {
+            break;
+        }
+        out.push(c);
+    }
+    out + "…"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers(values: &[f64]) -> Vec<String> {
+        drawn("n", &values.iter().map(|value| Value::Number(*value)).collect::<Vec<_>>()).cells
+    }
+
+    #[test]
+    fn a_column_has_the_digits_of_its_largest_number() {
+        assert_eq!(numbers(&[18.143812, 0.017901]), ["18.1438", "0.0179"]);
+        assert_eq!(numbers(&[1.5, 20.25, 0.0]), ["1.50", "20.25", "0.00"]);
+        assert_eq!(numbers(&[200.0, 50.0]), ["200", "50"]);
+        assert_eq!(numbers(&[1.2e-5, -3.4e-4]), ["0.000012", "-0.000340"]);
+        assert_eq!(numbers(&[0.0, f64::NAN]), ["0", "NaN"]);
+        assert_eq!(numbers(&[]), [""; 0]);
+    }
+
+    #[test]
+    fn a_length_far_away_keeps_its_micrometres() {
+        assert_eq!(drawn("x_mm", &[Value::Number(4744.84123)]).cells, ["4744.8412"]);
+        assert_eq!(drawn("x_mm", &[Value::Number(0.0286965)]).cells, ["0.0286965"]);
+    }
+
+    #[test]
+    fn numbers_of_different_sizes_are_written_each_by_itself() {
+        assert_eq!(numbers(&[1594.0, 2.5e-7, 0.0]), ["1594.00", "2.50000e-7", "0"]);
+        assert_eq!(numbers(&[1e300]), ["1.00000e300"]);
+    }
+
+    #[test]
+    fn a_narrow_terminal_cuts_texts_and_then_columns() {
+        let columns = || {
+            let text = |text: &str| Value::Text(text.to_string().into());
+            vec![
+                drawn("point", &[text("P1"), text("a point with a long name")]),
+                drawn("x_mm", &[Value::Number(1954.25), Value::Null]),
+                drawn("kept", &[Value::Boolean(true), Value::Boolean(false)]),
+            ]
+        };
+        assert_eq!(
+            draw(columns(), 2, None),
+            "point                        x_mm  kept\nP1                        1954.25  true\na point with a long name           false\n"
+        );
+        let narrow = draw(columns(), 2, Some(30));
+        assert!(narrow.lines().all(|line| line.width() <= 30) && narrow.contains("a point with …"), "{narrow}");
+        let narrower = draw(columns(), 2, Some(24));
+        assert!(narrower.ends_with("too narrow for: kept\n"), "{narrower}");
+    }
+
+    #[test]
+    fn a_text_keeps_its_zeros() {
+        assert_eq!(drawn("version", &[Value::Text("1.0".into()), Value::Text("2.0".into())]).cells, ["1.0", "2.0"]);
+    }
+
+    #[test]
+    fn a_wide_letter_counts_twice() {
+        assert_eq!(cut("関節関節", 5), "関節…");
+        assert_eq!(cut("joint", 5), "joint");
+    }
+}

@@ -1,0 +1,25 @@
+//! What a run, its tables, its diagnosis and the difference of two runs say, as text and as JSON; nothing is printed here.
+
+mod columns;
+mod corrections;
+mod diagnosis;
+mod explanation;
+mod grid;
+mod lines;
+mod plan;
+mod run;
+mod run_diff;
+mod searches;
+mod statistics;
+
+pub use columns::{columns, columns_json};
+pub use corrections::{corrections, corrections_json};
+pub use diagnosis::DiagnosisSummary;
+pub use explanation::explanation;
+pub use grid::grid;
+pub use lines::{csv, json};
+pub use plan::graph;
+pub use run::{run, stage, status};
+pub use run_diff::run_diff;
+pub use searches::{searches, searches_json};
+pub use statistics::{headline, rejected, rejected_rows, statistics, statistics_json};

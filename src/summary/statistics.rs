@@ -1,0 +1,186 @@
+//! The result of a run as text and as JSON: errors step by step, rejected rows.
+
+use crate::error::Result;
+use crate::pipeline::Outcome;
+use crate::stage::{Diagnose, Stage};
+use crate::store::Store;
+use crate::table::{Standing, Statistics, StatisticsRow, Table};
+use serde_json::json;
+
+fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
+    let mut rows = Vec::new();
+    for output in outcome.tables(Statistics::KIND) {
+        rows.extend(Statistics::from_frame(&store.load(&output.table)?)?.0);
+    }
+    Ok(rows)
+}
+
+/// Three tables: points that no model has seen, those that the models were fitted to, and these again
+/// cross-validated. `expected` is the rms of a complete
+/// model under the instrument's noise.
+pub fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+    let mut rows = rows(outcome, store)?;
+    let withdrawn: Vec<&str> = standing.iter().flat_map(|stands| &stands.withdrawn).map(|gone| gone.step.as_str()).collect();
+    for row in rows.iter_mut().filter(|row| withdrawn.contains(&row.step.as_str())) {
+        row.step.push_str(" (withdrawn)");
+    }
+    let mut text = String::new();
+    for (held_out, title) in [
+        (false, "training points (the models were fitted to these: flattered)"),
+        (true, "held-out points (no model has seen these)"),
+    ] {
+        let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.held_out == held_out).collect();
+        if !rows.is_empty() {
+            text.push_str(&block(title, &rows));
+        }
+    }
+    text.push_str(&folds(&rows));
+    text.push_str(&references(&rows));
+    Ok(text)
+}
+
+/// What the model that stands makes of the held-out set with most points, in a line, where it was diagnosed; a line more for every
+/// step that was worse.
+pub fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+    let Some(standing) = standing else { return Ok(String::new()) };
+    let mut text: String = standing.warnings().map(|warning| format!("{warning}\n")).collect();
+    if !standing.withdrawn.is_empty() {
+        text.push_str(&format!("`calib compensate` and `calib export` take the step `{}`\n", standing.model));
+    }
+    if !outcome.manifest.stages.iter().any(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty()) {
+        return Ok(text);
+    }
+    let rows = rows(outcome, store)?;
+    let own = rows.iter().filter(|row| row.held_out && row.step == standing.step);
+    let Some(after) = own.max_by_key(|row| row.points) else { return Ok(text) };
+    let earlier = rows.iter().filter(|row| row.held_out && row.set == after.set && row.order < after.order);
+    let before = earlier.min_by_key(|row| row.order).map_or_else(String::new, |row| {
+        format!("mean {:.4} mm, max {:.4} mm after `{}`, now ", row.mean_mm, row.max_mm, row.step)
+    });
+    let diagnosed = outcome.manifest.stage(&standing.model).is_some_and(|stage| stage.uses == Diagnose::NAME);
+    let model = if diagnosed { "the diagnosed model" } else { "the model that stands" };
+    text.push_str(&format!(
+        "{model}, {} held-out points of set {}: {before}mean {:.4} mm, max {:.4} mm after `{}`\n",
+        after.points, after.set, after.mean_mm, after.max_mm, after.step
+    ));
+    Ok(text)
+}
+
+/// Training points under fits without them; nothing where no step made folds.
+fn folds(rows: &[StatisticsRow]) -> String {
+    let rows: Vec<&StatisticsRow> = rows.iter().filter(|row| row.fold_rms_mm.is_some()).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
+        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+    };
+    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let mut text = format!(
+        "training points, each under a fit without it (cross-validated), error in mm: parts drawn at random | contiguous parts\n  \
+         {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",
+        "step", "set", "mean", "max", "rms", "expected", "mean", "max", "rms"
+    );
+    let show = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.4}"));
+    for row in rows {
+        text.push_str(&format!(
+            "  {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",
+            row.step,
+            row.set,
+            show(row.fold_mean_mm),
+            show(row.fold_max_mm),
+            show(row.fold_rms_mm),
+            show(row.fold_expected_mm),
+            show(row.block_mean_mm),
+            show(row.block_max_mm),
+            show(row.block_rms_mm)
+        ));
+    }
+    text + "\n"
+}
+
+/// Our figures beside those that the pipeline names; nothing where it names none.
+fn references(rows: &[StatisticsRow]) -> String {
+    let rows: Vec<(&str, &StatisticsRow)> = rows.iter().filter_map(|row| Some((row.reference.as_deref()?, row))).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let width = |names: &mut dyn Iterator<Item = &str>| names.map(|name| name.chars().count()).max().unwrap_or(0);
+    let label = width(&mut rows.iter().map(|row| row.0)).max("reference".len());
+    let step = width(&mut rows.iter().map(|row| row.1.step.as_str())).max("step".len());
+    let set = width(&mut rows.iter().map(|row| row.1.set.as_str())).max("set".len());
+    let mut text = format!(
+        "beside reference figures, error in mm: ours | theirs\n  {:label$}  {:step$}  {:set$}  {:>17}  {:>17}  {:>17}\n",
+        "reference", "step", "set", "mean", "std", "max"
+    );
+    let pair = |ours: f64, theirs: Option<f64>| match theirs {
+        Some(theirs) => format!("{ours:>7.4} | {theirs:>7.4}"),
+        None => format!("{ours:>7.4} | {:>7}", ""),
+    };
+    for (name, row) in rows {
+        text.push_str(&format!(
+            "  {name:label$}  {:step$}  {:set$}  {}  {}  {}\n",
+            row.step,
+            row.set,
+            pair(row.mean_mm, row.reference_mean_mm),
+            pair(row.std_mm, row.reference_std_mm),
+            pair(row.max_mm, row.reference_max_mm)
+        ));
+    }
+    text + "\n"
+}
+
+fn block(title: &str, rows: &[&StatisticsRow]) -> String {
+    let width = |name: fn(&StatisticsRow) -> &str, least: usize| {
+        rows.iter().map(|row| name(row).chars().count()).max().unwrap_or(0).max(least)
+    };
+    let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
+    let mut text = format!(
+        "{title}, error in mm\n  {:step$}  {:set$}  {:>6}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}  {:>8}\n",
+        "step", "set", "points", "mean", "std", "p95", "max", "rms", "expected"
+    );
+    for row in rows {
+        text.push_str(&format!(
+            "  {:step$}  {:set$}  {:>6}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8.4}  {:>8}\n",
+            row.step,
+            row.set,
+            row.points,
+            row.mean_mm,
+            row.std_mm,
+            row.p95_mm,
+            row.max_mm,
+            row.rms_mm,
+            row.expected_rms_mm.map_or_else(String::new, |expected| format!("{expected:.4}"))
+        ));
+    }
+    text + "\n"
+}
+
+pub fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+    let row = |row: StatisticsRow| {
+        json!({
+            "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
+            "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
+            "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
+            "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
+            "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
+            "fold_expected_mm": row.fold_expected_mm,
+            "reference": row.reference, "reference_mean_mm": row.reference_mean_mm,
+            "reference_std_mm": row.reference_std_mm, "reference_max_mm": row.reference_max_mm,
+        })
+    };
+    Ok(rows(outcome, store)?.into_iter().map(row).collect())
+}
+
+pub fn rejected_rows(outcome: &Outcome) -> u64 {
+    outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
+}
+
+/// Nothing where nothing was rejected.
+pub fn rejected(outcome: &Outcome) -> String {
+    let line = |output: &crate::pipeline::OutputRecord| {
+        let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        format!("rejected rows: {}, each with its reason in {path}\n", output.table.rows)
+    };
+    outcome.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
+}

@@ -1,0 +1,63 @@
+//! Every column of the recording, declared once: what kinds of measurement own, and the circumstances that are here.
+
+use crate::observation::{Column, KINDS, Shape};
+use crate::units::Quantity::{Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time};
+
+const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
+
+const fn simulated(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
+    Column::number(setting, stored, Length, [-200.0, 200.0], about).together(SIMULATED)
+}
+
+static CIRCUMSTANCES: &[Column] = &[
+    Column::text("point_id", "Name of the point; without it rows are called `row 17`."),
+    Column {
+        shape: Shape::Count,
+        ..Column::text("sequence", "Order of the recording, strictly increasing; without it the number of the data row, from 1.")
+    },
+    Column::text("usage", "What the recording itself says a row is for, e.g. `fit` or `validate`."),
+    Column::text("target", "Which of several targets on the tool was measured; blank for the robot's tool point."),
+    Column::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
+    Column::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
+    Column::number("temperature", &["temp"], Temperature, [-60.0, 200.0], "Temperature of the arm or of the room."),
+    simulated(
+        "sim_x",
+        &["sim_x"],
+        "The same point by another simulation, x in any frame fixed to the robot's base: `diagnose` then looks at measured minus simulated.",
+    ),
+    simulated("sim_y", &["sim_y"], "The same point by another simulation, y."),
+    simulated("sim_z", &["sim_z"], "The same point by another simulation, z."),
+    Column {
+        shape: Shape::Joints { prismatic: Some((Length, [-200.0, 200.0])) },
+        ..Column::number("q", &["q{j}"], Angle, [-20.0, 20.0], "Joint positions.")
+    },
+    Column {
+        shape: Shape::Joints { prismatic: None },
+        ..Column::number("current", &["i{j}"], Current, [-1e4, 1e4], "Motor currents.")
+    },
+    Column {
+        shape: Shape::Joints { prismatic: None },
+        ..Column::number(
+            "direction",
+            &["dir{j}"],
+            Number,
+            [-1.0, 1.0],
+            "Direction of the last move of each joint: 1, -1 or 0; no unit.",
+        )
+    },
+    Column {
+        shape: Shape::Joints { prismatic: Some((LinearRate, [-100.0, 100.0])) },
+        ..Column::number(
+            "velocity",
+            &["dq{j}"],
+            AngularRate,
+            [-100.0, 100.0],
+            "Joint velocities while the point was measured, where the arm moved: `{column: \"dq{j}\", unit: deg/s}`.",
+        )
+    },
+];
+
+/// All columns, in the order in which people see them.
+pub fn columns() -> impl Iterator<Item = &'static Column> {
+    CIRCUMSTANCES.iter().chain(KINDS.iter().flat_map(|kind| kind.about().columns))
+}

@@ -1,0 +1,187 @@
+//! Laws that every kind of measurement keeps, on an arm that is off nominal: residual, derivatives, rank.
+
+use super::{SIGMA, THREE};
+use crate::fixture;
+use crate::identify::{GEOMETRY, model, normal};
+use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
+use calib::observation::{KINDS, Kind, Weight, rank};
+use calib::robot::description::RobotDescription;
+use calib::robot::{Anchor, Gauging, Measurements, Readings, RobotModel, Target};
+use calib::spatial::{Pose, Twist};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// A target that sits askew, an anchor, and a robot whose parameters are off.
+pub(super) struct Truth {
+    description: RobotDescription,
+    pub model: Model,
+}
+
+impl Truth {
+    pub fn new(description: RobotDescription, askew: Vector3<f64>) -> Self {
+        let robot = RobotModel::new(description.clone());
+        let home = *robot.home();
+        let offset = Vector3::from(THREE[0].1) * 1e-3;
+        let rotation = home.rotation * Pose::from_rotation_vector(askew, Vector3::zeros()).rotation;
+        let target = Target { name: String::new(), seat: Pose::new(rotation, home.point(&offset)), oriented: true };
+        let anchor = Anchor { name: String::new(), place: Vector3::new(4.6, -2.5, 0.8) };
+        let robot = robot.measured_by(Gauging { targets: vec![target], anchors: vec![anchor] });
+        let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.0, 0.0));
+        let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
+        for (k, spec) in model.stack.specs().to_vec().iter().enumerate() {
+            // The seat is where the target truly is; the base stands level.
+            if !spec.name.starts_with("tool_offset") && !spec.name.starts_with("base_frame") {
+                model.x[k] = 5e-4 * normal(7000 + k);
+            }
+        }
+        Self { description, model }
+    }
+
+    /// Poses with what every kind measures, without noise.
+    pub fn rows(&self, poses: usize) -> Measurements {
+        let joints = self.description.joints.len();
+        let mut data = Measurements {
+            joints,
+            q: fixture::poses(&self.description, poses),
+            position: vec![Vector3::zeros(); poses],
+            sigma: vec![Vector3::repeat(SIGMA); poses],
+            payload: vec![0.0; poses],
+            ..Measurements::default()
+        };
+        data.position = self.model.predict(&data);
+        let rotations = self.rotations(&data);
+        for kind in &KINDS[1..] {
+            data.readings.push(self.readings(kind.about().name, &data, &rotations));
+        }
+        data
+    }
+
+    /// A fit of the parameters that are `asked` for by name, from the nominal robot.
+    pub fn fit(&self, data: &Measurements, asked: impl Fn(&str) -> bool) -> (Model, Fitted) {
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &BTreeMap::new()).unwrap();
+        let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
+        let candidates: Vec<usize> = (0..model.x.len()).filter(|k| asked(&model.stack.specs()[*k].name)).collect();
+        let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
+        (model, fitted)
+    }
+
+    /// How the target is turned in every row, by differences of points.
+    fn rotations(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
+        let seat = self.model.robot.gauging().targets[0].seat;
+        let beside = [0, 1, 2].map(|axis: usize| {
+            let mut gauging = self.model.robot.gauging().clone();
+            gauging.targets[0].seat.translation += seat.rotation.column(axis) * 0.5;
+            Model { robot: self.model.robot.clone().measured_by(gauging), ..self.model.clone() }.predict(data)
+        });
+        let rows = 0..data.rows();
+        rows.map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.position[row]) / 0.5)))
+            .collect()
+    }
+
+    fn readings(&self, kind: &'static str, data: &Measurements, rotations: &[Matrix3<f64>]) -> Readings {
+        let (stack, x) = (&self.model.stack, &self.model.x);
+        let named = |axis: &str| stack.specs().iter().position(|spec| spec.name == format!("anchor.{axis}")).expect("an axis");
+        let moved = Vector3::new(x[named("x")], x[named("y")], x[named("z")]);
+        let anchor = self.model.robot.gauging().anchors[0].place + moved;
+        let row: &dyn Fn(usize) -> Vec<f64> = match kind {
+            "orientation" => &|row| rotations[row].iter().copied().collect(),
+            "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
+            "distance" => &|row| vec![(data.position[row] - anchor).norm()],
+            other => panic!("say what `{other}` measures"),
+        };
+        let values: Vec<f64> = (0..data.rows()).flat_map(row).collect();
+        let anchor = (kind == "distance").then(Default::default);
+        Readings { kind, width: values.len() / data.rows(), values, sigma: vec![SIGMA; data.rows()], anchor }
+    }
+}
+
+/// Some of the rows.
+pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
+    let taken = |all: &Readings| Readings {
+        values: rows.iter().flat_map(|row| all.values[row * all.width..(row + 1) * all.width].to_vec()).collect(),
+        sigma: rows.iter().map(|row| all.sigma[*row]).collect(),
+        ..all.clone()
+    };
+    Measurements {
+        joints: data.joints,
+        q: rows.iter().flat_map(|row| data.q(*row).to_vec()).collect(),
+        position: rows.iter().map(|row| data.position[*row]).collect(),
+        sigma: rows.iter().map(|row| data.sigma[*row]).collect(),
+        payload: rows.iter().map(|row| data.payload[*row]).collect(),
+        readings: data.readings.iter().map(taken).collect(),
+        ..Measurements::default()
+    }
+}
+
+const ASKEW: [f64; 3] = [0.9, -1.2, 0.4];
+
+/// Residual of a kind under the model with parameters `x`.
+fn residual(kind: &dyn Kind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
+    let mut scratch = truth.stack.scratch(&truth.robot);
+    let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
+    kind.residual(data, row, &placed).expect("measured").0
+}
+
+#[test]
+fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differences() {
+    const STEP: f64 = 1e-6;
+    for description in fixture::all() {
+        let truth = Truth::new(description, Vector3::from(ASKEW));
+        let data = truth.rows(6);
+        let Truth { model, description } = &truth;
+        for (kind, row) in KINDS.iter().flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row))) {
+            let name = format!("{}, {}, row {row}", description.name, kind.about().name);
+            let left = residual(kind, model, &data, row, &model.x);
+            assert!(left.norm() < 1e-9, "{name}: {left} is left");
+            assert_eq!(kind.axes(&data, row), kind.about().axes, "{name}");
+            let mut scratch = model.stack.scratch(&model.robot);
+            let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
+            let mut partials = vec![Vector3::zeros(); model.x.len()];
+            let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
+            sensitivity.derivatives(&mut placed, |k, derivative| partials[k] += derivative);
+            for (k, partial) in partials.iter().enumerate() {
+                let moved = |step: f64| {
+                    let mut x = model.x.clone();
+                    x[k] += step;
+                    residual(kind, model, &data, row, &x)
+                };
+                let central = (moved(-STEP) - moved(STEP)) / (2.0 * STEP);
+                let (spec, off) = (&model.stack.specs()[k].name, (central - partial).norm());
+                assert!(off < 2e-6 * (1.0 + partial.norm()), "{name}, {spec}: {central} by differences, {partial} by formula");
+            }
+        }
+    }
+}
+
+/// The data with one kind alone.
+fn alone(data: &Measurements, kind: &dyn Kind) -> Measurements {
+    let name = kind.about().name;
+    let mut own = data.clone();
+    own.readings.retain(|readings| readings.kind == name);
+    if name != KINDS[0].about().name {
+        own.position.fill(Vector3::zeros());
+        own.sigma.fill(Vector3::repeat(f64::INFINITY));
+    }
+    own
+}
+
+#[test]
+fn the_rank_of_every_kind_is_that_of_theory() {
+    for description in [fixture::offset_wrist(), fixture::seven(), fixture::on_track()] {
+        let truth = Truth::new(description, Vector3::from(ASKEW));
+        let all = truth.rows(600);
+        // A level is read where it is upright.
+        let upright: Vec<usize> =
+            (0..all.rows()).filter(|row| all.reading("orientation", *row).expect("all").values[8] > 0.0).collect();
+        let all = select(&all, &upright);
+        for kind in KINDS {
+            let data = alone(&all, *kind);
+            let rows: Vec<usize> = (0..data.rows()).collect();
+            let (model, fitted) = truth.fit(&data, |_| true);
+            let free = fitted.statuses.iter().filter(|fate| matches!(fate, ParameterStatus::Free(_))).count();
+            let name = format!("{}, {}", truth.description.name, kind.about().name);
+            assert_eq!(Some(free), rank(&model.robot, &data, &rows), "{name}");
+        }
+    }
+}
