@@ -1,8 +1,8 @@
 //! `calib` makes industrial robots accurate and says why they were not.
 //!
 //! # The map
-//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`) has no files
-//! and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
+//! has no files and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
@@ -56,6 +56,29 @@
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
+
+//!
+//! # Glossary
+//! | word | what it means here |
+//! |---|---|
+//! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
+//! | form | a cause at a place with its shape numbers; a hypothesis is a form that a search may choose |
+//! | place | where on the chain (or in the measurement) a cause acts: joint 2, link 3, base, tool, recording |
+//! | law | a function of what a row offers (angle, load, time ...): a basis of one variable, or a product of two |
+//! | shape number | a parameter that enters a law nonlinearly (a threshold, a time, a width); coefficients enter linearly |
+//! | finding | causes of one name and place that a diagnosis keeps, with their evidence |
+//! | rival | another explanation of a finding that these data do not exclude |
+//! | residual | measured minus predicted; whitened: in standard deviations |
+//! | excess sigma | standard deviation of the residuals beyond the stated noise |
+//! | repeatability | standard deviation of a joint that comes back to a pose |
+//! | fold | a part of the rows to fit, whole poses, that is predicted by a fit to the others |
+//! | held out | rows that no step is fitted to: they judge in the end and choose nothing |
+//! | suspect | a row that no smooth model can follow; it is set aside and kept |
+//! | redundant | a parameter whose effect other free parameters have too; unseen: one that the data do not show |
+//! | confounded | causes that these data cannot separate |
+//! | compliance | turn of a joint per torque, rad/Nm |
+//! | datum freedom | a motion of everything that no measurement shows; targets and anchors are what is measured from and to |
+//! | step | a stage that predicts; the one that stands is used by report, compensation and export |
 
 #![forbid(unsafe_code)]
 

@@ -11,7 +11,6 @@ mod cable_drag;
 mod counterbalance;
 mod gear_cyclic;
 mod gear_eccentricity;
-mod gear_flank;
 mod holding_friction;
 mod joint_bump;
 mod joint_compliance;
@@ -40,7 +39,6 @@ pub use cable_drag::{CableDrag, Pull};
 pub use counterbalance::{Balancer, Counterbalance};
 pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
 pub use gear_eccentricity::GearEccentricity;
-pub use gear_flank::GearFlank;
 pub use holding_friction::HoldingFriction;
 pub use joint_bump::JointBump;
 pub use joint_compliance::JointCompliance;
@@ -156,8 +154,6 @@ physical! {
     Counterbalance,
     /// Run-out of an eccentric wheel, not a pure sine.
     GearEccentricity,
-    /// The two flanks of the teeth err differently.
-    GearFlank,
     /// A joint is wrong near one angle.
     JointBump,
     /// A joint's error starts at some angle.
