@@ -11,6 +11,7 @@ mod cable_drag;
 mod counterbalance;
 mod gear_cyclic;
 mod gear_eccentricity;
+mod gear_flank;
 mod holding_friction;
 mod joint_bump;
 mod joint_compliance;
@@ -39,6 +40,7 @@ pub use cable_drag::{CableDrag, Pull};
 pub use counterbalance::{Balancer, Counterbalance};
 pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
 pub use gear_eccentricity::GearEccentricity;
+pub use gear_flank::GearFlank;
 pub use holding_friction::HoldingFriction;
 pub use joint_bump::JointBump;
 pub use joint_compliance::JointCompliance;
@@ -154,6 +156,8 @@ physical! {
     Counterbalance,
     /// Run-out of an eccentric wheel, not a pure sine.
     GearEccentricity,
+    /// The two flanks of the teeth err differently.
+    GearFlank,
     /// A joint is wrong near one angle.
     JointBump,
     /// A joint's error starts at some angle.
