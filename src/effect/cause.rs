@@ -118,6 +118,7 @@ pub const CAUSES: &[&dyn Cause] = &[
     &base_compliance::BaseCompliance,
     &gear_cyclic::GearCyclic,
     &gear_motor_cyclic::GearMotorCyclic,
+    &gear_flank::GearFlank,
     &joint_table::JointTable,
     &backlash::Backlash,
     &thermal_growth::ThermalGrowth,

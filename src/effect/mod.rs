@@ -18,6 +18,7 @@ mod coupling_ratio;
 mod deflection;
 mod form;
 mod gear_cyclic;
+mod gear_flank;
 mod gear_motor_cyclic;
 mod joint_compliance;
 mod joint_hardening;

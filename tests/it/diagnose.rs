@@ -1,5 +1,6 @@
 //! Diagnosis of recordings with concealed effects: what was hidden is named and placed, and nothing else.
 
+mod flanks;
 mod said;
 mod scrambled;
 
