@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-use crate::diff::{Options, TableDiff, compare};
+use crate::diff::{DiffOptions, TableDiff, compare};
 use crate::error::Result;
 use crate::pipeline::{Change, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
@@ -51,7 +51,7 @@ impl RunDiff {
 }
 
 /// Compares run `a` with run `b`: all stages or one, all its ports or one.
-pub fn compare_runs(store: &Store, a: &Place, b: &Place, options: &Options) -> Result<RunDiff> {
+pub fn compare_runs(store: &Store, a: &Place, b: &Place, options: &DiffOptions) -> Result<RunDiff> {
     let (left, right) = (Manifest::of(store, &a.run)?, Manifest::of(store, &b.run)?);
     let (outputs_a, outputs_b) = (outputs(&left, a), outputs(&right, b));
     let names: BTreeSet<&String> = outputs_a.iter().chain(&outputs_b).map(|(name, _)| name).collect();
@@ -115,7 +115,7 @@ fn causes(a: &Manifest, b: &Manifest) -> Vec<Setting> {
     causes
 }
 
-fn table(store: &Store, name: &str, a: Option<OutputRecord>, b: Option<OutputRecord>, options: &Options) -> Result<TableChange> {
+fn table(store: &Store, name: &str, a: Option<OutputRecord>, b: Option<OutputRecord>, options: &DiffOptions) -> Result<TableChange> {
     let kind = b.as_ref().or(a.as_ref()).map(|output| output.kind.clone()).unwrap_or_default();
     let change =
         |status: &'static str, diff: Option<TableDiff>| TableChange { name: name.into(), kind: kind.clone(), status, diff };

@@ -3,7 +3,7 @@
 use super::surroundings::open_store;
 use super::{complain, emit, emit_json};
 use crate::audit::{Place, compare_runs};
-use crate::diff::{self, Detail, Options, TableDiff};
+use crate::diff::{self, Detail, DiffOptions, TableDiff};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::{Store, TableRef};
@@ -101,8 +101,12 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
         return Err(Error::spec("--out", "is for two tables: name them as RUN/STAGE/PORT"));
     }
     // What is asked of columns holds where a table has them, so only what the schemas say is used for runs.
-    let options =
-        Options { limit: options.limit, reread: options.reread, by_occurrence: options.by_occurrence, ..Options::default() };
+    let options = DiffOptions {
+        limit: options.limit,
+        reread: options.reread,
+        by_occurrence: options.by_occurrence,
+        ..DiffOptions::default()
+    };
     let diff = compare_runs(&store, &a, &b, &options)?;
     if arguments.json {
         let mut value = serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
@@ -122,7 +126,7 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     Ok(code(diff.is_same(), duplicates, arguments))
 }
 
-fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &Options) -> Result<u8> {
+fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &DiffOptions) -> Result<u8> {
     let diff = diff::compare(a, b, options)?;
     if arguments.json {
         emit_json(&json(&diff)?)?;
@@ -173,15 +177,15 @@ fn output(store: &Store, place: &Place) -> Result<Option<TableRef>> {
     Ok(output.map(|output| output.table.clone()))
 }
 
-fn options(arguments: &DiffArguments) -> Result<Options> {
-    let mut options = Options {
+fn options(arguments: &DiffArguments) -> Result<DiffOptions> {
+    let mut options = DiffOptions {
         key: arguments.key.clone(),
         ignore: arguments.ignore.iter().cloned().collect(),
         by_occurrence: arguments.occurrence,
         reread: arguments.reread,
         limit: usize::from(arguments.limit),
         out: arguments.out.clone(),
-        ..Options::default()
+        ..DiffOptions::default()
     };
     arguments.atol.iter().try_for_each(|text| options.atol.add("--atol", text))?;
     arguments.rtol.iter().try_for_each(|text| options.rtol.add("--rtol", text))?;

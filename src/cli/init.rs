@@ -2,7 +2,7 @@
 
 use super::emit;
 use crate::error::{Error, Fault, Result};
-use crate::init::{KINDS, Kind, Request, Start, start};
+use crate::init::{KINDS, Request, RobotFileKind, Start, start};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub(super) struct InitArguments {
     data: Vec<PathBuf>,
     /// The robot to start from
     #[arg(long, default_value = KINDS[0].name(), value_parser = kinds())]
-    robot: Kind,
+    robot: RobotFileKind,
     /// Takes the robot from this URDF instead
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
@@ -37,7 +37,7 @@ const EXAMPLES: &str = "Examples:
   calib init --robot seven";
 
 /// The robots as values of an option, each with its line of help.
-fn kinds() -> impl TypedValueParser<Value = Kind> {
+fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
     let values = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
     PossibleValuesParser::new(values).try_map(|name| KINDS.into_iter().find(|kind| kind.name() == name).ok_or("no kind"))
 }

@@ -42,7 +42,7 @@ pub struct Evidence {
     pub gain: f64,
 }
 
-/// Another explanation that these data cannot tell apart.
+/// Another explanation, which these data cannot separate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RivalCause {
     pub effect: &'static str,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::source::{Column, Kind, Source};
-use super::{Finding, Options, Tolerances};
+use super::{DiffOptions, Discrepancy, Tolerances};
 use crate::error::{Error, Result, nearest};
 use crate::units::{Quantity, Unit};
 
@@ -42,8 +42,8 @@ pub(super) fn plan(
     a: &Source,
     b: &Source,
     key: &[String],
-    options: &Options,
-    findings: &mut Vec<Finding>,
+    options: &DiffOptions,
+    findings: &mut Vec<Discrepancy>,
 ) -> Result<Vec<Comparison>> {
     known_names(a, b, options)?;
     let ignored = |name: &String| key.contains(name) || options.ignore.contains(name);
@@ -61,7 +61,7 @@ pub(super) fn plan(
     }
     for (at_b, column) in b.columns.iter().enumerate() {
         if !pairs.used_b.contains(&at_b) && !ignored(&column.name) {
-            pairs.findings.push(Finding::new("column", &column.name, "only in B"));
+            pairs.findings.push(Discrepancy::new("column", &column.name, "only in B"));
         }
     }
     comparisons.sort_by_key(|comparison| comparison.a[0]);
@@ -72,10 +72,10 @@ pub(super) fn plan(
 struct Pairs<'p> {
     a: &'p Source,
     b: &'p Source,
-    options: &'p Options,
+    options: &'p DiffOptions,
     used_a: BTreeSet<usize>,
     used_b: BTreeSet<usize>,
-    findings: &'p mut Vec<Finding>,
+    findings: &'p mut Vec<Discrepancy>,
 }
 
 impl Pairs<'_> {
@@ -106,7 +106,7 @@ impl Pairs<'_> {
         let (a, b) = (self.a, self.b);
         let column = &a.columns[at_a];
         let Some(at_b) = counterpart(a, b, at_a, &self.used_b) else {
-            self.findings.push(Finding::new("column", &column.name, "only in A"));
+            self.findings.push(Discrepancy::new("column", &column.name, "only in A"));
             return None;
         };
         self.used_b.insert(at_b);
@@ -142,12 +142,12 @@ impl Pairs<'_> {
     fn kinds_apart(&mut self, ours: &Column, theirs: &Column) {
         if ours.stored != theirs.stored {
             let text = format!("{} in A, {} in B", shown(&ours.stored), shown(&theirs.stored));
-            self.findings.push(Finding::new("type", &ours.name, text));
+            self.findings.push(Discrepancy::new("type", &ours.name, text));
         }
         if let (Some(our_semantic), Some(semantic)) = (&ours.semantic, &theirs.semantic)
             && our_semantic != semantic
         {
-            self.findings.push(Finding::new("semantic", &ours.name, format!("{our_semantic} in A, {semantic} in B")));
+            self.findings.push(Discrepancy::new("semantic", &ours.name, format!("{our_semantic} in A, {semantic} in B")));
         }
     }
 
@@ -157,7 +157,7 @@ impl Pairs<'_> {
         (column, ours): (&Column, Option<Unit>),
         (other, theirs): (&Column, Option<Unit>),
     ) -> Option<(f64, f64)> {
-        let mut say = |what: &str, text: String| self.findings.push(Finding::new(what, &column.name, text));
+        let mut say = |what: &str, text: String| self.findings.push(Discrepancy::new(what, &column.name, text));
         match (ours, theirs) {
             (Some(ours), Some(theirs)) if ours != theirs => {
                 if ours.quantity() != theirs.quantity() {
@@ -186,7 +186,7 @@ fn shown(stored: &str) -> &str {
 }
 
 /// Names in the options must be columns.
-fn known_names(a: &Source, b: &Source, options: &Options) -> Result<()> {
+fn known_names(a: &Source, b: &Source, options: &DiffOptions) -> Result<()> {
     let columns: Vec<&str> = a.columns.iter().chain(&b.columns).map(|column| column.name.as_str()).collect();
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {
@@ -205,7 +205,7 @@ fn known_names(a: &Source, b: &Source, options: &Options) -> Result<()> {
 }
 
 /// Columns that are one rotation together: declared, asked for, or by their names; true for a rotation vector.
-fn groups(a: &Source, options: &Options) -> Vec<(Vec<String>, bool)> {
+fn groups(a: &Source, options: &DiffOptions) -> Vec<(Vec<String>, bool)> {
     let mut groups: Vec<(Vec<String>, bool)> = options.quaternions.iter().map(|names| (names.clone(), false)).collect();
     let declared = |semantic: &str, size: usize, groups: &mut Vec<(Vec<String>, bool)>| {
         let named = a.columns.iter().filter(|column| column.semantic.as_deref() == Some(semantic));
@@ -272,7 +272,7 @@ fn turn(source: &Source, column: usize) -> Option<f64> {
     (declared || !known).then(|| unit.from_si(std::f64::consts::TAU))
 }
 
-fn tolerance(a: &Source, name: &str, options: &Options, unit: Unit) -> (f64, f64) {
+fn tolerance(a: &Source, name: &str, options: &DiffOptions, unit: Unit) -> (f64, f64) {
     let field = a.schema().and_then(|schema| schema.field_of(name)).map(|(field, _)| &field.diff);
     let of = |wish: &Tolerances, schema: Option<f64>| wish.of(name, unit).unwrap_or(schema.unwrap_or(0.0));
     (of(&options.atol, field.map(|field| field.atol)), of(&options.rtol, field.map(|field| field.rtol)))

@@ -11,14 +11,14 @@ use super::columns::{self, Comparison};
 use super::key::{self, Keys, Pairing};
 use super::measure::{self, Beside, CHANGED, Cell, SAME, Value, WITHIN};
 use super::source::Source;
-use super::{ColumnDiff, Equal, Examples, Finding, Options, Rows, Side, TableDiff, WorstCell, WorstRow};
+use super::{ColumnDiff, DiffOptions, Discrepancy, Equal, Examples, Rows, Side, TableDiff, WorstCell, WorstRow};
 use crate::error::{Error, Result};
 
 /// Keys shown of rows without a partner.
 const EXAMPLES: usize = 5;
 
 /// Compares the Parquet files `a` and `b`.
-pub fn compare(a: &Path, b: &Path, options: &Options) -> Result<TableDiff> {
+pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     let (a, b) = (Source::open(a)?, Source::open(b)?);
     if let Some(out) = options.out.as_deref()
         && [&a, &b].iter().any(|source| same_file(&source.path, out))
@@ -114,7 +114,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     found(a).is_some() && found(a) == found(b)
 }
 
-fn schema_findings(a: &Source, b: &Source, options: &Options) -> Result<Vec<Finding>> {
+fn schema_findings(a: &Source, b: &Source, options: &DiffOptions) -> Result<Vec<Discrepancy>> {
     let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else { return Ok(Vec::new()) };
     if kind_a != kind_b && options.key.is_empty() {
         let message =
@@ -122,7 +122,7 @@ fn schema_findings(a: &Source, b: &Source, options: &Options) -> Result<Vec<Find
         return Err(Error::spec(b.path.display().to_string(), message));
     }
     if kind_a != kind_b {
-        return Ok(vec![Finding::new("schema", "", format!("{kind_a} in A, {kind_b} in B"))]);
+        return Ok(vec![Discrepancy::new("schema", "", format!("{kind_a} in A, {kind_b} in B"))]);
     }
     if version_a == version_b {
         return Ok(Vec::new());
@@ -132,16 +132,16 @@ fn schema_findings(a: &Source, b: &Source, options: &Options) -> Result<Vec<Find
         (true, false) => "minor: columns were added",
         (true, true) => "patch: descriptions changed",
     };
-    Ok(vec![Finding::new("schema", "", format!("{kind_a} {version_a} in A, {version_b} in B ({step})"))])
+    Ok(vec![Discrepancy::new("schema", "", format!("{kind_a} {version_a} in A, {version_b} in B ({step})"))])
 }
 
-fn key_columns(a: &Source, b: &Source, options: &Options, findings: &mut Vec<Finding>) -> Result<Vec<String>> {
+fn key_columns(a: &Source, b: &Source, options: &DiffOptions, findings: &mut Vec<Discrepancy>) -> Result<Vec<String>> {
     if !options.key.is_empty() {
         options.key.iter().try_for_each(|name| a.key_column(name).and(b.key_column(name)).map(|_| ()))?;
         return Ok(options.key.clone());
     }
     if !a.key.is_empty() && !b.key.is_empty() && a.key != b.key {
-        findings.push(Finding::new("key", "", format!("{} in A, {} in B", a.key.join(", "), b.key.join(", "))));
+        findings.push(Discrepancy::new("key", "", format!("{} in A, {} in B", a.key.join(", "), b.key.join(", "))));
     }
     let key = if a.key.is_empty() { &b.key } else { &a.key };
     if key.is_empty() {
@@ -178,7 +178,7 @@ fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
 fn judge(
     files: Beside,
     comparison: &Comparison,
-    options: &Options,
+    options: &DiffOptions,
     mut out: Option<(&mut CellWriter, &Keys)>,
 ) -> Result<(ColumnDiff, Vec<Cell>)> {
     let mut worst: Vec<Cell> = Vec::new();

@@ -27,7 +27,7 @@ use crate::units::Unit;
 
 /// What a comparison is to overlook, and how much it is to show.
 #[derive(Debug, Clone, Default)]
-pub struct Options {
+pub struct DiffOptions {
     /// Instead of the key that the files name.
     pub key: Vec<String>,
     pub atol: Tolerances,
@@ -96,7 +96,7 @@ pub struct TableDiff {
     /// Equal without a look at any row: by the hash of their content, or byte by byte.
     pub equal: Option<Equal>,
     /// What differs beside the values: columns, units, types, the schema's version.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<Discrepancy>,
     pub rows: Rows,
     /// Compared columns, in the order of A.
     pub columns: Vec<ColumnDiff>,
@@ -139,14 +139,14 @@ pub struct Side {
 
 /// A difference of the tables' make.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct Discrepancy {
     /// `column`, `unit`, `type`, `semantic`, `schema`, `key`.
     pub what: String,
     pub column: String,
     pub says: String,
 }
 
-impl Finding {
+impl Discrepancy {
     fn new(what: &str, column: &str, says: impl Into<String>) -> Self {
         Self { what: what.into(), column: column.into(), says: says.into() }
     }

@@ -5,7 +5,7 @@
 use super::factor::Tall;
 use super::model::Model;
 use super::problem::Problem;
-use super::term::Term;
+use super::term::ObservationTerm;
 use super::triangle::Triangle;
 use crate::observation::KINDS;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
@@ -32,7 +32,9 @@ pub(crate) fn clustered(problem: &Problem, model: &Model, free: &[usize], invers
                 for &row in pose {
                     let mut placed = model.place(problem.data, row, scratch);
                     for kind in KINDS {
-                        let Some((term, _)) = Term::of(*kind, problem.data, row, &placed, problem.excess) else { continue };
+                        let Some((term, _)) = ObservationTerm::of(*kind, problem.data, row, &placed, problem.excess) else {
+                            continue;
+                        };
                         let share = term.share();
                         jacobian.fill(Vector3::zeros());
                         term.derivatives(&mut placed, |parameter, derivative| {

@@ -10,7 +10,7 @@ use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
 use super::repeats::Poses;
-use super::term::Term;
+use super::term::ObservationTerm;
 use crate::observation::KINDS;
 use crate::robot::Measurements;
 use faer::Mat;
@@ -183,7 +183,7 @@ impl Near {
         let mut scratch = other.stack.scratch(&other.robot);
         let after = part.iter().flat_map(|row| {
             let placed = other.place(problem.data, *row, &mut scratch);
-            let terms = KINDS.iter().filter_map(|kind| Term::of(*kind, problem.data, *row, &placed, problem.excess));
+            let terms = KINDS.iter().filter_map(|kind| ObservationTerm::of(*kind, problem.data, *row, &placed, problem.excess));
             terms.map(|(term, _)| term.error).collect::<Vec<_>>()
         });
         let after: Vec<f64> = after.zip(&shares).flat_map(|(error, share)| <[f64; 3]>::from(error * *share)).collect();
@@ -211,7 +211,7 @@ impl Near {
         for row in part {
             let mut placed = model.place(problem.data, *row, &mut scratch);
             for kind in KINDS {
-                let Some((term, _)) = Term::of(*kind, problem.data, *row, &placed, problem.excess) else { continue };
+                let Some((term, _)) = ObservationTerm::of(*kind, problem.data, *row, &placed, problem.excess) else { continue };
                 let share = term.share();
                 let mut line = vec![Vector3::zeros(); p];
                 term.derivatives(&mut placed, |parameter, derivative| {

@@ -46,4 +46,4 @@ pub use model::Model;
 pub use observe::Visibility;
 pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, spread};
-pub use screen::{Kind, Screening, Suspect, fit_screened};
+pub use screen::{Screening, Suspect, SuspectKind, fit_screened};

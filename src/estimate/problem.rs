@@ -2,7 +2,7 @@
 
 use super::factor::{Factor, Tall};
 use super::model::Model;
-use super::term::{Term, huber};
+use super::term::{ObservationTerm, huber};
 use crate::effect::PlacedRow;
 use crate::observation::{Dimension, ExcessSigma, KINDS, Residual, kinds};
 use crate::robot::Measurements;
@@ -78,7 +78,7 @@ impl Problem<'_> {
         for chunk in rows.chunks(CHUNK) {
             let height = lines_of_row * chunk.len();
             let mut lines = tall.chunk(height);
-            let mut write = |first: usize, term: Term, placed: &mut PlacedRow| {
+            let mut write = |first: usize, term: ObservationTerm, placed: &mut PlacedRow| {
                 let share = term.share();
                 term.derivatives(placed, |parameter, derivative| {
                     if let Some(j) = column[parameter] {
@@ -91,7 +91,7 @@ impl Problem<'_> {
             for (i, &row) in chunk.iter().enumerate() {
                 let mut placed = model.place(self.data, row, &mut scratch);
                 for (k, kind) in kinds.iter().enumerate() {
-                    if let Some((term, residual)) = Term::of(*kind, self.data, row, &placed, self.excess) {
+                    if let Some((term, residual)) = ObservationTerm::of(*kind, self.data, row, &placed, self.excess) {
                         write(lines_of_row * i + 3 * k, term, &mut placed);
                         residuals.push(residual);
                     }

@@ -11,14 +11,14 @@ const HUBER_BY_AXES: [f64; 4] = [f64::INFINITY, 2.7, 3.15, HUBER];
 pub(crate) const HUBER: f64 = 3.5;
 
 /// Weighted residual and derivatives of one kind in one row.
-pub(crate) struct Term {
+pub(crate) struct ObservationTerm {
     /// Measured - predicted in standard deviations.
     pub error: Vector3<f64>,
     pub axes: usize,
     sensitivity: Sensitivity,
 }
 
-impl Term {
+impl ObservationTerm {
     /// With `excess` beside the measurement's own noise. `None` where the row measured none.
     pub fn of(
         kind: &'static dyn Kind,

@@ -13,7 +13,7 @@ const STACK: usize = 8 << 20;
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// How robots are worked through.
-pub struct Options<'a> {
+pub struct WorkerOptions<'a> {
     pub workers: usize,
     /// Stops at the first robot that is not done.
     pub fail_fast: bool,
@@ -29,7 +29,7 @@ pub struct Worked {
 }
 
 /// Works through robots of the roster, by position. Fails where the store does; then all workers stop.
-pub fn work(workshop: &Workshop, robots: &[usize], options: &Options, watcher: &dyn Watcher) -> Result<Worked> {
+pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watcher: &dyn Watcher) -> Result<Worked> {
     let roster = &workshop.fleet.roster.0;
     let slots: Vec<Mutex<Option<Record>>> = roster.iter().map(|_| Mutex::new(None)).collect();
     let (next, computed) = (AtomicUsize::new(0), AtomicUsize::new(0));

@@ -12,7 +12,7 @@ mod together;
 mod words;
 
 pub use marks::marked;
-pub use robots::{KINDS, Kind};
+pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result, counted};
 use columns::Found;
@@ -25,7 +25,7 @@ pub struct Request<'a> {
     pub folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
     pub data: &'a [PathBuf],
-    pub robot: Kind,
+    pub robot: RobotFileKind,
     /// The robot instead, and its last link.
     pub urdf: Option<&'a Path>,
     pub tip: &'a str,

@@ -3,7 +3,7 @@
 use crate::yaml::quoted;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum RobotFileKind {
     Spherical6,
     Offset6,
     Seven,
@@ -11,9 +11,10 @@ pub enum Kind {
 }
 
 /// All of them, in the order of the help.
-pub const KINDS: [Kind; 4] = [Kind::Spherical6, Kind::Offset6, Kind::Seven, Kind::Dh6];
+pub const KINDS: [RobotFileKind; 4] =
+    [RobotFileKind::Spherical6, RobotFileKind::Offset6, RobotFileKind::Seven, RobotFileKind::Dh6];
 
-impl Kind {
+impl RobotFileKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Spherical6 => "spherical6",

@@ -52,7 +52,7 @@ pub struct About {
     /// Whether it must come with its standard deviation; else the instrument's noise is taken.
     pub own_sigma: bool,
     pub rank: Rank,
-    /// Whether rows that stand out by it are named and set aside; else they only count less, by Huber's loss.
+    /// Whether rows that stand out by it are named and set aside; else they are only down-weighted, by Huber's loss.
     pub is_screened: bool,
 }
 

@@ -40,7 +40,7 @@ pub struct RobotFiles<'a> {
     pub urdf: Option<&'a Path>,
 }
 
-/// Proposes poses; `pair` are two effects to tell apart, or none, `against` a recording to compare with.
+/// Proposes poses; `pair` are two effects to separate, or none, `against` a recording to compare with.
 pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
     let imported = robot_file(robot.file, robot.urdf)?;
     let place = robot.file.display().to_string();

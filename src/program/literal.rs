@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// What the numbers of a target mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum TargetKind {
     /// Six joints, deg.
     Joints,
     /// X, Y, Z (mm), A about z, B about the new y, C about the new x (deg).
@@ -17,7 +17,7 @@ pub enum Kind {
 /// A target of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Literal {
-    pub kind: Kind,
+    pub kind: TargetKind,
     /// In the order of the kind.
     pub values: Vec<f64>,
     /// Where each value stands, sign included.
@@ -30,10 +30,10 @@ impl Literal {
         let placed = self.values.iter().zip(&self.spans).enumerate();
         placed.filter_map(|(k, (value, span))| {
             let fault = match self.kind {
-                Kind::Joints => Bound::Angle.fault(value.to_radians()),
+                TargetKind::Joints => Bound::Angle.fault(value.to_radians()),
                 _ if k < 3 => Bound::Length.fault(value * 1e-3),
-                Kind::Frame => Bound::Angle.fault(value.to_radians()),
-                Kind::Quaternion => None,
+                TargetKind::Frame => Bound::Angle.fault(value.to_radians()),
+                TargetKind::Quaternion => None,
             };
             Some((span.start, fault?))
         })
@@ -47,10 +47,10 @@ impl Literal {
     /// Decimals of value `k`: 1e-6 deg is 0.04 um at 2.5 m, 1e-5 mm is 0.01 um.
     fn decimals(&self, k: usize) -> usize {
         match self.kind {
-            Kind::Joints => 6,
-            Kind::Frame | Kind::Quaternion if k < 3 => 5,
-            Kind::Frame => 6,
-            Kind::Quaternion => 9,
+            TargetKind::Joints => 6,
+            TargetKind::Frame | TargetKind::Quaternion if k < 3 => 5,
+            TargetKind::Frame => 6,
+            TargetKind::Quaternion => 9,
         }
     }
 

@@ -12,7 +12,7 @@ mod rapid;
 mod token;
 
 pub use correct::{ProgramFile, corrected};
-pub use literal::{Kind, Literal};
+pub use literal::{Literal, TargetKind};
 pub use pose::solve;
 
 use std::ops::Range;

@@ -3,7 +3,7 @@
 //! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::{Kind, Literal, Solved};
+use super::{Literal, Solved, TargetKind};
 use crate::compensate::{Answer, Chain, Corrector, Nominal, Target, turns};
 use crate::robot::RobotModel;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -23,12 +23,12 @@ fn target(literal: &Literal) -> Target {
     let v = &literal.values;
     let point = || Some(Vector3::new(v[0], v[1], v[2]) * 1e-3);
     match literal.kind {
-        Kind::Joints => Target { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..Target::default() },
-        Kind::Frame => {
+        TargetKind::Joints => Target { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..Target::default() },
+        TargetKind::Frame => {
             let rotation = turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians());
             Target { point: point(), rotation: Some(rotation), ..Target::default() }
         }
-        Kind::Quaternion => {
+        TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
             Target { point: point(), rotation: Some(turn.to_rotation_matrix().into_inner()), ..Target::default() }
         }
@@ -36,14 +36,14 @@ fn target(literal: &Literal) -> Target {
 }
 
 fn values(literal: &Literal, robot: &RobotModel, q: &[f64]) -> Vec<f64> {
-    if literal.kind == Kind::Joints {
+    if literal.kind == TargetKind::Joints {
         return q.iter().map(|q| q.to_degrees()).collect();
     }
     let pose = Nominal::new(robot).place(q);
     let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];
-    if literal.kind == Kind::Frame {
+    if literal.kind == TargetKind::Frame {
         let (c, b, a) = rotation.euler_angles();
         // Of the angles that turn alike those next to the given, so that 180 does not become -180.
         let near = |angle: f64, given: f64| angle + 360.0 * ((given - angle) / 360.0).round();

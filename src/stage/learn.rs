@@ -8,7 +8,7 @@ mod told;
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::network::correction::features;
-use crate::estimate::network::rivals::{Contest, fits, learn};
+use crate::estimate::network::rivals::{CorrectionContest, fits, learn};
 use crate::estimate::network::{Activation, Arm, OUTPUTS, Recipe, Rival, Samples, Start, compare};
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
@@ -312,7 +312,7 @@ impl Learn {
         }
     }
 
-    fn contest<'a>(&self, rows: usize, arm: Option<&'a Arm>, prismatic: &'a [bool], context: &Context) -> Contest<'a> {
+    fn contest<'a>(&self, rows: usize, arm: Option<&'a Arm>, prismatic: &'a [bool], context: &Context) -> CorrectionContest<'a> {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
         let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
@@ -336,7 +336,7 @@ impl Learn {
                 once.push(rival);
             }
         }
-        Contest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
+        CorrectionContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What identifications do about rows that no smooth model can follow, and what they tell the person about them.
 
-use crate::estimate::{FitOptions, Fitted, Kind, Model, Screening, Suspect, fit, fit_screened};
+use crate::estimate::{FitOptions, Fitted, Model, Screening, Suspect, SuspectKind, fit, fit_screened};
 use crate::robot::Measurements;
 use crate::stage::Context;
 use crate::table::{Recording, Split, slip};
@@ -58,13 +58,13 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
             let partner = first.partner.map_or("another row", id);
             let many = case.len() > 1;
             let (order, text) = match first.kind {
-                Kind::Exchanged if first.partner > Some(first.row) => (0, format!("{who} and {partner} look exchanged")),
-                Kind::Exchanged => continue,
-                Kind::ShiftedBlock(offset) => (1, format!("{who}: points and joints are {offset:+} rows apart")),
-                Kind::Mislabelled => (2, format!("{who} lies where the joints of {partner} put it")),
-                Kind::UnitSlip(factor) => (3, format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor))),
-                Kind::Zero => (4, format!("{who} {} zero", if many { "are" } else { "is" })),
-                Kind::Outlier | Kind::Event => (5, format!("{who} is {:.3} mm off", first.size * 1e3)),
+                SuspectKind::Exchanged if first.partner > Some(first.row) => (0, format!("{who} and {partner} look exchanged")),
+                SuspectKind::Exchanged => continue,
+                SuspectKind::ShiftedBlock(offset) => (1, format!("{who}: points and joints are {offset:+} rows apart")),
+                SuspectKind::Mislabelled => (2, format!("{who} lies where the joints of {partner} put it")),
+                SuspectKind::UnitSlip(factor) => (3, format!("{who} {} {}", if many { "are" } else { "is" }, slip(factor))),
+                SuspectKind::Zero => (4, format!("{who} {} zero", if many { "are" } else { "is" })),
+                SuspectKind::Outlier | SuspectKind::Event => (5, format!("{who} is {:.3} mm off", first.size * 1e3)),
             };
             by_kind.entry(order).or_default().push(text);
         }
@@ -97,7 +97,7 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
 /// Suspects that are one thing to a person: consecutive rows with the same slip, zero or shift; all others one by one.
 fn cases<'a>(suspects: &'a [&'a Suspect]) -> impl Iterator<Item = &'a [&'a Suspect]> {
     suspects.chunk_by(|a, b| {
-        let together = matches!(a.kind, Kind::ShiftedBlock(_) | Kind::UnitSlip(_) | Kind::Zero);
+        let together = matches!(a.kind, SuspectKind::ShiftedBlock(_) | SuspectKind::UnitSlip(_) | SuspectKind::Zero);
         together && a.kind == b.kind && a.row + 1 == b.row
     })
 }

@@ -4,7 +4,7 @@ mod numbers;
 mod reading;
 
 use crate::estimate::network::arm::Arm;
-use crate::estimate::network::basis::{Term, Wave, Way};
+use crate::estimate::network::basis::{BasisTerm, Wave, Way};
 use crate::estimate::network::correction::{Body, Correction, Dress, Feature, Map};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::region::Region;
@@ -176,7 +176,7 @@ fn feature_unit(feature: Feature, prismatic: &[bool]) -> f64 {
 }
 
 /// Shifts are stored in mm, turns in rad; per m of torque or travel where a wave is one.
-fn coefficient_unit(term: &Term) -> f64 {
+fn coefficient_unit(term: &BasisTerm) -> f64 {
     if matches!(term.way, Way::Along(_) | Way::Shift(..)) { MILLI } else { 1.0 }
 }
 

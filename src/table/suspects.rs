@@ -23,7 +23,7 @@ crate::table::rows! { "suspects",
     }
 }
 
-use crate::estimate::{Kind, Screening, Suspect};
+use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::table::{Recording, Split};
 
 impl Suspects {
@@ -46,15 +46,15 @@ impl Suspects {
     }
 }
 
-fn name(kind: Kind) -> &'static str {
+fn name(kind: SuspectKind) -> &'static str {
     match kind {
-        Kind::Exchanged => "exchanged",
-        Kind::Mislabelled => "mislabelled",
-        Kind::ShiftedBlock(_) => "shifted_block",
-        Kind::UnitSlip(_) => "unit_slip",
-        Kind::Zero => "zero",
-        Kind::Outlier => "outlier",
-        Kind::Event => "event",
+        SuspectKind::Exchanged => "exchanged",
+        SuspectKind::Mislabelled => "mislabelled",
+        SuspectKind::ShiftedBlock(_) => "shifted_block",
+        SuspectKind::UnitSlip(_) => "unit_slip",
+        SuspectKind::Zero => "zero",
+        SuspectKind::Outlier => "outlier",
+        SuspectKind::Event => "event",
     }
 }
 
@@ -62,17 +62,19 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
     let partner = partner.unwrap_or("another row");
     let far = format!("{:.3} mm from where its joints put it", suspect.size * 1e3);
     match suspect.kind {
-        Kind::Exchanged => format!("{far}; with the points of {partner} and this row swapped, both fit"),
-        Kind::Mislabelled => format!("{far}, and where the joints of {partner} put it"),
-        Kind::ShiftedBlock(offset) => {
+        SuspectKind::Exchanged => format!("{far}; with the points of {partner} and this row swapped, both fit"),
+        SuspectKind::Mislabelled => format!("{far}, and where the joints of {partner} put it"),
+        SuspectKind::ShiftedBlock(offset) => {
             format!(
                 "{far}, and where the joints of {partner} put it, like its neighbours: points and joints are {offset:+} rows apart"
             )
         }
-        Kind::UnitSlip(factor) => format!("the point is {}: another unit?", slip(factor)),
-        Kind::Zero => "the point is the tracker's origin: a lost beam?".into(),
-        Kind::Outlier => format!("{far}, and nowhere else that this recording explains"),
-        Kind::Event => format!("{far}, like its neighbours: something happened that the model does not know, so the row is kept"),
+        SuspectKind::UnitSlip(factor) => format!("the point is {}: another unit?", slip(factor)),
+        SuspectKind::Zero => "the point is the tracker's origin: a lost beam?".into(),
+        SuspectKind::Outlier => format!("{far}, and nowhere else that this recording explains"),
+        SuspectKind::Event => {
+            format!("{far}, like its neighbours: something happened that the model does not know, so the row is kept")
+        }
     }
 }
 

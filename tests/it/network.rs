@@ -4,7 +4,7 @@ use calib::estimate::network::arm::Arm;
 use calib::estimate::network::correction::{Body, Dress, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, Scratch};
 use calib::estimate::network::region::Region;
-use calib::estimate::network::rivals::{Comparison, Contest, learn};
+use calib::estimate::network::rivals::{Comparison, CorrectionContest, learn};
 use calib::estimate::network::{Activation, Correction, Recipe, Rival, Samples, Shape, Start, compare, train};
 use calib::estimate::swarm::Algorithm;
 use calib::robot::RobotModel;
@@ -160,8 +160,8 @@ fn waves(rows: usize, arm: &Arm, noise: f64, seed: u64) -> Samples {
     samples
 }
 
-fn contest<'a>(arm: Option<&'a Arm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> Contest<'a> {
-    Contest {
+fn contest<'a>(arm: Option<&'a Arm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> CorrectionContest<'a> {
+    CorrectionContest {
         rivals: rivals.to_vec(),
         arm,
         prismatic: &[false; 6],

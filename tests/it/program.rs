@@ -5,14 +5,14 @@ mod random;
 mod rapid;
 mod reader;
 
-use calib::program::{Kind, Language, Note, Partial, Program, Solved};
+use calib::program::{Language, Note, Partial, Program, Solved, TargetKind};
 
 fn told(notes: &[Note]) -> Vec<String> {
     notes.iter().map(|note| format!("{}:{}: {}", note.line, note.column, note.message)).collect()
 }
 
 /// Targets and warnings of a program that is accepted.
-fn accepted(language: Language, text: &str) -> (Vec<(Kind, Vec<f64>)>, Vec<String>) {
+fn accepted(language: Language, text: &str) -> (Vec<(TargetKind, Vec<f64>)>, Vec<String>) {
     let program = Program::parse(text.as_bytes(), language, Partial::Refused)
         .unwrap_or_else(|refusal| panic!("{text}\n{:#?}", told(&refusal.faults)));
     let targets = program.literals().iter().map(|literal| (literal.kind, literal.values.clone())).collect();

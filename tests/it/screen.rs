@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{EffectStack, Load, Setting, whole};
-use calib::estimate::{FitOptions, Kind, Model, Screening, align, fit, fit_screened};
+use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -175,15 +175,15 @@ fn circle(trial: &mut Trial) -> Spoilt {
     rows.into_iter().map(|row| (row, "mislabelled")).collect()
 }
 
-fn name(kind: Kind) -> &'static str {
+fn name(kind: SuspectKind) -> &'static str {
     match kind {
-        Kind::Exchanged => "exchanged",
-        Kind::Mislabelled => "mislabelled",
-        Kind::ShiftedBlock(_) => "shifted_block",
-        Kind::UnitSlip(_) => "unit_slip",
-        Kind::Zero => "zero",
-        Kind::Outlier => "outlier",
-        Kind::Event => "event",
+        SuspectKind::Exchanged => "exchanged",
+        SuspectKind::Mislabelled => "mislabelled",
+        SuspectKind::ShiftedBlock(_) => "shifted_block",
+        SuspectKind::UnitSlip(_) => "unit_slip",
+        SuspectKind::Zero => "zero",
+        SuspectKind::Outlier => "outlier",
+        SuspectKind::Event => "event",
     }
 }
 
@@ -305,7 +305,7 @@ fn a_joint_log_that_slips_in_the_middle_is_told_by_its_rows_and_the_rest_is_fitt
         slip_log(&mut trial, 180, 30);
         let (model, screening) = trial.screen();
         assert_eq!(screening.apart, None, "arm {seed}");
-        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == Kind::ShiftedBlock(30));
+        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
         // The last 30 points have lost their joints.
         let shifted = shifted.filter(|suspect| suspect.row >= 180).count();
         assert!(shifted >= 118, "arm {seed}: {shifted} of 120");
@@ -327,7 +327,7 @@ fn a_slip_is_told_in_a_robot_that_has_more_errors_than_its_model() {
         }
         slip_log(&mut trial, 1203, 30);
         let screening = trial.screen().1;
-        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == Kind::ShiftedBlock(30));
+        let shifted = screening.suspects.iter().filter(|suspect| suspect.kind == SuspectKind::ShiftedBlock(30));
         assert_eq!(shifted.map(|suspect| suspect.row).collect::<Vec<_>>(), (1203..2000).collect::<Vec<_>>(), "arm {seed}");
         assert!(screening.suspects.iter().all(|suspect| suspect.partner.is_none_or(|row| row < 2000)), "arm {seed}");
         assert!(screening.kept.iter().all(|row| *row < 1203), "arm {seed}");

@@ -43,7 +43,7 @@ pub(super) fn main(arguments: &ExecArguments, command_line: &[OsString]) -> Resu
     workshop.log = task.map(|(job, task)| format!("{job}_{task}.out"));
     let progress = FleetProgress::new(Verbosity::Normal, 1, chosen.len());
     let stop = || workshop.ledger.cancelled(&note.run);
-    let worked = local::work(&workshop, &chosen, &local::Options { workers: 1, fail_fast: false, stop: &stop }, &progress)?;
+    let worked = local::work(&workshop, &chosen, &local::WorkerOptions { workers: 1, fail_fast: false, stop: &stop }, &progress)?;
     let recorded = worked.records.iter().flatten().count();
     emit(&format!("{recorded} of {} recorded, {} computed here\n", counted(robots.len(), "robot"), worked.computed))?;
     if recorded < robots.len() {

@@ -112,7 +112,7 @@ fn run(fleet: &Fleet, store: &Store, place: &Place, how: &How, command_line: &[O
             let workers = how.jobs.map_or_else(cores, usize::from);
             let progress = FleetProgress::new(verbosity, workers, chosen.len());
             let stop = || workshop.ledger.cancelled(&note.run);
-            let options = local::Options { workers, fail_fast: how.fail_fast, stop: &stop };
+            let options = local::WorkerOptions { workers, fail_fast: how.fail_fast, stop: &stop };
             let worked = local::work(&workshop, &chosen, &options, &progress);
             progress.finish();
             let worked = worked?;

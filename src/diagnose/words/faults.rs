@@ -4,7 +4,7 @@ use crate::diagnose::round::{FitState, REVERSED};
 use crate::diagnose::types::Finding;
 use crate::effect::{JointLogLag, ParameterEstimate, ParameterSpec, Place, ReductionRatio};
 use crate::error::counted;
-use crate::estimate::{Kind, ParameterStatus, Screening, Suspect};
+use crate::estimate::{ParameterStatus, Screening, Suspect, SuspectKind};
 
 /// Joints and points of all rows that are so many rows apart.
 pub(super) fn rows_apart(offset: i64) -> Finding {
@@ -37,8 +37,8 @@ const REVERSED_WITHIN: f64 = 0.1;
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
     // What has no other explanation than that it is far out must be farther than this noise reaches.
-    let far = |s: &Suspect| s.kind != Kind::Outlier || s.statistic > screening.reach;
-    let of = |kinds: fn(Kind) -> bool| -> Vec<usize> {
+    let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
+    let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
         let own = screening.suspects.iter().filter(|s| !s.used() && kinds(s.kind) && Some(s.row) != unknown);
         own.filter(|s| far(s)).map(|s| s.row + 1).collect()
     };
@@ -49,16 +49,16 @@ pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Findi
         format!("{noun} {}{}", named.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
     };
     let mut out = Vec::new();
-    let swapped = of(|kind| matches!(kind, Kind::Exchanged | Kind::Mislabelled));
+    let swapped = of(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
     if !swapped.is_empty() {
         out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped))));
     }
-    let shifted = of(|kind| matches!(kind, Kind::ShiftedBlock(_)));
+    let shifted = of(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
     if !shifted.is_empty() {
         let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
         out.push(of_the_recording("joint_log_lag", text));
     }
-    let wrong = of(|kind| matches!(kind, Kind::Outlier | Kind::UnitSlip(_) | Kind::Zero));
+    let wrong = of(|kind| matches!(kind, SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero));
     if !wrong.is_empty() {
         out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong))));
     }

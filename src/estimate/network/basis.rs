@@ -32,7 +32,7 @@ pub enum Wave {
 
 /// A way times the product of its waves.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Term {
+pub struct BasisTerm {
     pub way: Way,
     pub waves: Vec<Wave>,
 }
@@ -45,7 +45,7 @@ const ROWS_EACH: usize = 8;
 const HARMONICS: usize = 3;
 
 /// Ridge on harmonics: constants, three orders of every joint, and first orders of every two joints multiplied.
-pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<Term>> {
+pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
     let first = |joint: usize| match prismatic[joint] {
         true => vec![Wave::Value(joint)],
         false => vec![Wave::Sin(joint, 1), Wave::Cos(joint, 1)],
@@ -64,15 +64,15 @@ pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<Term>> {
         }
     }
     groups.push(pairs);
-    let along = |waves: Vec<Wave>| (0..3).map(move |axis| Term { way: Way::Along(axis), waves: waves.clone() });
+    let along = |waves: Vec<Wave>| (0..3).map(move |axis| BasisTerm { way: Way::Along(axis), waves: waves.clone() });
     groups.into_iter().map(|group| group.into_iter().flat_map(along).collect()).collect()
 }
 
 /// Joint curves as fine as `rows` can show, small motions of all stations, and wind-up by weight.
-pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<Term>> {
+pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<BasisTerm>> {
     let joints = arm.hinges.len();
-    let single = |way: Way, wave: Wave| Term { way, waves: vec![wave] };
-    let mut groups: Vec<Vec<Term>> = Vec::new();
+    let single = |way: Way, wave: Wave| BasisTerm { way, waves: vec![wave] };
+    let mut groups: Vec<Vec<BasisTerm>> = Vec::new();
     for (joint, hinge) in arm.hinges.iter().enumerate() {
         let mut low = 1;
         for high in BANDS {
@@ -86,7 +86,7 @@ pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<Term>> {
     }
     let rigid =
         (0..=joints).flat_map(|station| (0..3).flat_map(move |axis| [Way::Shift(station, axis), Way::Tilt(station, axis)]));
-    groups.push(rigid.map(|way| Term { way, waves: Vec::new() }).collect());
+    groups.push(rigid.map(|way| BasisTerm { way, waves: Vec::new() }).collect());
     let weights =
         (0..joints).flat_map(|joint| (joint..joints).map(move |body| single(Way::Turn(joint), Wave::Torque(joint, body))));
     groups.push(weights.collect());
@@ -94,15 +94,15 @@ pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<Term>> {
 }
 
 /// Terms at a posture, with the memory that this takes.
-pub struct Basis<'a> {
+pub struct BasisFunctions<'a> {
     arm: Option<&'a Arm>,
-    terms: &'a [Term],
+    terms: &'a [BasisTerm],
     /// Sines and cosines of the multiples of each joint's angle.
     multiples: Vec<Vec<[f64; 2]>>,
 }
 
-impl<'a> Basis<'a> {
-    pub fn new(arm: Option<&'a Arm>, terms: &'a [Term]) -> Self {
+impl<'a> BasisFunctions<'a> {
+    pub fn new(arm: Option<&'a Arm>, terms: &'a [BasisTerm]) -> Self {
         let mut highest: Vec<usize> = Vec::new();
         for wave in terms.iter().flat_map(|term| &term.waves) {
             if let Wave::Sin(joint, order) | Wave::Cos(joint, order) = *wave {

@@ -14,7 +14,7 @@ const PATIENCE: usize = 20;
 
 /// One iteration of the training; iteration 0 is the start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Iteration {
+pub struct DescentIteration {
     pub index: usize,
     /// Loss on the training rows, decay included.
     pub loss: f64,
@@ -26,7 +26,7 @@ pub struct Iteration {
 
 /// Why the training ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
+pub enum DescentStop {
     Iterations,
     /// The loss no longer falls.
     Flat,
@@ -38,8 +38,8 @@ pub enum Stop {
 #[derive(Debug, Clone)]
 pub struct Descent {
     pub parameters: Vec<f64>,
-    pub history: Vec<Iteration>,
-    pub stop: Stop,
+    pub history: Vec<DescentIteration>,
+    pub stop: DescentStop,
 }
 
 /// Minimises a loss from `start` in at most `iterations` iterations.
@@ -65,7 +65,7 @@ pub fn descend(
     let mut index = 0;
     let stop = loop {
         let checked = check(&x);
-        history.push(Iteration { index, loss, train: squares, check: checked, evaluations });
+        history.push(DescentIteration { index, loss, train: squares, check: checked, evaluations });
         let judged = checked.map_or(loss, |squares| squares.iter().sum());
         if judged < kept.0 {
             kept = (judged, x.clone());
@@ -74,10 +74,10 @@ pub fn descend(
             since += 1;
         }
         if since >= PATIENCE {
-            break Stop::Early;
+            break DescentStop::Early;
         }
         if index >= iterations {
-            break Stop::Iterations;
+            break DescentStop::Iterations;
         }
         let mut direction = quasi_newton(&gradient, &memory);
         let mut slope = dot(&direction, &gradient);
@@ -104,7 +104,7 @@ pub fn descend(
                 break None;
             }
         };
-        let Some((value, at_next)) = found else { break Stop::Flat };
+        let Some((value, at_next)) = found else { break DescentStop::Flat };
         let s: Vec<f64> = next.iter().zip(&x).map(|(n, x)| n - x).collect();
         let y: Vec<f64> = next_gradient.iter().zip(&gradient).map(|(n, g)| n - g).collect();
         let curvature = dot(&s, &y);
@@ -121,7 +121,7 @@ pub fn descend(
         (loss, squares) = (value, at_next);
         index += 1;
         if flat {
-            break Stop::Flat;
+            break DescentStop::Flat;
         }
     };
     Descent { parameters: kept.1, history, stop }

@@ -5,7 +5,7 @@
 //! summed in chunks of rows, so memory does not grow with the recording.
 
 use super::arm::Arm;
-use super::basis::{Basis, Term};
+use super::basis::{BasisFunctions, BasisTerm};
 use super::samples::Samples;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{DenseSolveCore, Llt};
@@ -30,7 +30,7 @@ pub const DRAWS: usize = 8;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linear {
     pub arm: Option<Arm>,
-    pub terms: Vec<Term>,
+    pub terms: Vec<BasisTerm>,
     /// The most likely coefficients, then [`DRAWS`] draws from the posterior.
     pub members: Vec<Vec<f64>>,
     /// What is left per axis, m.
@@ -39,7 +39,7 @@ pub struct Linear {
 
 impl Linear {
     /// Fits `groups` of terms. `None` where nothing moves or the matrix is singular.
-    pub fn fit(samples: &Samples, arm: Option<&Arm>, groups: &[Vec<Term>], seed: u64) -> Option<Self> {
+    pub fn fit(samples: &Samples, arm: Option<&Arm>, groups: &[Vec<BasisTerm>], seed: u64) -> Option<Self> {
         let every = samples.rows().div_ceil(ROWS).max(1);
         let rows: Vec<usize> = (0..samples.rows()).step_by(every).collect();
         let (terms, group) = Self::lively(samples, &rows, arm, groups);
@@ -83,11 +83,16 @@ impl Linear {
     }
 
     /// The terms that move the point anywhere with the root mean square of each, and the group of each.
-    fn lively(samples: &Samples, rows: &[usize], arm: Option<&Arm>, groups: &[Vec<Term>]) -> ((Vec<Term>, Vec<f64>), Vec<usize>) {
-        let all: Vec<Term> = groups.iter().flatten().cloned().collect();
+    fn lively(
+        samples: &Samples,
+        rows: &[usize],
+        arm: Option<&Arm>,
+        groups: &[Vec<BasisTerm>],
+    ) -> ((Vec<BasisTerm>, Vec<f64>), Vec<usize>) {
+        let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
         let of: Vec<usize> = groups.iter().enumerate().flat_map(|(g, terms)| terms.iter().map(move |_| g)).collect();
         let mut squares = vec![0.0; all.len()];
-        let mut basis = Basis::new(arm, &all);
+        let mut basis = BasisFunctions::new(arm, &all);
         for row in rows {
             basis.at(&samples.sources[*row], |t, way| squares[t] += way.iter().map(|v| v * v).sum::<f64>());
         }
@@ -101,7 +106,7 @@ impl Linear {
     /// The correction and its standard deviation per axis beside the noise, m.
     pub fn at(&self, q: &[f64]) -> ([f64; 3], f64) {
         let mut sums = vec![[0.0; 3]; self.members.len()];
-        Basis::new(self.arm.as_ref(), &self.terms).at(q, |t, way| {
+        BasisFunctions::new(self.arm.as_ref(), &self.terms).at(q, |t, way| {
             for (sum, member) in sums.iter_mut().zip(&self.members) {
                 for (sum, value) in sum.iter_mut().zip(way) {
                     *sum += member[t] * value;
@@ -119,7 +124,7 @@ struct Sums<'a> {
     samples: &'a Samples,
     rows: &'a [usize],
     arm: Option<&'a Arm>,
-    terms: &'a [Term],
+    terms: &'a [BasisTerm],
     scale: &'a [f64],
     unit: f64,
     h: Mat<f64>,
@@ -130,7 +135,13 @@ struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
-    fn new(samples: &'a Samples, rows: &'a [usize], arm: Option<&'a Arm>, terms: &'a [Term], scale: &'a [f64]) -> Option<Self> {
+    fn new(
+        samples: &'a Samples,
+        rows: &'a [usize],
+        arm: Option<&'a Arm>,
+        terms: &'a [BasisTerm],
+        scale: &'a [f64],
+    ) -> Option<Self> {
         let squares: f64 = rows.iter().flat_map(|row| samples.residual[*row]).map(|v| v * v).sum();
         let unit = (squares / (3 * rows.len().max(1)) as f64).sqrt();
         let p = terms.len();
@@ -143,7 +154,7 @@ impl<'a> Sums<'a> {
         self.h.fill(0.0);
         self.g.fill(0.0);
         (self.squares, self.count) = (0.0, 0.0);
-        let mut basis = Basis::new(self.arm, self.terms);
+        let mut basis = BasisFunctions::new(self.arm, self.terms);
         let mut columns = Mat::<f64>::zeros(3 * CHUNK, self.terms.len());
         for (rows, weights) in self.rows.chunks(CHUNK).zip(weights.chunks(CHUNK)) {
             columns.fill(0.0);
@@ -176,7 +187,7 @@ impl<'a> Sums<'a> {
 
     /// Huber's weights of the rows under coefficients `x`; `limit` is a length in units of the residual.
     fn weights(&self, x: &[f64], limit: f64) -> Vec<f64> {
-        let mut basis = Basis::new(self.arm, self.terms);
+        let mut basis = BasisFunctions::new(self.arm, self.terms);
         let weight = |row: &usize| {
             let mut left = self.samples.residual[*row].map(|value| value / self.unit);
             basis.at(&self.samples.sources[*row], |t, way| {

@@ -78,7 +78,7 @@ impl Rival {
 
 /// What is compared.
 #[derive(Debug, Clone)]
-pub struct Contest<'a> {
+pub struct CorrectionContest<'a> {
     pub rivals: Vec<Rival>,
     /// What joint curves and joint networks go through; without it they are no rivals.
     pub arm: Option<&'a Arm>,
@@ -148,12 +148,12 @@ struct Done {
 }
 
 /// How many fits [`compare`] makes.
-pub fn fits(contest: &Contest) -> usize {
+pub fn fits(contest: &CorrectionContest) -> usize {
     let grids = KINDS.iter().filter(|kind| contest.has(**kind)).count();
     (contest.rivals.len() + grids * contest.decays.len() * contest.hidden.len()) * contest.folds
 }
 
-impl Contest<'_> {
+impl CorrectionContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
     fn has(&self, kind: fn(Start) -> Rival) -> bool {
         self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
@@ -163,7 +163,7 @@ impl Contest<'_> {
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
+pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
     let poses = samples.poses();
@@ -220,7 +220,7 @@ pub fn compare(samples: &Samples, contest: &Contest, observe: impl Fn(usize, &st
 /// The rival learnt from all samples, with the course of a network's training. `None` where it cannot be fitted.
 pub fn learn(
     samples: &Samples,
-    contest: &Contest,
+    contest: &CorrectionContest,
     judged: &Judged,
     observe: impl FnMut(&Generation),
 ) -> Option<(Correction, Vec<Course>)> {
@@ -234,7 +234,7 @@ pub fn learn(
 fn fit(
     rival: Rival,
     samples: &Samples,
-    contest: &Contest,
+    contest: &CorrectionContest,
     recipe: &Recipe,
     observe: impl FnMut(&Generation),
 ) -> Option<(Correction, Vec<Course>)> {
@@ -257,7 +257,7 @@ fn fit(
 
 impl Task {
     /// `poses`: that of each row.
-    fn run(&self, samples: &Samples, poses: &[usize], contest: &Contest) -> Option<Done> {
+    fn run(&self, samples: &Samples, poses: &[usize], contest: &CorrectionContest) -> Option<Done> {
         let count = poses.iter().max()? + 1;
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);

@@ -5,7 +5,7 @@
 use super::activation::Activation;
 use super::arm::Arm;
 use super::correction::{Body, Correction, Dress, Feature, JointMotion, Networks, Scaling};
-use super::descent::{Iteration, descend};
+use super::descent::{DescentIteration, descend};
 use super::loss::{Batch, Loss, Scratch};
 use super::perceptron::{OUTPUTS, Shape};
 use super::region::Region;
@@ -231,7 +231,7 @@ impl<'a> Prepared<'a> {
             start,
             self.recipe.iterations,
         );
-        let course = |i: Iteration| Course {
+        let course = |i: DescentIteration| Course {
             phase: Phase::Gradient,
             member: m + 1,
             index: i.index,

@@ -5,7 +5,7 @@
 
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
-use crate::estimate::term::{HUBER, Term};
+use crate::estimate::term::{HUBER, ObservationTerm};
 use crate::estimate::triangle::Triangle;
 use crate::observation::{KINDS, Kind, noise};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -51,7 +51,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                 let mut placed = model.place(data, row, scratch);
                 let predicted = placed.point;
                 let away = |kind: &&'static dyn Kind| {
-                    let (term, _) = Term::of(*kind, data, row, &placed, problem.excess)?;
+                    let (term, _) = ObservationTerm::of(*kind, data, row, &placed, problem.excess)?;
                     jacobian.fill(Vector3::zeros());
                     term.derivatives(&mut placed, |parameter, derivative| {
                         if let Some(entry) = jacobian.get_mut(column[parameter]) {

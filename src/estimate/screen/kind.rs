@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Why a row stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum SuspectKind {
     /// The partner's joints fit this row's point and the other way round.
     Exchanged,
     /// The point belongs to the partner's joints, and no simple exchange explains it.
@@ -49,8 +49,8 @@ pub(super) fn name(
     flagged: &[usize],
     limit: f64,
     moving: bool,
-) -> Vec<(usize, Kind, Option<usize>)> {
-    let mut kinds: BTreeMap<usize, (Kind, Option<usize>)> = BTreeMap::new();
+) -> Vec<(usize, SuspectKind, Option<usize>)> {
+    let mut kinds: BTreeMap<usize, (SuspectKind, Option<usize>)> = BTreeMap::new();
     for &row in flagged {
         if let Some(kind) = misread(&data.position[row], &standings[row].predicted, SLIP_TOLERANCE) {
             kinds.insert(row, (kind, None));
@@ -65,15 +65,15 @@ pub(super) fn name(
     for (row, candidates) in &fits {
         let nearest = candidates.iter().min_by(|a, b| a.1.total_cmp(&b.1));
         if let (false, Some((partner, _))) = (kinds.contains_key(row), nearest) {
-            kinds.insert(*row, (Kind::Mislabelled, Some(*partner)));
+            kinds.insert(*row, (SuspectKind::Mislabelled, Some(*partner)));
         }
     }
     let unexplained: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
     for run in runs(&unexplained) {
         let kind = match beyond_the_log(run, &kinds, standings.len()) {
-            Some(offset) => Kind::ShiftedBlock(offset),
-            None if is_event(run, standings) => Kind::Event,
-            None => Kind::Outlier,
+            Some(offset) => SuspectKind::ShiftedBlock(offset),
+            None if is_event(run, standings) => SuspectKind::Event,
+            None => SuspectKind::Outlier,
         };
         kinds.extend(run.iter().map(|row| (*row, (kind, None))));
     }
@@ -81,12 +81,12 @@ pub(super) fn name(
 }
 
 /// A zero, or a point that a change of unit brings to where it was predicted, to a share `tolerance` of its distance.
-pub(super) fn misread(measured: &Vector3<f64>, predicted: &Vector3<f64>, tolerance: f64) -> Option<Kind> {
+pub(super) fn misread(measured: &Vector3<f64>, predicted: &Vector3<f64>, tolerance: f64) -> Option<SuspectKind> {
     let distance = predicted.norm();
     let slip = SLIPS.iter().find(|factor| (measured / **factor - predicted).norm() < tolerance * distance);
     match slip {
-        Some(factor) => Some(Kind::UnitSlip(*factor)),
-        None => (measured.norm() < ZERO * distance).then_some(Kind::Zero),
+        Some(factor) => Some(SuspectKind::UnitSlip(*factor)),
+        None => (measured.norm() < ZERO * distance).then_some(SuspectKind::Zero),
     }
 }
 
@@ -129,7 +129,7 @@ fn median_sigma(standings: &[Standing], row: usize) -> f64 {
     sigmas[sigmas.len() / 2]
 }
 
-type Kinds = BTreeMap<usize, (Kind, Option<usize>)>;
+type Kinds = BTreeMap<usize, (SuspectKind, Option<usize>)>;
 
 /// Pairs that fit each other's joints; the closest pairs first where repeats leave a choice.
 fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
@@ -144,8 +144,8 @@ fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
     for (_, a, b) in pairs {
         if !kinds.contains_key(&a) && !kinds.contains_key(&b) {
-            kinds.insert(a, (Kind::Exchanged, Some(b)));
-            kinds.insert(b, (Kind::Exchanged, Some(a)));
+            kinds.insert(a, (SuspectKind::Exchanged, Some(b)));
+            kinds.insert(b, (SuspectKind::Exchanged, Some(a)));
         }
     }
 }
@@ -175,12 +175,12 @@ fn shift(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
         {
             let to = |row: usize| usize::try_from(row as i64 + offset).ok();
             for &row in &rows[at..end] {
-                kinds.insert(row, (Kind::ShiftedBlock(offset), to(row)));
+                kinds.insert(row, (SuspectKind::ShiftedBlock(offset), to(row)));
             }
             for row in [first.wrapping_sub(1), last + 1] {
                 let inside = fits.get(&row).and_then(|found| found.iter().find(|(other, _)| (first..=last).contains(other)));
                 if let (false, Some((partner, _))) = (kinds.contains_key(&row), inside) {
-                    kinds.insert(row, (Kind::ShiftedBlock(offset), Some(*partner)));
+                    kinds.insert(row, (SuspectKind::ShiftedBlock(offset), Some(*partner)));
                 }
             }
         }
@@ -198,7 +198,7 @@ fn beyond_the_log(run: &[usize], kinds: &Kinds, rows: usize) -> Option<i64> {
     let (first, last) = (*run.first()?, *run.last()?);
     let neighbours = [first.wrapping_sub(1), last + 1];
     let offset = neighbours.iter().find_map(|row| match kinds.get(row) {
-        Some((Kind::ShiftedBlock(offset), _)) => Some(*offset),
+        Some((SuspectKind::ShiftedBlock(offset), _)) => Some(*offset),
         _ => None,
     })?;
     let logged = |row: usize| usize::try_from(row as i64 + offset).is_ok_and(|there| there < rows);

@@ -8,7 +8,7 @@ mod distance;
 mod kind;
 mod tail;
 
-pub use kind::Kind;
+pub use kind::SuspectKind;
 
 use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::model::Model;
@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Suspect {
     /// Row of the recording, from 0.
     pub row: usize,
-    pub kind: Kind,
+    pub kind: SuspectKind,
     /// The row whose joints put the tool where this row was measured.
     pub partner: Option<usize>,
     /// Distance of the measured from the predicted point, m.
@@ -35,7 +35,7 @@ pub struct Suspect {
 impl Suspect {
     /// Whether the row still takes part in the fit: an event is the model's fault, not the row's.
     pub fn used(&self) -> bool {
-        self.kind == Kind::Event
+        self.kind == SuspectKind::Event
     }
 }
 
@@ -158,8 +158,8 @@ fn screen(
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let Standing { residual, distance, .. } = &standings[row];
-        let kind = if kind == Kind::Event && held.contains(&row) { Kind::Outlier } else { kind };
-        if kind == Kind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row) {
+        let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
+        if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row) {
             crowd += 1;
         } else {
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
@@ -168,7 +168,7 @@ fn screen(
     // Plain from the nominal robot, whatever the model makes of them.
     suspects.extend(slipped.iter().map(|(row, offset)| Suspect {
         row: *row,
-        kind: Kind::ShiftedBlock(*offset),
+        kind: SuspectKind::ShiftedBlock(*offset),
         partner: row.checked_add_signed(*offset as isize).filter(|row| *row < data.rows()),
         size: standings[*row].residual.norm(),
         statistic: standings[*row].distance,
@@ -202,12 +202,12 @@ fn bulk(standings: &[Standing]) -> Vec<f64> {
 }
 
 /// Sets with more unexplained rows than mistakes would make.
-fn crowded(named: &[(usize, Kind, Option<usize>)], set: &[usize]) -> BTreeSet<usize> {
+fn crowded(named: &[(usize, SuspectKind, Option<usize>)], set: &[usize]) -> BTreeSet<usize> {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     sets.into_iter()
         .filter(|number| {
             let all = set.iter().filter(|of| *of == number).count() as f64;
-            let unexplained = named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == Kind::Outlier).count() as f64;
+            let unexplained = named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == SuspectKind::Outlier).count() as f64;
             unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
         })
         .collect()

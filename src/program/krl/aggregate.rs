@@ -1,7 +1,7 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
 use super::super::token::{Sort, Source, Token};
-use super::super::{Found, Kind, Literal, quoted};
+use super::super::{Found, Literal, TargetKind, quoted};
 use super::line::opens;
 use std::ops::Range;
 
@@ -163,7 +163,7 @@ impl<'t> Aggregate<'t> {
             return;
         }
         let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
-        found.literals.push(Literal { kind: if kind.axes { Kind::Joints } else { Kind::Frame }, values, spans });
+        found.literals.push(Literal { kind: if kind.axes { TargetKind::Joints } else { TargetKind::Frame }, values, spans });
     }
 
     /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.

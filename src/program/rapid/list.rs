@@ -1,7 +1,7 @@
 //! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
 
 use super::super::token::{Source, Token};
-use super::super::{Found, Kind, Literal, quoted};
+use super::super::{Found, Literal, TargetKind, quoted};
 use crate::error::counted;
 use std::ops::Range;
 
@@ -162,7 +162,7 @@ impl<'t> List<'t> {
                 return;
             }
         }
-        let kind = if want == Want::Joints { Kind::Joints } else { Kind::Quaternion };
+        let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
         found.literals.push(Literal { kind, values, spans });
     }
 

@@ -4,7 +4,7 @@ use super::numbers::{Numbers, index};
 use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit};
 use crate::error::{Error, Result, counted};
 use crate::estimate::network::arm::{Arm, Hinge};
-use crate::estimate::network::basis::{Term, Wave, Way};
+use crate::estimate::network::basis::{BasisTerm, Wave, Way};
 use crate::estimate::network::correction::{Body, Correction, Dress, Feature, JointMotion, Map, Networks, Scaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
@@ -128,7 +128,7 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
         let found = index(value, 1)?;
         if found < count { Ok(found) } else { Err(Error::data("network", format!("no joint, body or axis {value}"))) }
     };
-    let mut terms: BTreeMap<i64, Term> = BTreeMap::new();
+    let mut terms: BTreeMap<i64, BasisTerm> = BTreeMap::new();
     for part in ["along", "turn", "shift", "tilt"] {
         for ((layer, to, from), _) in numbers.all(part) {
             let station = index(layer, 0)?;
@@ -141,7 +141,7 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
                 "shift" => Way::Shift(station, within(from, 3)?),
                 _ => Way::Tilt(station, within(from, 3)?),
             };
-            terms.insert(to, Term { way, waves: Vec::new() });
+            terms.insert(to, BasisTerm { way, waves: Vec::new() });
         }
     }
     for part in ["sin", "cos", "value", "torque"] {
@@ -157,8 +157,8 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
             term.waves.push(wave);
         }
     }
-    let terms: Vec<Term> = terms.into_values().collect();
-    let coefficient = |member: usize, t: usize, term: &Term| {
+    let terms: Vec<BasisTerm> = terms.into_values().collect();
+    let coefficient = |member: usize, t: usize, term: &BasisTerm| {
         Ok::<f64, Error>(numbers.of(member, "coefficient", [0, t + 1, 0])? / coefficient_unit(term))
     };
     let member = |member: usize| terms.iter().enumerate().map(|(t, term)| coefficient(member, t, term)).collect::<Result<_>>();

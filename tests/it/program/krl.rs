@@ -1,13 +1,13 @@
 //! KUKA KRL: numbers are strict, fields are known, types are stated.
 
-use super::{Kind, accepted, refused, told};
+use super::{TargetKind, accepted, refused, told};
 use calib::program::{Language, Partial, Program};
 
 fn faults(text: &str) -> Vec<String> {
     refused(Language::Krl, text)
 }
 
-fn targets(text: &str) -> Vec<(Kind, Vec<f64>)> {
+fn targets(text: &str) -> Vec<(TargetKind, Vec<f64>)> {
     accepted(Language::Krl, text).0
 }
 
@@ -139,8 +139,8 @@ fn a_target_is_known_by_its_prefix_its_declaration_or_its_motion() {
     let text = format!(
         "&ACCESS RVP\n&PARAM T = {{\nDEFDAT X\n;FOLD PTP P1 {{A1 9,A2\nDECL POS P[2]\nP[1]={frame}\nDECL E6AXIS H={axes} ; {{A1\nGLOBAL E6POS G={{ e6pos : X 1 , Y 2,Z 3,A 4,B 5,C 6 }}\nQ={{AXIS: A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}}\nSCIRC {frame},{frame},CA 30 C_SPL\nSPL {frame}\nLIN {{FRAME: X 1,Y 2,Z 3,A 4,B 5,C 6}}\nENDDAT\n"
     );
-    let frame = (Kind::Frame, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
-    let axes = (Kind::Joints, frame.1.clone());
+    let frame = (TargetKind::Frame, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let axes = (TargetKind::Joints, frame.1.clone());
     assert_eq!(targets(&text), [&frame, &axes, &frame, &axes, &frame, &frame, &frame, &frame].map(Clone::clone));
 }
 

@@ -1,7 +1,7 @@
 //! Programs at random, and programs with one byte changed: every number of an accepted one is what a second reader says.
 
 use super::reader::{self, Targets};
-use super::{Kind, Program, moved};
+use super::{Program, TargetKind, moved};
 use calib::program::{Language, Partial};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -87,7 +87,7 @@ impl Writer {
             self.text.push_str(end);
         }
         self.text.push('}');
-        self.wanted.push((if axes { Kind::Joints } else { Kind::Frame }, values));
+        self.wanted.push((if axes { TargetKind::Joints } else { TargetKind::Frame }, values));
     }
 
     fn krl(&mut self) {
@@ -164,7 +164,7 @@ impl Writer {
         }
         self.text.push_str("[9E9,9E+09,9e9,9E9,9E9,9E9]]");
         self.gap(false);
-        self.wanted.push((if pose { Kind::Quaternion } else { Kind::Joints }, values));
+        self.wanted.push((if pose { TargetKind::Quaternion } else { TargetKind::Joints }, values));
     }
 
     fn rapid(&mut self) {
@@ -259,8 +259,8 @@ fn check(language: Language, text: &[u8], program: &Program) {
     for ((kind, values), (_, given)) in written.iter().zip(&wanted) {
         for (k, (value, given)) in values.iter().zip(given).enumerate() {
             let half = match kind {
-                Kind::Quaternion if k > 2 => 5e-10,
-                Kind::Frame | Kind::Quaternion if k < 3 => 5e-6,
+                TargetKind::Quaternion if k > 2 => 5e-10,
+                TargetKind::Frame | TargetKind::Quaternion if k < 3 => 5e-6,
                 _ => 5e-7,
             };
             let slack = half + 1e-15 * given.abs();

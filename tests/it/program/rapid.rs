@@ -1,6 +1,6 @@
 //! ABB RAPID: numbers are strict, literals have the shape of their type, and what may be a target is not passed over.
 
-use super::{Kind, accepted, refused, told};
+use super::{TargetKind, accepted, refused, told};
 use calib::program::{Language, Partial, Program};
 
 const REST: &str = "[1,0,0,0],[0,0,-1,0],[9E9,9E+09,9e9,9000000000,9E9,9E9]]";
@@ -9,7 +9,7 @@ fn faults(text: &str) -> Vec<String> {
     refused(Language::Rapid, text)
 }
 
-fn targets(text: &str) -> Vec<(Kind, Vec<f64>)> {
+fn targets(text: &str) -> Vec<(TargetKind, Vec<f64>)> {
     accepted(Language::Rapid, text).0
 }
 
@@ -52,8 +52,8 @@ fn both_positions_of_a_circle_and_arrays_over_lines_are_targets() {
     );
     let (found, warned) = accepted(Language::Rapid, &text);
     assert_eq!(warned, Vec::<String>::new());
-    let pose = |x: f64| (Kind::Quaternion, vec![x, x + 1.0, x + 2.0, 1.0, 0.0, 0.0, 0.0]);
-    let joints = (Kind::Joints, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let pose = |x: f64| (TargetKind::Quaternion, vec![x, x + 1.0, x + 2.0, 1.0, 0.0, 0.0, 0.0]);
+    let joints = (TargetKind::Joints, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     assert_eq!(found, [pose(1.0), pose(4.0), pose(7.0), pose(1.0), joints.clone(), joints]);
 }
 

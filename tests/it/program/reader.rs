@@ -2,9 +2,9 @@
 //!
 //! It knows the forms that `random` writes; of what it cannot read it says `None`.
 
-use super::Kind;
+use super::TargetKind;
 
-pub type Targets = Vec<(Kind, Vec<f64>)>;
+pub type Targets = Vec<(TargetKind, Vec<f64>)>;
 
 /// Bytes as characters, with what is behind the comment sign taken out, and texts blanked.
 fn bare(line: &[u8], comment: u8) -> String {
@@ -110,7 +110,7 @@ pub fn krl(program: &[u8]) -> Option<Targets> {
     Some(out)
 }
 
-fn fields(inner: &str) -> Option<(Kind, Vec<f64>)> {
+fn fields(inner: &str) -> Option<(TargetKind, Vec<f64>)> {
     let mut given: Vec<(String, &str)> = Vec::new();
     for field in inner.split(',') {
         let field = field.trim_matches(blank);
@@ -125,8 +125,8 @@ fn fields(inner: &str) -> Option<(Kind, Vec<f64>)> {
         names.iter().map(|name| number(given.iter().find(|(known, _)| known == name)?.1, false)).collect()
     };
     take(["A1", "A2", "A3", "A4", "A5", "A6"])
-        .map(|values| (Kind::Joints, values))
-        .or_else(|| take(["X", "Y", "Z", "A", "B", "C"]).map(|values| (Kind::Frame, values)))
+        .map(|values| (TargetKind::Joints, values))
+        .or_else(|| take(["X", "Y", "Z", "A", "B", "C"]).map(|values| (TargetKind::Frame, values)))
 }
 
 /// A bracket list, or the text between commas.
@@ -184,7 +184,7 @@ fn collect(piece: &Piece, pose: bool, out: &mut Targets) -> Option<()> {
         }
     }
     values.truncate(if pose { 7 } else { 6 });
-    out.push((if pose { Kind::Quaternion } else { Kind::Joints }, values));
+    out.push((if pose { TargetKind::Quaternion } else { TargetKind::Joints }, values));
     Some(())
 }
 
