@@ -115,7 +115,13 @@ fn causes(a: &Manifest, b: &Manifest) -> Vec<Setting> {
     causes
 }
 
-fn table(store: &Store, name: &str, a: Option<OutputRecord>, b: Option<OutputRecord>, options: &DiffOptions) -> Result<TableChange> {
+fn table(
+    store: &Store,
+    name: &str,
+    a: Option<OutputRecord>,
+    b: Option<OutputRecord>,
+    options: &DiffOptions,
+) -> Result<TableChange> {
     let kind = b.as_ref().or(a.as_ref()).map(|output| output.kind.clone()).unwrap_or_default();
     let change =
         |status: &'static str, diff: Option<TableDiff>| TableChange { name: name.into(), kind: kind.clone(), status, diff };

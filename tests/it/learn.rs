@@ -228,5 +228,5 @@ fn settings_and_sets_that_make_no_sense_are_named() {
     assert!(message.contains("with.payload"), "{message}");
     let written = learn(quick(), &arm, 1, &desk).unwrap();
     assert!(written.network.0.is_empty());
-    assert!(desk.warnings.lock().unwrap()[0].contains("27 rows are too few"), "{:?}", desk.warnings);
+    assert!(desk.warnings.lock().unwrap()[0].contains("only 27 rows to learn from"), "{:?}", desk.warnings);
 }

@@ -159,7 +159,8 @@ fn screen(
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let Standing { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
-        if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row) {
+        if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row)
+        {
             crowd += 1;
         } else {
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
@@ -207,7 +208,8 @@ fn crowded(named: &[(usize, SuspectKind, Option<usize>)], set: &[usize]) -> BTre
     sets.into_iter()
         .filter(|number| {
             let all = set.iter().filter(|of| *of == number).count() as f64;
-            let unexplained = named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == SuspectKind::Outlier).count() as f64;
+            let unexplained =
+                named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == SuspectKind::Outlier).count() as f64;
             unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
         })
         .collect()

@@ -1,4 +1,4 @@
-//! A step that is worse than one before it on the same held-out points is withdrawn wherever a run is spoken of or used.
+//! A step that is worse than one before it at points predicted by fits without them is withdrawn wherever a run is spoken of or used.
 
 use super::{PIPELINE, ROBOT, calib};
 use serde_json::Value;
@@ -23,7 +23,7 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     let (out, err) = said(&["run", "pipeline.yaml"], "");
     assert!(out.contains("\n`poor` is withdrawn, `identify` stands: "), "{out}");
     assert!(
-        out.contains("at the same 20 held-out points\n`calib compensate` and `calib export` take the step `identify`\n"),
+        out.contains("at the same 60 points, predicted by fits without them\n`calib compensate` and `calib export` take the step `identify`\n"),
         "{out}"
     );
     assert!(out.contains("  poor (withdrawn)  validate"), "{out}");
@@ -31,12 +31,12 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     let document: Value = serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0).expect("JSON");
     assert_eq!((&document["standing"]["step"], &document["standing"]["model"]), (&"identify".into(), &"identify".into()));
     let gone = &document["standing"]["withdrawn"][0];
-    assert_eq!((&gone["step"], &gone["than"], &gone["points"]), (&"poor".into(), &"identify".into(), &20.into()));
+    assert_eq!((&gone["step"], &gone["than"], &gone["points"]), (&"poor".into(), &"identify".into(), &60.into()));
     // The figures are those of the statistics.
     let rms = |step: &str| {
         let rows = document["statistics"].as_array().expect("rows");
-        let row = rows.iter().find(|row| row["step"] == step && row["held_out"] == true).expect("a row");
-        row["rms_mm"].as_f64().expect("mm")
+        let row = rows.iter().find(|row| row["step"] == step && row["held_out"] == false).expect("a row");
+        row["fold_rms_mm"].as_f64().expect("mm")
     };
     for (figure, step) in [("rms_mm", "poor"), ("than_rms_mm", "identify")] {
         assert!((gone[figure].as_f64().expect("mm") - rms(step)).abs() < 1e-9, "{gone}");

@@ -31,7 +31,7 @@ fn flanks_that_err_differently_are_named_with_their_order_and_amplitude() {
     let number = |k: usize, name: &str| finding["parameters"][k][name].as_f64().expect("a number");
     // sin(5 q + 40 deg) = cos(40 deg) sin(5 q) + sin(40 deg) cos(5 q)
     let (sine, cosine) = 40f64.to_radians().sin_cos();
-    for (k, truth) in [35.0 * cosine, 35.0 * sine].into_iter().enumerate() {
+    for (k, truth) in [35.0 * sine, 35.0 * cosine].into_iter().enumerate() {
         assert!((number(k, "value") - truth).abs() < 4.0 * number(k, "sigma"), "{finding:#}");
         assert!(number(k, "sigma") < 4.0, "{finding:#}");
     }
