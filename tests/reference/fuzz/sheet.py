@@ -39,8 +39,8 @@ def value(text, delimiter):
 
 
 def role(name, robot_names):
-    """(what, index, factor to SI) of a column by its name."""
-    lower = name.strip().lower()
+    """(what, index, factor to SI) of a column by its name; a unit may stand behind a blank, or in brackets."""
+    lower = re.sub(r"[\s\[\]()_/.]+", "_", name.strip().lower()).strip("_")
     stem, _, ending = lower.rpartition("_")
     if not stem or ending not in UNITS:
         return None
