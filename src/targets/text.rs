@@ -44,8 +44,9 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
-    let names: Vec<String> =
-        fields(body.trim_start_matches('\u{feff}'), delimiter).into_iter().map(|field| field.1.into_owned()).collect();
+    let cells = fields(body.trim_start_matches('\u{feff}'), delimiter)
+        .map_err(|message| Error::Data(vec![Fault::new(format!("{}:{number}", layout.place), message)]))?;
+    let names: Vec<String> = cells.into_iter().map(|field| field.1.into_owned()).collect();
     let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
     let mut joints: Vec<(usize, usize, Unit)> =
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
@@ -172,20 +173,29 @@ fn delimiter(header: &str) -> char {
     [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
 }
 
-/// Where each field stands, and its text without quotes.
-fn fields(line: &str, delimiter: char) -> Vec<(Range<usize>, Cow<'_, str>)> {
+/// Where each field stands, and its text without quotes. A quote opens a field only where it begins one, behind blanks at most; inside,
+/// two are one (RFC 4180). Fails where one is not closed.
+fn fields(line: &str, delimiter: char) -> Result<Vec<(Range<usize>, Cow<'_, str>)>, String> {
     let mut out = Vec::with_capacity(16);
-    let (mut start, mut quoted) = (0, false);
-    for (at, c) in line.char_indices() {
-        if c == '"' {
-            quoted = !quoted;
-        } else if c == delimiter && !quoted {
-            out.push((start..at, unquoted(&line[start..at])));
-            start = at + c.len_utf8();
+    let (mut start, mut quoted, mut opened) = (0, false, 0);
+    let mut chars = line.char_indices().peekable();
+    while let Some((at, c)) = chars.next() {
+        match c {
+            '"' if quoted && chars.next_if(|(_, next)| *next == '"').is_some() => {}
+            '"' if quoted => quoted = false,
+            '"' if line[start..at].trim().is_empty() => (quoted, opened) = (true, at),
+            _ if c == delimiter && !quoted => {
+                out.push((start..at, unquoted(&line[start..at])));
+                start = at + c.len_utf8();
+            }
+            _ => {}
         }
     }
+    if quoted {
+        return Err(format!("column {}: `\"` is not closed on its line", opened + 1));
+    }
     out.push((start..line.len(), unquoted(&line[start..])));
-    out
+    Ok(out)
 }
 
 fn unquoted(text: &str) -> Cow<'_, str> {
@@ -232,7 +242,7 @@ impl Sheet<'_> {
 
     fn target(&self, line: &str) -> Result<(Target, Spans), String> {
         let (body, _) = split_ending(line);
-        let cells = fields(body, self.delimiter);
+        let cells = fields(body, self.delimiter)?;
         if cells.len() != self.columns.count {
             return Err(format!("has {} fields, the header {}", cells.len(), self.columns.count));
         }

@@ -215,6 +215,15 @@ fn a_faulty_text_of_targets_is_refused_with_line_and_column() {
     assert_eq!(code, Some(10));
     assert!(said.contains("stdin:3: column 5: field 3 is `x`, no number"), "{said}");
     assert!(said.contains("stdin:4: has 2 fields, the header 6"), "{said}");
+    // A quote inside a field is a letter of it; one that begins a field ends it.
+    let open = header.replace("q6_deg", "q6_deg,note");
+    let (code, said, _) = run(&format!("{open}1,2,3,4,5,6,3\" bolt\n1,2,3,4,5,6,\"3, and 4\n"));
+    assert_eq!(code, Some(10));
+    assert_eq!(said.matches("stdin:").count(), 1, "{said}");
+    assert!(said.contains("stdin:3: column 13: `\"` is not closed on its line"), "{said}");
+    let (code, said, _) = run(&header.replace("q6_deg", "\"q6_deg"));
+    assert_eq!(code, Some(10));
+    assert!(said.contains("stdin:1: column 36: `\"` is not closed on its line"), "{said}");
     let (code, said, _) = run("A1,A2,A3,A4,A5,A6\n1,2,3,4,5,6\n");
     assert_eq!(code, Some(2));
     assert!(said.contains("`A1` has no unit") && said.contains("--angle deg"), "{said}");

@@ -26,11 +26,13 @@ COMMENT, TEXT = "\x01", "\x02"
 
 
 def bare(text, comment):
-    """The text with comments and strings blanked, position for position."""
+    """The text with comments and strings blanked, position for position; KRL's lines of attributes (`&ACCESS RVO`) are comments."""
     out, state = [], ""
-    for c in text:
+    for at, c in enumerate(text):
         if c == "\n":
             state = ""
+        elif state == "" and c == "&" and comment == ";" and not text[text.rfind("\n", 0, at) + 1:at].strip():
+            state = ";"
         elif state == "" and c == '"':
             state = '"'
             out.append(TEXT)

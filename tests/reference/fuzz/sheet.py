@@ -12,13 +12,21 @@ APPENDED = ["uncorrected_mm", "residual_mm", "iterations", "remark"]
 
 
 def fields(line, delimiter):
-    out, start, quoted = [], 0, False
-    for at, c in enumerate(line):
-        if c == '"':
-            quoted = not quoted
-        elif c == delimiter and not quoted:
+    """A quote opens a field only where it begins one; inside, two are one."""
+    out, start, at, quoted = [], 0, 0, False
+    while at < len(line):
+        c = line[at]
+        if quoted and c == '"':
+            if line[at + 1:at + 2] == '"':
+                at += 1
+            else:
+                quoted = False
+        elif not quoted and c == '"' and not line[start:at].strip():
+            quoted = True
+        elif not quoted and c == delimiter:
             out.append(line[start:at])
             start = at + 1
+        at += 1
     out.append(line[start:])
     return out
 
