@@ -173,9 +173,12 @@ fn delimiter(header: &str) -> char {
     [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
 }
 
-/// Where each field stands, and its text without quotes. A quote opens a field only where it begins one, behind blanks at most; inside,
+/// Where a field stands, and its text without quotes.
+type Field<'t> = (Range<usize>, Cow<'t, str>);
+
+/// The fields of a line. A quote opens a field only where it begins one, behind blanks at most; inside,
 /// two are one (RFC 4180). Fails where one is not closed.
-fn fields(line: &str, delimiter: char) -> Result<Vec<(Range<usize>, Cow<'_, str>)>, String> {
+fn fields(line: &str, delimiter: char) -> Result<Vec<Field<'_>>, String> {
     let mut out = Vec::with_capacity(16);
     let (mut start, mut quoted, mut opened) = (0, false, 0);
     let mut chars = line.char_indices().peekable();

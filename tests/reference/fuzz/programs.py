@@ -109,7 +109,7 @@ def krl_target(head, group, tail):
 
 def rapid_lists(text):
     """Nested lists of numbers, or none."""
-    tokens = re.findall(r"\[|\]|,|[^\[\],]+", text)
+    tokens = [token for token in re.findall(r"\[|\]|,|[^\[\],]+", text) if token.strip()]
     at = 0
 
     def parse():
