@@ -330,12 +330,8 @@ impl Learn {
                 RivalSetting::MlpJoints => rivals.extend(self.starts.iter().map(|start| Rival::JointNetwork((*start).into()))),
             }
         }
-        let mut once: Vec<Rival> = Vec::new();
-        for rival in rivals {
-            if !once.contains(&rival) {
-                once.push(rival);
-            }
-        }
+        let twice = |k: usize| rivals[..k].contains(&rivals[k]);
+        let once = (0..rivals.len()).filter(|k| !twice(*k)).map(|k| rivals[k]).collect();
         CorrectionContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
     }
 }

@@ -3,6 +3,7 @@
 
 mod columns;
 mod decimal;
+mod fields;
 pub mod parquet;
 pub mod text;
 mod whole;

@@ -1,6 +1,7 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
 use super::columns::{Columns, Role};
+use super::fields::fields;
 use super::{Layout, Unreached, decimal};
 use crate::compensate::{Answer, Corrector, Target, turns};
 use crate::error::{Error, Fault, Result};
@@ -9,7 +10,6 @@ use crate::robot::description::JointKind;
 use crate::units::{Quantity, Unit};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::io::{BufRead, Read, Write};
 use std::ops::Range;
 
@@ -171,40 +171,6 @@ fn split_ending(line: &str) -> (&str, &str) {
 fn delimiter(header: &str) -> char {
     let count = |c: char| header.matches(c).count();
     [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
-}
-
-/// Where a field stands, and its text without quotes.
-type Field<'t> = (Range<usize>, Cow<'t, str>);
-
-/// The fields of a line. A quote opens a field only where it begins one, behind blanks at most; inside,
-/// two are one (RFC 4180). Fails where one is not closed.
-fn fields(line: &str, delimiter: char) -> Result<Vec<Field<'_>>, String> {
-    let mut out = Vec::with_capacity(16);
-    let (mut start, mut quoted, mut opened) = (0, false, 0);
-    let mut chars = line.char_indices().peekable();
-    while let Some((at, c)) = chars.next() {
-        match c {
-            '"' if quoted && chars.next_if(|(_, next)| *next == '"').is_some() => {}
-            '"' if quoted => quoted = false,
-            '"' if line[start..at].trim().is_empty() => (quoted, opened) = (true, at),
-            _ if c == delimiter && !quoted => {
-                out.push((start..at, unquoted(&line[start..at])));
-                start = at + c.len_utf8();
-            }
-            _ => {}
-        }
-    }
-    if quoted {
-        return Err(format!("column {}: `\"` is not closed on its line", opened + 1));
-    }
-    out.push((start..line.len(), unquoted(&line[start..])));
-    Ok(out)
-}
-
-fn unquoted(text: &str) -> Cow<'_, str> {
-    let text = text.trim();
-    let inner = text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text);
-    if inner.contains('"') { Cow::Owned(inner.replace("\"\"", "\"")) } else { Cow::Borrowed(inner) }
 }
 
 /// Where a line's joints stand, in the order of the line, and whether its numbers have a comma.
