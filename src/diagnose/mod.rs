@@ -35,7 +35,7 @@ use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
-/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` hears what is going on.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     if question.fit.len() < too_few::FEWEST {
         return too_few::not_asked(question);

@@ -70,7 +70,7 @@ fn masses(survey: &Survey) -> Option<String> {
 }
 
 /// Where nothing else is needed.
-const POSES: &str = "more poses, chosen to tell them apart (`calib poses --run`)";
+const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
 
 /// What would tell findings from their rivals, a sentence each.
 pub(super) fn next(findings: &[Finding]) -> Vec<String> {
