@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Arm, Chain, Circumstance, Coverage, Found, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse, least_change,
-    one_step,
+    Arm, Chain, Circumstance, Coverage, Found, Nominal, PositionUncertainty, Reach, Uncertainty, Wanted, beyond_limits, inverse,
+    least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -61,7 +61,7 @@ pub struct Answer {
     pub uncorrected: f64,
     pub residual: f64,
     pub iterations: usize,
-    pub sigma: Option<f64>,
+    pub uncertainty: Option<PositionUncertainty>,
     /// What is wrong with it; empty if nothing.
     pub remark: String,
 }
@@ -78,7 +78,7 @@ pub struct Corrector<'a> {
     pub tally: Tally,
 }
 
-/// What became of all targets.
+/// Results of all targets.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     pub targets: u64,
@@ -193,7 +193,7 @@ impl<'a> Corrector<'a> {
             Self::reached(reach, &wanted, &job.home)
         };
         let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
-        let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
+        let uncertainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
         let mut remarks = Vec::new();
         let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
         let faces = !turned || found.turn <= TURNED_AWAY;
@@ -217,7 +217,7 @@ impl<'a> Corrector<'a> {
             uncorrected: found.before,
             residual: found.residual,
             iterations: found.iterations,
-            sigma,
+            uncertainty,
             remark: remarks.join("; "),
         }
     }

@@ -95,6 +95,26 @@ impl Prediction {
         Self(rows.collect())
     }
 
+    /// Standard deviation per axis (mm) of what the model leaves beyond the noise, by the rows that its step was fitted to: their errors
+    /// under fits without them where there were folds, else their residuals, with what the fit took up put back. Zero of none.
+    pub fn unexplained_mm(&self) -> f64 {
+        let fitted = self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none());
+        let excess = fitted.map(|row| {
+            let sigma = row.sigma_mm.unwrap_or(0.0).powi(2);
+            let error = row.fold_error_mm.map_or(row.error_mm.powi(2) + sigma, |error| error * error - sigma);
+            error - row.noise_mm.powi(2)
+        });
+        let (sum, count) = excess.fold((0.0, 0usize), |(sum, count), excess| (sum + excess, count + 1));
+        (sum / (3 * count.max(1)) as f64).max(0.0).sqrt()
+    }
+
+    /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
+    pub fn mean_square_noise_mm2(&self) -> f64 {
+        let fitted = self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none());
+        let (sum, count) = fitted.fold((0.0, 0usize), |(sum, count), row| (sum + row.noise_mm.powi(2), count + 1));
+        sum / count.max(1) as f64
+    }
+
     /// The same with the errors of `rows` under fits without them.
     pub fn with_folds<'a>(mut self, rows: impl Iterator<Item = (&'a usize, (&'a f64, &'a f64))>) -> Self {
         for (row, (fold, block)) in rows {

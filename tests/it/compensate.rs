@@ -2,6 +2,7 @@
 
 mod standing;
 mod true_error;
+mod within;
 
 use calib::compensate::{Chain, Nominal, SETTLED, Wanted, inverse, least_change};
 use calib::robot::RobotModel;
@@ -169,7 +170,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let said = text(&output.stdout);
     let mut lines = said.lines();
-    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,remark"));
+    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark"));
     let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
     let number = |k: usize| first[k].parse::<f64>().expect("a number");
     assert!((0.1..3.0).contains(&number(6)), "{first:?}");
