@@ -61,6 +61,13 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = next;
             continue;
         }
+        if let Some(memory) = fitter.memory_left_by(&next) {
+            fitter.recall(memory);
+            tell(words::of_the_memory(&fitter));
+            now = fitter.fit(&next.model, Vec::new());
+            history = RoundHistory::default();
+            continue;
+        }
         let structureless = outcome == RoundOutcome::Settled && found.last > SIGNIFICANT;
         if let Some(sigma) = structureless.then(|| fitter.noise_left_by(&next)).flatten() {
             fitter.learn(sigma);

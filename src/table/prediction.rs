@@ -95,17 +95,18 @@ impl Prediction {
         Self(rows.collect())
     }
 
-    /// Standard deviation per axis (mm) of what the model leaves beyond the noise, by the rows that its step was fitted to: their errors
-    /// under fits without them where there were folds, else their residuals, with what the fit took up put back. Zero of none.
+    /// Standard deviation per axis (mm) of what the model leaves beyond the noise, by the residuals of the points that its step was
+    /// fitted to, with what the fit took up put back. Zero where it is within two standard errors of none.
     pub fn unexplained_mm(&self) -> f64 {
-        let fitted = self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none());
-        let excess = fitted.map(|row| {
-            let sigma = row.sigma_mm.unwrap_or(0.0).powi(2);
-            let error = row.fold_error_mm.map_or(row.error_mm.powi(2) + sigma, |error| error * error - sigma);
-            error - row.noise_mm.powi(2)
-        });
-        let (sum, count) = excess.fold((0.0, 0usize), |(sum, count), excess| (sum + excess, count + 1));
-        (sum / (3 * count.max(1)) as f64).max(0.0).sqrt()
+        let (mut excess, mut noise, mut count) = (0.0, 0.0, 0usize);
+        for row in self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none()) {
+            excess += row.error_mm.powi(2) + row.sigma_mm.unwrap_or(0.0).powi(2) - row.noise_mm.powi(2);
+            noise += row.noise_mm.powi(2);
+            count += 1;
+        }
+        // The standard error of a sum of squares of three axes a row.
+        let chance = 2.0 * noise * (2.0 / (3 * count.max(1)) as f64).sqrt();
+        if excess > chance { (excess / (3 * count) as f64).sqrt() } else { 0.0 }
     }
 
     /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
