@@ -2,6 +2,7 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
+use super::probability::weigh;
 use super::statement::{next, not_observable, slower_than_noise};
 use super::unseen::by_speed;
 use crate::diagnose::judge::FOLDS;
@@ -32,6 +33,8 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let (rest, findings) = without_small_rests(findings(&last));
     let something_left =
         (last.last <= SIGNIFICANT && misfit.chi_square > LOUD) || misfit.chi_square > TOO_LOUD || misfit.not_carried;
+    let mut findings = findings;
+    findings.iter_mut().for_each(|finding| weigh(finding, something_left));
     let verdict = verdict(&findings, &misfit, something_left, fitter.repeatability);
     let signature = signature(&rest, &last, something_left, misfit.not_carried);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
