@@ -1,7 +1,7 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 
 use super::interval::{Interval, intervals};
-use super::paper::{Answer, Finding, Truth, atoms};
+use super::paper::{Answer, Atoms, Finding, Truth, atoms};
 use super::reliability::{Statement, statements};
 use std::collections::BTreeSet;
 
@@ -111,6 +111,9 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     if !truth.tampered.is_empty() {
         known.extend(["outlier", "mislabelled_point"].into_iter().flat_map(|effect| atoms(effect, "recording")));
     }
+    let tampered = truth.tampered.iter().map(|fault| atoms(&fault.effect, &fault.place));
+    let true_names: Vec<Atoms> = truth.effects.iter().map(|cause| atoms(&cause.effect, &cause.place)).chain(tampered).collect();
+    let accepted_names: Vec<Atoms> = truth.accepted.iter().map(|name| atoms(&name.effect, &name.place)).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
     let causes = truth.effects.iter().filter(|cause| cause.wanted).map(|cause| {
@@ -145,7 +148,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         tampered: truth.tampered.iter().map(|fault| (fault.effect.clone(), named(&fault.effect))).collect(),
         held_out: held_out(truth, answer),
         intervals: truth.effects.iter().flat_map(|cause| intervals(cause, &answer.findings)).collect(),
-        statements: statements(&answer.findings, &known),
+        statements: statements(&answer.findings, &true_names, &accepted_names),
         strays,
     }
 }

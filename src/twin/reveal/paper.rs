@@ -115,8 +115,11 @@ pub struct Answer {
     pub findings: Vec<Finding>,
 }
 
+/// Effects and places of single links.
+pub type Atoms = BTreeSet<(String, String)>;
+
 /// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
-pub(super) fn atoms(effect: &str, place: &str) -> BTreeSet<(String, String)> {
+pub(super) fn atoms(effect: &str, place: &str) -> Atoms {
     let run = place.strip_prefix("link ").and_then(|rest| rest.split_once('-'));
     let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
     match ends {

@@ -1,6 +1,6 @@
 //! Stated probabilities against what was true: how often what is said with a probability is right, and the mean squared error of it.
 
-use super::paper::{Finding, atoms};
+use super::paper::{Atoms, Finding, atoms};
 use super::share::Share;
 use std::collections::BTreeSet;
 
@@ -43,23 +43,22 @@ pub struct Bin {
 /// Ends of the bins.
 const ENDS: [f64; 8] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95];
 
-/// What findings say with a probability, against names that are true or accepted.
-pub(super) fn statements(findings: &[Finding], known: &BTreeSet<(String, String)>) -> Vec<Statement> {
-    let true_name = |effect: &str, place: &str| !atoms(effect, place).is_disjoint(known);
-    let true_place = |place: &str| {
-        let own: BTreeSet<String> = atoms("", place).into_iter().map(|(_, place)| place).collect();
-        known.iter().any(|(_, place)| own.contains(place))
-    };
+/// What findings say with a probability, against the names that are `true_names`, and those that are `accepted` where a finding has none of
+/// these.
+pub(super) fn statements(findings: &[Finding], true_names: &[Atoms], accepted: &[Atoms]) -> Vec<Statement> {
+    let places: BTreeSet<&str> = true_names.iter().chain(accepted).flatten().map(|(_, place)| place.as_str()).collect();
     let mut out = Vec::new();
     for finding in findings {
+        let own = atoms(&finding.effect, &finding.place);
+        let there = own.iter().any(|(_, place)| places.contains(place.as_str()));
+        let rivals = finding.rivals.iter().map(|rival| (rival.probability, atoms(&rival.effect, &rival.place)));
+        let names: Vec<(Option<f64>, Atoms)> = std::iter::once((finding.probability, own)).chain(rivals).collect();
+        let known = if names.iter().any(|(_, name)| true_names.contains(name)) { true_names } else { accepted };
         let mut say = |subject, probability: Option<f64>, right| {
             out.extend(probability.map(|probability| Statement { subject, probability, right }));
         };
-        say(Subject::Name, finding.probability, true_name(&finding.effect, &finding.place));
-        say(Subject::Place, finding.place_probability, true_place(&finding.place));
-        for rival in &finding.rivals {
-            say(Subject::Name, rival.probability, true_name(&rival.effect, &rival.place));
-        }
+        say(Subject::Place, finding.place_probability, there);
+        names.into_iter().for_each(|(probability, name)| say(Subject::Name, probability, known.contains(&name)));
     }
     out
 }
