@@ -1,7 +1,7 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
 use super::mark::{Case, Marked, Outcome};
-use super::reliability::{Bin, Subject, reliability};
+use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
 use std::collections::BTreeMap;
 
@@ -48,6 +48,11 @@ pub struct Board {
     pub missing: Vec<(String, String)>,
 }
 
+/// Forms of the twin whose formula the library does not have: it approximates them. Every other form, of what is in no list too, is one that
+/// the library's laws can take.
+const OWN_FORMS: [&str; 6] =
+    ["eccentric wheel", "at the middle", "cantilever", "gas strut", "hung over two joints", "bent by two joints"];
+
 /// What a set of effects is counted over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Company {
@@ -83,6 +88,15 @@ impl Board {
             Counts::of(self.causes().map(|(_, cause)| cause).filter(|cause| cause.effect == name && cause.strength >= DUE))
         };
         names.into_iter().map(|name| (name, due(name))).filter(|(_, counts)| counts.all() > 0).collect()
+    }
+
+    /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
+    pub fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
+        let due = || self.causes().map(|(_, cause)| cause).filter(|cause| cause.strength >= DUE);
+        let own: Vec<&Marked> = due().filter(|cause| OWN_FORMS.contains(&cause.form.as_str()) != shared).collect();
+        let stated: Vec<f64> = own.iter().filter_map(|cause| cause.probability).collect();
+        let mean = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
+        (Counts::of(own.into_iter()), mean)
     }
 
     /// Due causes: effect -> what it was called (`=`: rightly; `-`: nothing) -> how often.
@@ -166,8 +180,8 @@ impl Board {
         out.into_iter().map(|(effect, holds)| (effect, Share::of(holds))).collect()
     }
 
-    /// Stated probabilities against what was true, with their Brier score.
-    pub fn reliability(&self, subject: Subject) -> (Vec<Bin>, Option<f64>) {
+    /// Stated probabilities against what was true.
+    pub fn reliability(&self, subject: Subject) -> Reliability {
         reliability(self.cases.iter().flat_map(|case| &case.statements), subject)
     }
 

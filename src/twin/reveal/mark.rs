@@ -39,6 +39,8 @@ pub struct Marked {
     pub outcome: Outcome,
     /// What was said instead, strongest first: `effect at place`.
     pub said: Option<String>,
+    /// The stated probability of the true name, 0 where nothing was called so; none where no finding states any.
+    pub probability: Option<f64>,
 }
 
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
@@ -134,6 +136,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
             strength: cause.strength,
             outcome,
             said: (outcome == Outcome::Wrong).then(|| strays.first().cloned()).flatten(),
+            probability: probability_of(&own, &answer.findings),
         }
     });
     let named = |name: &str| answer.findings.iter().any(|finding| finding.effect == name);
@@ -151,6 +154,17 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         statements: statements(&answer.findings, &true_names, &accepted_names),
         strays,
     }
+}
+
+/// The largest probability that a finding or a rival of this name was given.
+fn probability_of(name: &Atoms, findings: &[Finding]) -> Option<f64> {
+    let own = findings.iter().map(|finding| (&finding.effect, &finding.place, finding.probability));
+    let rivals = findings.iter().flat_map(|finding| &finding.rivals);
+    let rivals = rivals.map(|rival| (&rival.effect, &rival.place, rival.probability));
+    let stated: Vec<(bool, f64)> =
+        own.chain(rivals).filter_map(|(effect, place, p)| Some((atoms(effect, place) == *name, p?))).collect();
+    let of_it = stated.iter().filter(|(same, _)| *same).map(|(_, p)| *p).fold(0.0, f64::max);
+    (!stated.is_empty()).then_some(of_it)
 }
 
 fn held_out(truth: &Truth, answer: &Answer) -> Option<HeldOut> {

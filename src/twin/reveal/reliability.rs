@@ -63,8 +63,19 @@ pub(super) fn statements(findings: &[Finding], true_names: &[Atoms], accepted: &
     out
 }
 
-/// Bins that hold statements of a subject, and their Brier score (1950): the mean squared difference of probability and outcome.
-pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, subject: Subject) -> (Vec<Bin>, Option<f64>) {
+/// Stated probabilities of a subject against what was true.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reliability {
+    /// Those that hold statements.
+    pub bins: Vec<Bin>,
+    /// Brier's score (1950): the mean squared difference of probability and outcome; none of no statements.
+    pub brier: Option<f64>,
+    /// Chance that a right statement has a higher probability than a wrong one (area under the ROC curve); none where all are alike.
+    pub auc: Option<f64>,
+}
+
+/// Of statements of one subject.
+pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, subject: Subject) -> Reliability {
     let all: Vec<&Statement> = statements.filter(|statement| statement.subject == subject).collect();
     let ends = ENDS.iter().zip(ENDS[1..].iter().chain([&1.0]));
     let bins = ends.filter_map(|(from, to)| {
@@ -76,7 +87,20 @@ pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, s
     });
     let miss = |s: &&Statement| (s.probability - f64::from(u8::from(s.right))).powi(2);
     let brier = (!all.is_empty()).then(|| all.iter().map(miss).sum::<f64>() / all.len() as f64);
-    (bins.collect(), brier)
+    Reliability { bins: bins.collect(), brier, auc: auc(&all) }
+}
+
+/// By Mann and Whitney's (1947) ranks; ties count half.
+fn auc(all: &[&Statement]) -> Option<f64> {
+    let (right, wrong): (Vec<&Statement>, Vec<&Statement>) = all.iter().partition(|s| s.right);
+    let pairs = (right.len() * wrong.len()) as f64;
+    let above = |a: &Statement, b: &Statement| match a.probability.total_cmp(&b.probability) {
+        std::cmp::Ordering::Greater => 1.0,
+        std::cmp::Ordering::Equal => 0.5,
+        std::cmp::Ordering::Less => 0.0,
+    };
+    let sum: f64 = right.iter().flat_map(|a| wrong.iter().map(move |b| above(a, b))).sum();
+    (pairs > 0.0).then(|| sum / pairs)
 }
 
 #[cfg(test)]
@@ -87,11 +111,13 @@ mod tests {
     fn statements_fall_into_bins_and_the_score_is_the_mean_squared_miss() {
         let said = |probability, right| Statement { subject: Subject::Name, probability, right };
         let all = [said(0.85, true), said(0.85, true), said(0.85, false), said(1.0, true), said(0.05, false)];
-        let (bins, brier) = reliability(all.iter(), Subject::Name);
+        let Reliability { bins, brier, auc } = reliability(all.iter(), Subject::Name);
         let shown: Vec<(f64, usize, usize)> = bins.iter().map(|bin| (bin.from, bin.right.count, bin.right.of)).collect();
         assert_eq!(shown, [(0.0, 0, 1), (0.8, 2, 3), (0.95, 1, 1)]);
         // 2 x 0.15^2 + 0.85^2 + 0 + 0.05^2, by five.
         assert!((brier.expect("a score") - 0.154).abs() < 1e-12);
-        assert!(reliability(all.iter(), Subject::Place).0.is_empty());
+        // Of three right and two wrong: 1.0 is above both, each 0.85 above one and level with the other.
+        assert!((auc.expect("an area") - 5.0 / 6.0).abs() < 1e-12);
+        assert!(reliability(all.iter(), Subject::Place).bins.is_empty());
     }
 }

@@ -2,11 +2,14 @@
 
 use super::board::{BINS, Board, Company, Counts, DUE};
 use super::mark::Case;
-use super::reliability::{Bin, Subject};
+use super::reliability::{Bin, Reliability, Subject};
 use super::share::Share;
 use crate::statistics::quantile;
 use serde_json::{Value, json};
 use std::fmt::Write;
+
+/// Whether the library has the formula by which the twin makes an effect.
+const FORMULAS: [(&str, bool); 2] = [("formulas that the library has", true), ("formulas that it has not", false)];
 
 impl Board {
     /// The scoreboard as text, mm and percent.
@@ -30,6 +33,13 @@ impl Board {
             );
             for (effect, counts) in by_effect {
                 let _ = writeln!(out, "  {effect:<22}{}", line(&counts));
+            }
+        }
+        for (title, shared) in FORMULAS {
+            let (counts, mean) = self.by_formula(shared);
+            if counts.all() > 0 {
+                let mean = mean.map(|mean| format!(", mean probability of the true name {mean:.3}")).unwrap_or_default();
+                let _ = writeln!(out, "{title}: {} exact, {} in the set{mean}", percent(&counts.exactly()), counts.in_set);
             }
         }
         let confusion = self.confusion();
@@ -64,13 +74,11 @@ impl Board {
             let _ = writeln!(out, "explained share of the held-out error: median {median:.4}");
         }
         for subject in [Subject::Name, Subject::Place] {
-            let (bins, brier) = self.reliability(subject);
+            let Reliability { bins, brier, auc } = self.reliability(subject);
             if let Some(brier) = brier {
-                let _ = writeln!(
-                    out,
-                    "\nstated probabilities of {}, Brier score {brier:.4}\n  from  to    stated  right",
-                    subject.name()
-                );
+                let auc = auc.map(|auc| format!(", area under the ROC curve {auc:.3}")).unwrap_or_default();
+                let _ = writeln!(out, "\nstated probabilities of {}: Brier score {brier:.4}{auc}", subject.name());
+                let _ = writeln!(out, "  from  to    stated  right");
             }
             for Bin { from, to, stated, right } in bins {
                 let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {}", percent(&right));
@@ -112,10 +120,14 @@ impl Board {
             let by_strength = self.by_strength(company);
             by_strength.iter().enumerate().map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) })).collect::<Vec<_>>()
         };
+        let by_formula = FORMULAS.map(|(_, shared)| {
+            let (of, mean) = self.by_formula(shared);
+            json!({ "shared": shared, "outcomes": counts(&of), "mean_probability": mean })
+        });
         let reliability = [Subject::Name, Subject::Place].map(|subject| {
-            let (bins, brier) = self.reliability(subject);
+            let Reliability { bins, brier, auc } = self.reliability(subject);
             let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
-            json!({ "of": subject.name(), "brier": brier, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
+            json!({ "of": subject.name(), "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
         });
         let [due, null] = self.ratios();
         let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
@@ -125,6 +137,7 @@ impl Board {
             "alone": bins(Company::Alone),
             "beside": bins(Company::Beside),
             "by_effect": self.by_effect().iter().map(|(name, of)| (name.to_string(), counts(of))).collect::<serde_json::Map<_, _>>(),
+            "by_formula": by_formula,
             "confusion": self.confusion(),
             "reliability": reliability,
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
