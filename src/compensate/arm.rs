@@ -1,7 +1,7 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::{Form, LONG_AFTER, Scratch};
+use crate::effect::{Form, LONG_AFTER, PlacementBuffers};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::Measurements;
@@ -93,7 +93,7 @@ impl Arm {
 /// One arm being placed.
 pub struct Reach<'a> {
     arm: &'a Arm,
-    scratch: Scratch,
+    scratch: PlacementBuffers,
     /// A single row: the command and its circumstances.
     data: Measurements,
     velocities: Vec<Twist>,

@@ -3,7 +3,7 @@
 use super::pool::{CachedHypotheses, HypothesisSet};
 use super::round::compliance;
 use super::whitened::WhitenedProblem;
-use crate::effect::{Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey, Unknown, hypotheses, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Survey, Unknown, hypotheses, whole};
 use crate::estimate::Model;
 use crate::estimate::choose::{Contest, Side};
 use crate::robot::Measurements;
@@ -98,7 +98,7 @@ fn with(model: &Model, form: &Form) -> Model {
     if model.stack.effects().any(|(other, _)| other.form() == Some(form)) {
         return model.clone();
     }
-    let setting = Setting { base: *model.stack.base(), load: Load::GravityTorque };
+    let setting = EffectContext { base: *model.stack.base(), load: Load::GravityTorque };
     let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
         match effect.form() {
             Some(form) => Some(Box::new(form.clone())),

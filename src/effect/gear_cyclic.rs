@@ -3,7 +3,8 @@
 use super::joint_table::{JointTable, strongest_orders};
 use super::summary::amplitude;
 use super::{
-    About, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -29,8 +30,8 @@ impl GearCyclic {
 }
 
 impl Cause for GearCyclic {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",

@@ -2,7 +2,8 @@
 
 use super::summary::amplitude;
 use super::{
-    About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -22,8 +23,8 @@ impl GearFlank {
 }
 
 impl Cause for GearFlank {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "gear_flank",
             place: "joint",
             formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",

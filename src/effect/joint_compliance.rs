@@ -3,8 +3,8 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Summary, Survey,
-    Variable,
+    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, ParameterSpec, Place, Placed,
+    Summary, Survey, Variable,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -17,8 +17,8 @@ impl JointCompliance {
 }
 
 impl Cause for JointCompliance {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_compliance",
             place: "joint",
             formula: "d = c t",
@@ -28,7 +28,7 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn whole(&self, setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Windup::new(setting.load)))
     }
 

@@ -3,7 +3,8 @@
 
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -38,8 +39,8 @@ pub struct Lag {
 const LARGEST: f64 = 0.3;
 
 impl Cause for JointLogLag {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_log_lag",
             place: "recording",
             formula: "joints were logged a share of the last move too early; of a moving arm d = c dq/dt of every joint, its clock and the tracker's c apart",

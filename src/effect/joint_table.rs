@@ -1,6 +1,8 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use std::f64::consts::PI;
@@ -23,8 +25,8 @@ impl JointTable {
 }
 
 impl Cause for JointTable {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = a smooth curve of q over the measured range",

@@ -52,13 +52,13 @@ mod words;
 mod wrong_point;
 mod zero_shift;
 
-pub use anchor::Anchor;
+pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
 pub use basis::Basis;
 pub use cable_drag::CableDrag;
-pub use cause::{About, CAUSES, Cause, Measure, NumberSpec, cause, hypotheses, identified, whole};
+pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
@@ -71,7 +71,7 @@ pub use law::{Factor, Law};
 pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
 pub use place::Place;
-pub use placed_row::{PlacedRow, Scratch};
+pub use placed_row::{PlacedRow, PlacementBuffers};
 pub use reduction_ratio::ReductionRatio;
 pub use stack::{EffectStack, PointMotion};
 pub use summary::{ParameterEstimate, Summary, people};
@@ -212,7 +212,7 @@ pub enum Load {
 
 /// What an effect needs to be made.
 #[derive(Debug, Clone, Copy)]
-pub struct Setting {
+pub struct EffectContext {
     /// Where the base stands in the tracker's frame before any correction.
     pub base: Pose,
     pub load: Load,

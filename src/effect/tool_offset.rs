@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about its seat.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -28,8 +28,8 @@ impl ToolOffset {
 }
 
 impl Cause for ToolOffset {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "tool_offset",
             place: "tool",
             formula: "a displacement of the measured point",
@@ -39,7 +39,7 @@ impl Cause for ToolOffset {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

@@ -1,7 +1,7 @@
 //! How far off a row is under a model, in the units of people: a length and an angle.
 
 use super::model::Model;
-use crate::effect::Scratch;
+use crate::effect::PlacementBuffers;
 use crate::observation::{Dimension, KINDS, Residual};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ pub struct Miss {
 }
 
 /// How far off a row is under a model.
-pub(crate) fn miss(model: &Model, data: &Measurements, row: usize, scratch: &mut Scratch) -> Miss {
+pub(crate) fn miss(model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> Miss {
     let placed = model.place(data, row, scratch);
     let (mut length, mut angle) = (None, None);
     for residual in KINDS.iter().filter_map(|kind| Residual::of(*kind, data, row, &placed)) {

@@ -2,7 +2,7 @@
 
 use super::site::site;
 use super::{Request, recorded, wish};
-use crate::effect::{EffectStack, Load, Setting, identified, whole};
+use crate::effect::{EffectContext, EffectStack, Load, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
@@ -100,8 +100,8 @@ pub fn is_known(effect: &str) -> bool {
     whole(effect, &setting()).is_some()
 }
 
-fn setting() -> Setting {
-    Setting { base: Pose::identity(), load: Load::GravityTorque }
+fn setting() -> EffectContext {
+    EffectContext { base: Pose::identity(), load: Load::GravityTorque }
 }
 
 fn model(robot: &RobotModel, effects: &[&str]) -> Model {

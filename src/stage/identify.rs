@@ -2,7 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{Anchor, Effect, EffectStack, Setting, identified, whole};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
@@ -82,11 +82,11 @@ impl Stage for Identify {
         let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
-        let setting = Setting { base, load: self.load.into() };
+        let setting = EffectContext { base, load: self.load.into() };
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in asked.filter_map(|cause| cause.whole(&setting)) {
-            if effect.name() == Anchor::NAME && robot.gauging().anchors.is_empty() {
+            if effect.name() == AnchorShift::NAME && robot.gauging().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
@@ -145,7 +145,7 @@ const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offse
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
     let anchored = !model.robot.gauging().anchors.is_empty();
-    let mut needed = GEOMETRY.iter().filter(|name| **name != Anchor::NAME || anchored);
+    let mut needed = GEOMETRY.iter().filter(|name| **name != AnchorShift::NAME || anchored);
     let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model
         .stack
@@ -166,7 +166,7 @@ const PLAUSIBLE_RATIO: f64 = 5e-4;
 const COMPLIANCE: &str = "joint_compliance";
 
 /// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
-fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &Setting, context: &Context) {
+fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &EffectContext, context: &Context) {
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
         let specs = model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("reduction_ratio."));
         let free = specs.filter_map(|(k, _)| match &fitted.statuses[k] {

@@ -28,7 +28,7 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
+use crate::effect::{AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{self, Gauging, RobotModel, Target};
@@ -209,7 +209,7 @@ impl Parameters {
                 None => load,
             };
         let robot = self.gauging(robot);
-        let setting = Setting { base, load };
+        let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
         let whole = chosen.iter().filter_map(|name| whole(name, &setting));
@@ -219,7 +219,7 @@ impl Parameters {
         let targets = !robot.gauging().targets.is_empty();
         // Where these stand is their start: nothing is left to correct.
         let stands = |row: &ParameterRow| match row.effect.as_str() {
-            BaseFrame::NAME | Anchor::NAME => true,
+            BaseFrame::NAME | AnchorShift::NAME => true,
             effect => targets && effect == ToolOffset::NAME,
         };
         for row in self.0.iter().filter(|row| !stands(row)) {
@@ -238,7 +238,8 @@ impl Parameters {
     /// The robot with the targets and anchors that the parameters place.
     fn gauging(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors = self.placed(Anchor::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
+        let anchors =
+            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
         let mut gauging = Gauging { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));

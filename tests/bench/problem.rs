@@ -1,7 +1,7 @@
 //! What the benches fit: a robot, its recording, and which of its rows.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, identified};
+use calib::effect::{EffectContext, EffectStack, Load, identified};
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::robot::{Measurements, RobotModel};
@@ -114,7 +114,7 @@ impl Case {
 }
 
 fn model(robot: &RobotModel, base: Pose, effects: &[String]) -> Model {
-    let setting = Setting { base, load: Load::GravityTorque };
+    let setting = EffectContext { base, load: Load::GravityTorque };
     let chosen = identified().filter(|cause| effects.iter().any(|name| name == cause.name()));
     Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.filter_map(|cause| cause.whole(&setting)).collect()))
 }

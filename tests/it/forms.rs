@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Setting, Summary, Survey, cause,
+    CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Summary, Survey, cause,
     hypotheses, people, whole,
 };
 use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
@@ -58,8 +58,8 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     out
 }
 
-fn setting() -> Setting {
-    Setting { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
+fn setting() -> EffectContext {
+    EffectContext { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
 }
 
 /// Runs `law` on every hypothesis of every fixture arm; returns how many there were.

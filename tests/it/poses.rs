@@ -1,7 +1,7 @@
 //! Proposed poses tell more than random ones, and simulated fits confirm it; limits hold, seeds repeat.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, identified, whole};
+use calib::effect::{EffectContext, EffectStack, Load, identified, whole};
 use calib::estimate::choose::{Aim, Proposal, Score, Site, Wish, median, propose};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
 use calib::robot::description::RobotDescription;
@@ -30,7 +30,7 @@ fn wish(aim: Aim) -> Wish {
 
 fn model(robot: &RobotDescription, effects: &[&str]) -> Model {
     let robot = RobotModel::new(robot.clone());
-    let setting = Setting { base: Pose::identity(), load: Load::GravityTorque };
+    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     let stack = EffectStack::new(&robot, setting.base, made);
     Model::nominal(robot, stack)

@@ -1,7 +1,7 @@
 //! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, whole};
+use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
@@ -29,7 +29,7 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn model(robot: &RobotModel, base: Pose) -> Model {
-    let setting = Setting { base, load: Load::GravityTorque };
+    let setting = EffectContext { base, load: Load::GravityTorque };
     let made = EFFECTS.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }

@@ -7,7 +7,7 @@ use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
 use crate::estimate::term::{HUBER, ObservationTerm};
 use crate::estimate::triangle::Triangle;
-use crate::observation::{KINDS, Kind, noise};
+use crate::observation::{KINDS, MeasurementKind, noise};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -41,7 +41,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
         fitted[*row] = true;
     }
     let p = free.len();
-    let screened: Vec<&dyn Kind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
+    let screened: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
     (0..data.rows())
         .into_par_iter()
         .with_min_len(CHUNK)
@@ -50,7 +50,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
             |(scratch, jacobian), row| {
                 let mut placed = model.place(data, row, scratch);
                 let predicted = placed.point;
-                let away = |kind: &&'static dyn Kind| {
+                let away = |kind: &&'static dyn MeasurementKind| {
                     let (term, _) = ObservationTerm::of(*kind, data, row, &placed, problem.excess)?;
                     jacobian.fill(Vector3::zeros());
                     term.derivatives(&mut placed, |parameter, derivative| {

@@ -4,7 +4,7 @@ use super::arm::Arm;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::observation::{Column, Convention};
+use crate::observation::{Convention, DeclaredColumn};
 use crate::units::{Quantity, Unit};
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ pub(super) struct Binding {
     /// In the order of the row's texts.
     pub texts: Vec<Option<Text>>,
     /// Quantities of several numbers: where they are, and how they are read.
-    pub conventions: Vec<(Range<usize>, &'static Column, &'static Convention)>,
+    pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub measures: bool,
     pub sequence: Option<usize>,
@@ -230,12 +230,12 @@ impl Binder<'_> {
         text
     }
     /// A cell that may not be blank.
-    fn cell(&self, declared: &Column, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> Cell {
+    fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> Cell {
         let (quantity, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
         Cell { index, column, unit, range, is_direction, optional: false, name, difference: None }
     }
-    fn joints(&mut self, declared: &Column, joints: &JointColumns, arm: &Arm) -> Result<()> {
+    fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &Arm) -> Result<()> {
         let name = declared.setting;
         let count = arm.joints();
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {

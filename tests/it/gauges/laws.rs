@@ -4,7 +4,7 @@ use super::{SIGMA, THREE};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
-use calib::observation::{KINDS, Kind, Weight, rank};
+use calib::observation::{KINDS, MeasurementKind, Weight, rank};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Anchor, Gauging, Measurements, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
@@ -117,7 +117,7 @@ pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
 const ASKEW: [f64; 3] = [0.9, -1.2, 0.4];
 
 /// Residual of a kind under the model with parameters `x`.
-fn residual(kind: &dyn Kind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
+fn residual(kind: &dyn MeasurementKind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
     let mut scratch = truth.stack.scratch(&truth.robot);
     let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
     kind.residual(data, row, &placed).expect("measured").0
@@ -155,7 +155,7 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
 }
 
 /// The data with one kind alone.
-fn alone(data: &Measurements, kind: &dyn Kind) -> Measurements {
+fn alone(data: &Measurements, kind: &dyn MeasurementKind) -> Measurements {
     let name = kind.about().name;
     let mut own = data.clone();
     own.readings.retain(|readings| readings.kind == name);
