@@ -1,7 +1,7 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{Arm, Corrector, Manner};
+use crate::compensate::{Corrector, IdentifiedArm, Manner};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::Identified;
 use crate::pipeline::Purpose;
@@ -104,7 +104,7 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
     let identified = arguments.model.load(Purpose::Compensate, command_line)?;
-    let arm = Arm::new(identified.model.clone(), identified.correction.clone());
+    let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
     let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);

@@ -31,7 +31,7 @@ impl Circumstance {
 }
 
 /// An identified arm.
-pub struct Arm {
+pub struct IdentifiedArm {
     model: Model,
     base: Pose,
     correction: Option<Correction>,
@@ -39,7 +39,7 @@ pub struct Arm {
     quiet: Vec<usize>,
 }
 
-impl Arm {
+impl IdentifiedArm {
     /// The arm of a model; effects of the measurement itself are taken out.
     pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
         let of_it = |form: &Form| form.is_of_the_measurement();
@@ -92,7 +92,7 @@ impl Arm {
 
 /// One arm being placed.
 pub struct Reach<'a> {
-    arm: &'a Arm,
+    arm: &'a IdentifiedArm,
     scratch: PlacementBuffers,
     /// A single row: the command and its circumstances.
     data: Measurements,

@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Arm, Chain, Circumstance, Coverage, Found, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse, least_change,
-    one_step,
+    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse,
+    least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -22,7 +22,7 @@ const STILL: f64 = 1e-9;
 
 /// A target as it was given, SI.
 #[derive(Debug, Clone, Default)]
-pub struct Target {
+pub struct CommandTarget {
     pub q: Option<Vec<f64>>,
     /// Base frame.
     pub point: Option<Vector3<f64>>,
@@ -54,7 +54,7 @@ pub struct Manner {
 
 /// A command and what is known of it, SI.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub struct CorrectedCommand {
     /// None where the target is not reached: no joints are better than wrong ones.
     pub q: Option<Vec<f64>>,
     /// How far the uncorrected command would be off by the model.
@@ -68,19 +68,19 @@ pub struct Answer {
 
 /// Corrects targets in their order: what a target does not say follows from the one before.
 pub struct Corrector<'a> {
-    arm: &'a Arm,
+    arm: &'a IdentifiedArm,
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: Manner,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
-    pub tally: Tally,
+    pub tally: CorrectionTotals,
 }
 
 /// What became of all targets.
 #[derive(Debug, Clone, Default)]
-pub struct Tally {
+pub struct CorrectionTotals {
     pub targets: u64,
     pub uncorrected_sum: f64,
     pub uncorrected_max: f64,
@@ -92,7 +92,7 @@ pub struct Tally {
     pub beyond_measured: u64,
 }
 
-impl Tally {
+impl CorrectionTotals {
     /// What the correction does, in a line.
     pub fn summary(&self) -> String {
         format!(
@@ -125,9 +125,9 @@ struct Job {
 }
 
 impl<'a> Corrector<'a> {
-    pub fn new(arm: &'a Arm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
+    pub fn new(arm: &'a IdentifiedArm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
         let joints = arm.model().robot.joints();
-        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: Tally::default() }
+        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
     }
 
     pub fn has_uncertainty(&self) -> bool {
@@ -135,10 +135,10 @@ impl<'a> Corrector<'a> {
     }
 
     /// Answers in the order of the targets, which follow those of the batch before.
-    pub fn batch(&mut self, targets: Vec<Target>) -> Vec<Answer> {
+    pub fn batch(&mut self, targets: Vec<CommandTarget>) -> Vec<CorrectedCommand> {
         let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
         let this: &Self = self;
-        let answers: Vec<Answer> = jobs
+        let answers: Vec<CorrectedCommand> = jobs
             .par_iter()
             .map_init(
                 || (this.arm.reach(), Nominal::new(&this.arm.model().robot)),
@@ -151,7 +151,7 @@ impl<'a> Corrector<'a> {
         answers
     }
 
-    fn prepare(&mut self, target: Target) -> Job {
+    fn prepare(&mut self, target: CommandTarget) -> Job {
         let robot: &RobotModel = &self.arm.model().robot;
         let n = robot.joints();
         let (wanted, home) = match (target.q, target.point) {
@@ -184,10 +184,10 @@ impl<'a> Corrector<'a> {
         Job { wanted, home, circumstance }
     }
 
-    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> Answer {
+    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> CorrectedCommand {
         reach.under(&job.circumstance);
         let wanted = job.wanted.unwrap_or_else(|| Wanted { pose: nominal.place(&job.home), oriented: self.manner.oriented });
-        let found: Found = if self.manner.one_step {
+        let found: CommandSolution = if self.manner.one_step {
             one_step(reach, nominal, &wanted, &job.home)
         } else {
             Self::reached(reach, &wanted, &job.home)
@@ -212,7 +212,7 @@ impl<'a> Corrector<'a> {
                 remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
             }
         }
-        Answer {
+        CorrectedCommand {
             q: reached.then_some(found.q),
             uncorrected: found.before,
             residual: found.residual,
@@ -225,20 +225,20 @@ impl<'a> Corrector<'a> {
 
 impl Corrector<'_> {
     /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
-    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> Found {
+    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> CommandSolution {
         let found = least_change(reach, wanted, home, home);
         if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
             return found;
         }
         let point = Wanted { oriented: false, ..*wanted };
-        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
+        let CommandSolution { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
         let turn = wanted.turn_left(&reach.place(&q));
-        Found { q, residual, turn, before, iterations: iterations + found.iterations }
+        CommandSolution { q, residual, turn, before, iterations: iterations + found.iterations }
     }
 }
 
-impl Tally {
-    fn add(&mut self, answer: &Answer) {
+impl CorrectionTotals {
+    fn add(&mut self, answer: &CorrectedCommand) {
         self.targets += 1;
         self.uncorrected_sum += answer.uncorrected;
         self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);

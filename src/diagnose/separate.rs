@@ -5,7 +5,7 @@ use super::round::compliance;
 use super::whitened::WhitenedProblem;
 use crate::effect::{Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Survey, Unknown, hypotheses, whole};
 use crate::estimate::Model;
-use crate::estimate::choose::{Contest, Side};
+use crate::estimate::choose::{Alternative, Contest};
 use crate::robot::Measurements;
 use std::collections::BTreeSet;
 
@@ -60,7 +60,7 @@ pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&
     let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
     let theirs: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
     let sizes = own.iter().map(|k| model.x[*k]).collect();
-    let sides = [Side { parameters: own, sizes }, Side { parameters: theirs, sizes: fitted }];
+    let sides = [Alternative { parameters: own, sizes }, Alternative { parameters: theirs, sizes: fitted }];
     Ok((Contest { model: both, nuisances, sides }, rival.form.clone()))
 }
 

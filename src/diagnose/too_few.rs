@@ -1,7 +1,7 @@
 //! Too few rows to ask what was left out: the nominal robot in its place, and no findings.
 
 use super::misfit::Misfit;
-use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, Verdict};
+use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, VerdictKind};
 use crate::effect::{BasePlacement, Effect, EffectStack};
 use crate::estimate::{FitOptions, Model, align, fit_screened};
 
@@ -20,7 +20,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
     let errors = ErrorLengths::of(data, &predicted, &misfit.rows);
     Diagnosis {
-        verdict: Verdict::NotAsked,
+        verdict: VerdictKind::NotAsked,
         noise_floor: misfit.noise_floor,
         before: errors,
         after: errors,

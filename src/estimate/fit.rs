@@ -3,7 +3,7 @@
 use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::known::PriorCheck;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
@@ -275,7 +275,7 @@ fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize
 }
 
 /// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.
-fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, statuses: &mut [ParameterStatus]) {
+fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &TriangularFactor, statuses: &mut [ParameterStatus]) {
     for (j, k) in free.iter().enumerate().filter(|(j, _)| pinned[*j]) {
         let fixed: Vec<Option<f64>> = pinned.iter().enumerate().map(|(i, pinned)| (*pinned && i != j).then_some(0.0)).collect();
         let among = fixed.iter().take(j).filter(|fixed| fixed.is_none()).count();

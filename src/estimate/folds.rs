@@ -4,7 +4,7 @@
 //! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
 //! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
 use super::miss::miss;
 use super::model::Model;
@@ -145,7 +145,7 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
 /// The problem at the whole fit's solution.
 struct Near {
     free: Vec<usize>,
-    factor: Factor,
+    factor: TriangularFactor,
     inverse: Mat<f64>,
 }
 

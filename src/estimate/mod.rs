@@ -32,7 +32,7 @@ pub(crate) use crate::observation::Weight;
 pub use align::align;
 pub(crate) use align::align_points;
 pub(crate) use autocorrelation::autocorrelation_time;
-pub use change::{Change, Session, changes};
+pub use change::{ParameterChange, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};

@@ -3,7 +3,7 @@
 //! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
 //! beside the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::fit::{Fitted, ParameterStatus};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
@@ -78,7 +78,7 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
 }
 
 /// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
-fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
+fn shown(own: &TriangularFactor, more: &TriangularFactor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
     let p = prior.len();
     let new: Vec<usize> = (0..p).filter(|j| apart[*j]).collect();
     // Estimated ones, new ones, then those in question.
@@ -93,7 +93,7 @@ fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usiz
     for (j, prior) in prior.iter().enumerate() {
         sigma[place(j)] = prior / CLEARLY;
     }
-    let seen = visibility(&Factor::of(&rows), &sigma);
+    let seen = visibility(&TriangularFactor::of(&rows), &sigma);
     seen[known + new.len()..].iter().map(|verdict| *verdict == Visibility::Seen).collect()
 }
 

@@ -6,7 +6,7 @@ mod standing;
 pub use robot_file::robot_file;
 pub use standing::standing_of;
 
-use crate::compensate::{Arm, Coverage, Uncertainty};
+use crate::compensate::{Coverage, IdentifiedArm, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
 use crate::estimate::network::Correction;
@@ -125,7 +125,7 @@ impl Identified {
     }
 
     /// The uncertainty of what the model predicts, from the rows that it was fitted to; none for a table of parameters alone.
-    pub fn uncertainty(&self, arm: &Arm) -> Option<Uncertainty> {
+    pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
         self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance))
     }
 }

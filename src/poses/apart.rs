@@ -3,12 +3,12 @@
 mod show;
 
 use super::site::site;
-use super::{Request, wish};
+use super::{PoseRequest, wish};
 use crate::audit::diagnosis;
 use crate::diagnose::{DiagnosedModel, contest};
 use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
 use crate::error::{Error, Result, nearest};
-use crate::estimate::choose::{Aim, Circumstances, Site, Told, median, tell};
+use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::pipeline::StageReport;
 use crate::robot::description::RobotDescription;
 use crate::robot::{Instrument, Measurements, RobotModel};
@@ -24,7 +24,7 @@ type Name = (String, String);
 
 /// A finding and a rival, and what tells them apart.
 pub struct Apart<'a> {
-    request: &'a Request,
+    request: &'a PoseRequest,
     run: String,
     finding: FindingRow,
     rival: Name,
@@ -36,7 +36,7 @@ pub struct Apart<'a> {
     /// mm.
     sigma: f64,
     circumstances: Circumstances,
-    told: Told,
+    told: Discrimination,
 }
 
 /// A run by its name, and which of its diagnoses.
@@ -46,7 +46,7 @@ pub struct RunStage<'a> {
 }
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
-pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
+pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
     let (manifest, stage) = diagnosis(store, of.run, of.step)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
@@ -90,7 +90,7 @@ pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[St
             tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
         }
         // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
-        Err(_) if listed => Told { before: [0.0; 2], alike: [true; 2], proposed: None },
+        Err(_) if listed => Discrimination { before: [0.0; 2], alike: [true; 2], proposed: None },
         Err(fault) => return Err(Error::spec("--separate", fault)),
     };
     Ok(Apart {

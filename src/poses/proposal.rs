@@ -1,7 +1,7 @@
 //! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
 
 use super::site::site;
-use super::{Request, recorded, wish};
+use super::{PoseRequest, recorded, wish};
 use crate::effect::{EffectContext, EffectStack, Load, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// What was proposed and what for; made once, shown as text, JSON or file.
 pub struct Work<'a> {
-    pub(super) request: &'a Request,
+    pub(super) request: &'a PoseRequest,
     pub(super) robot: RobotDescription,
     pub(super) ranges: Vec<[f64; 2]>,
     pub(super) effects: Vec<&'static str>,
@@ -41,7 +41,7 @@ pub struct RobotFiles<'a> {
 }
 
 /// Proposes poses; `pair` are two effects to separate, or none, `against` a recording to compare with.
-pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
+pub fn proposal<'a>(request: &'a PoseRequest, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
     let imported = robot_file(robot.file, robot.urdf)?;
     let place = robot.file.display().to_string();
     let site = site(request, &imported, &place, None)?;
@@ -69,10 +69,10 @@ pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], a
     Ok(Work { request, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded, warnings })
 }
 
-type Named = (Vec<&'static str>, Vec<(&'static str, String)>);
+type NamedEffects = (Vec<&'static str>, Vec<(&'static str, String)>);
 
 /// The chosen effects that poses can tell of this robot, and those left out.
-fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> Named {
+fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
     let heaviest = site.payloads.iter().copied().fold(0.0, f64::max);
     let data = Measurements {
         joints: robot.joints(),

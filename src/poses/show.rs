@@ -1,12 +1,12 @@
 //! What the proposed poses promise, as a short table and as JSON.
 
 use super::proposal::Work;
-use super::{Answer, Drive, Request, drive};
+use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::error::counted;
 use crate::estimate::choose::{Proposal, Score, median};
 use serde_json::json;
 
-impl Answer for Work<'_> {
+impl PoseAnswer for Work<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let Proposal { poses, direction, .. } = &self.proposal;
         Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction })
@@ -94,7 +94,7 @@ fn text(work: &Work) -> String {
 }
 
 /// What every proposal ends with.
-pub(super) fn closing(request: &Request) -> String {
+pub(super) fn closing(request: &PoseRequest) -> String {
     let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
     match &request.out {
         Some(path) => format!("{text}poses: {}\n", path.display()),

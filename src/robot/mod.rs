@@ -17,5 +17,5 @@ pub use measurements::{Instrument, Measurements};
 pub use model::RobotModel;
 pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{Named, Reading, Readings};
-pub use rows::{Row, Rows};
+pub use rows::{DhRow, DhTable};
 pub use travel::Travel;

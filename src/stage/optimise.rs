@@ -4,7 +4,7 @@
 //! gets stuck. Times are no part of a table, which is the same whenever it is made; `cargo bench -- swarm` prints them.
 
 use crate::error::{Fault, Result};
-use crate::estimate::swarm::{Algorithm, Budget, Landscape, Outcome, Stop};
+use crate::estimate::swarm::{Algorithm, Budget, Landscape, SearchStop, SwarmResult};
 use crate::estimate::threads::in_order;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::statistics::quantile;
@@ -166,7 +166,7 @@ impl Stage for Optimise {
 
 impl Optimise {
     /// One search on one thread.
-    pub fn search(&self, problem: &Problem, method: Algorithm, seed: u64) -> Outcome {
+    pub fn search(&self, problem: &Problem, method: Algorithm, seed: u64) -> SwarmResult {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(f64::NEG_INFINITY);
         let budget = Budget {
             generations: method.generations(self.population, self.evaluations),
@@ -179,9 +179,10 @@ impl Optimise {
         method.minimise(self.population, &function, &problem.function.bounds(problem.dimensions), &budget, |_, _| {})
     }
 
-    fn row(&self, step: &str, problem: &Problem, method: Algorithm, outcomes: &[Outcome]) -> SearchesRow {
+    fn row(&self, step: &str, problem: &Problem, method: Algorithm, outcomes: &[SwarmResult]) -> SearchesRow {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
-        let mut reached: Vec<f64> = outcomes.iter().filter(|o| o.stop == Stop::Target).map(|o| o.evaluations as f64).collect();
+        let mut reached: Vec<f64> =
+            outcomes.iter().filter(|o| o.stop == SearchStop::Target).map(|o| o.evaluations as f64).collect();
         let mut errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
         reached.sort_by(f64::total_cmp);
         errors.sort_by(f64::total_cmp);
@@ -208,7 +209,7 @@ impl Optimise {
 }
 
 /// Whether a search missed the target and found nothing better in the second half of its generations.
-fn stuck(outcome: &Outcome) -> bool {
+fn stuck(outcome: &SwarmResult) -> bool {
     let half = outcome.history.get(outcome.history.len() / 2);
-    outcome.stop != Stop::Target && half.is_some_and(|half| half.best <= outcome.value)
+    outcome.stop != SearchStop::Target && half.is_some_and(|half| half.best <= outcome.value)
 }

@@ -3,7 +3,7 @@
 use super::columns::{Columns, Role};
 use super::text::Row;
 use super::{Layout, Unreached};
-use crate::compensate::{Answer, Corrector, Target};
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::robot::description::JointKind;
@@ -78,7 +78,7 @@ fn stored(kind: JointKind) -> Unit {
     if kind == JointKind::Revolute { Unit::Radian } else { Unit::Millimetre }
 }
 
-fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usize) -> Result<Vec<Target>> {
+fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usize) -> Result<Vec<CommandTarget>> {
     let mut numbers = Vec::new();
     for (index, role) in &columns.roles {
         let column = batch.column(*index);
@@ -105,8 +105,9 @@ fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usiz
         .collect()
 }
 
-fn answered(batch: &RecordBatch, columns: &Columns, layout: &Layout, answers: &[Answer]) -> Vec<ArrayRef> {
-    let numbers = |of: &dyn Fn(&Answer) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
+fn answered(batch: &RecordBatch, columns: &Columns, layout: &Layout, answers: &[CorrectedCommand]) -> Vec<ArrayRef> {
+    let numbers =
+        |of: &dyn Fn(&CorrectedCommand) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
     let joint_numbers = |joint: usize, unit: Unit| -> ArrayRef {
         Arc::new(answers.iter().map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint]))).collect::<Float64Array>())
     };

@@ -3,7 +3,7 @@
 use super::columns::{Columns, Role};
 use super::fields::fields;
 use super::{Layout, Unreached, decimal};
-use crate::compensate::{Answer, Corrector, Target, turns};
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector, turns};
 use crate::error::{Error, Fault, Result};
 use crate::robot::Bound;
 use crate::robot::description::JointKind;
@@ -65,7 +65,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
                 _ => Ok(unreached),
             };
         }
-        let parsed: Vec<Result<Option<(Target, Spans)>, String>> =
+        let parsed: Vec<Result<Option<(CommandTarget, Spans)>, String>> =
             lines.par_iter().map(|line| if line.trim().is_empty() { Ok(None) } else { table.target(line).map(Some) }).collect();
         let faults: Vec<Fault> = (parsed.iter().enumerate())
             .filter_map(|(k, row)| Some(Fault::new(format!("{}:{}", layout.place, first + k), row.as_ref().err()?)))
@@ -81,7 +81,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             spans.push(span);
         }
         let mut answers = corrector.batch(targets).into_iter();
-        let rows: Vec<(&str, Option<(Spans, Answer)>)> = lines
+        let rows: Vec<(&str, Option<(Spans, CorrectedCommand)>)> = lines
             .into_iter()
             .zip(spans)
             .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
@@ -209,7 +209,7 @@ impl Sheet<'_> {
         names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
     }
 
-    fn target(&self, line: &str) -> Result<(Target, Spans), String> {
+    fn target(&self, line: &str) -> Result<(CommandTarget, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
         if cells.len() != self.columns.count {
@@ -234,7 +234,7 @@ impl Sheet<'_> {
     }
 
     /// Lines with what became of their targets; lines without one as they are.
-    fn lines(&self, rows: &[(&str, Option<(Spans, Answer)>)]) -> String {
+    fn lines(&self, rows: &[(&str, Option<(Spans, CorrectedCommand)>)]) -> String {
         let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
         for (line, answered) in rows {
             match answered {
@@ -245,7 +245,7 @@ impl Sheet<'_> {
         out
     }
 
-    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &Answer) {
+    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &CorrectedCommand) {
         let (body, ending) = split_ending(line);
         let point = if spans.comma { ',' } else { '.' };
         let mut at = 0;
@@ -315,7 +315,7 @@ fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
 /// The numbers of one row, by what they mean.
 #[derive(Default)]
 pub(super) struct Row {
-    target: Target,
+    target: CommandTarget,
     point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
@@ -338,7 +338,7 @@ impl Row {
         }
     }
 
-    pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<Target, String> {
+    pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
         let joints =
             joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));

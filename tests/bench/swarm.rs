@@ -1,7 +1,7 @@
 //! Table 2 of Wang et al. (2020) with times: success, evaluations and wall time to the target beside the paper's, and in ten
 //! dimensions, of which a network has more.
 
-use calib::estimate::swarm::{Algorithm, Landscape, Stop};
+use calib::estimate::swarm::{Algorithm, Landscape, SearchStop};
 use calib::stage::{Optimise, Problem};
 use std::time::Instant;
 
@@ -38,7 +38,7 @@ fn compare(stage: &Optimise, problem: &Problem, seeds: usize, published: &[(Algo
             let outcome = stage.search(problem, method, seed);
             let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
             errors.push((outcome.value - minimum).max(0.0));
-            if outcome.stop == Stop::Target {
+            if outcome.stop == SearchStop::Target {
                 times.push(milliseconds);
                 evaluations.push(outcome.evaluations as f64);
             }

@@ -183,8 +183,8 @@ fn what_is_known_of_a_target_stands_behind_it() {
 #[test]
 fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
     let joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,25,40,10\n";
-    let robot =
-        calib::robot::import::read_calib(calib::robot::import::Text { label: "robot.yaml", text: ROBOT }, None).expect("a robot");
+    let robot = calib::robot::import::read_calib(calib::robot::import::RobotFileText { label: "robot.yaml", text: ROBOT }, None)
+        .expect("a robot");
     let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
     let pose = RobotModel::new(robot.robot).forward(&q);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();

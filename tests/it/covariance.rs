@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
-use calib::compensate::{Arm, Circumstance, Uncertainty};
+use calib::compensate::{Circumstance, IdentifiedArm, Uncertainty};
 use calib::effect::Load;
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::Measurements;
@@ -49,7 +49,7 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let read = parameters.model(truth.robot.clone(), &[], Load::GravityTorque).expect("a model");
     let covariance = CovarianceTable::of(&model, &fitted, None).of_model(&read).expect("a covariance");
     let want = fitted.covariance.as_ref().expect("a covariance").of_predictions(&model, &data);
-    let arm = Arm::new(read, None);
+    let arm = IdentifiedArm::new(read, None);
     let uncertainty = Uncertainty::new(&arm, covariance);
     let mut reach = arm.reach();
     for (row, want) in want.iter().enumerate() {

@@ -9,7 +9,7 @@ use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::{Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
-use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, Verdict};
+use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::effect::Unknown;
 use crate::estimate::cross_validate;
 use nalgebra::Vector3;
@@ -75,16 +75,16 @@ fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
     findings.into_iter().partition(small)
 }
 
-fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> Verdict {
+fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
     let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
     let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
     let only_unknown = physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME);
     if blind || something_left || only_unknown {
-        Verdict::Unexplained
+        VerdictKind::Unexplained
     } else if findings.is_empty() {
-        Verdict::NothingMissing
+        VerdictKind::NothingMissing
     } else {
-        Verdict::Explained
+        VerdictKind::Explained
     }
 }
 

@@ -3,9 +3,9 @@
 //! Inside the region that the training saw it is what was learnt; outside, sources are held at its edge and it fades to nothing
 //! (see [`Region`]).
 
-use super::arm::Arm;
+use super::arm::ScrewArm;
 use super::linear::Linear;
-use super::perceptron::{OUTPUTS, Shape};
+use super::perceptron::{LayerSizes, OUTPUTS};
 use super::process::Process;
 use super::region::Region;
 
@@ -98,7 +98,7 @@ impl Dress {
 /// Outputs that are motions of the joints, which move the point through the arm's Jacobian.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointMotion {
-    pub arm: Arm,
+    pub arm: ScrewArm,
     /// Motion of each joint per unit of output, rad or m.
     pub scales: Vec<f64>,
 }
@@ -114,7 +114,7 @@ impl JointMotion {
 /// Equal networks whose mean is the correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Networks {
-    pub shape: Shape,
+    pub shape: LayerSizes,
     /// `None`: outputs are the axes.
     pub joints: Option<JointMotion>,
     /// Parameters of each network.

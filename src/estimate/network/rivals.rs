@@ -3,14 +3,14 @@
 //! Rows are judged by corrections that did not see their pose. Folds are made of runs of neighbouring poses, each with all its targets,
 //! since a recording's neighbours are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
 
-use super::arm::Arm;
+use super::arm::ScrewArm;
 use super::basis::{curves, harmonics};
 use super::correction::{Body, Correction};
 use super::linear::Linear;
 use super::process::Process;
 use super::region::Region;
-use super::samples::Samples;
-use super::training::{Course, Recipe, Start, dressed, train};
+use super::samples::TrainingSamples;
+use super::training::{Course, Recipe, TrainingStart, dressed, train};
 use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
@@ -30,13 +30,13 @@ pub enum Rival {
     /// Joint curves, small motions of links and wind-up by weight, through the Jacobian.
     Curves,
     /// Multilayer perceptrons whose outputs move the point along the axes, by where their training starts.
-    Network(Start),
+    Network(TrainingStart),
     /// Multilayer perceptrons whose outputs are joint motions, through the Jacobian.
-    JointNetwork(Start),
+    JointNetwork(TrainingStart),
 }
 
 /// Kinds of networks: each has its decay and size of hidden layer chosen for itself, with random starts.
-const KINDS: [fn(Start) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
+const KINDS: [fn(TrainingStart) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
 
 impl Rival {
     pub fn name(self) -> &'static str {
@@ -44,16 +44,16 @@ impl Rival {
             Self::Ridge => "ridge",
             Self::Process => "gaussian_process",
             Self::Curves => "curves",
-            Self::Network(Start::Random) => "mlp_random",
-            Self::Network(Start::Swarm(algorithm)) => match algorithm {
+            Self::Network(TrainingStart::Random) => "mlp_random",
+            Self::Network(TrainingStart::Swarm(algorithm)) => match algorithm {
                 Algorithm::Bas => "mlp_bas",
                 Algorithm::Bso => "mlp_bso",
                 Algorithm::Pso => "mlp_pso",
                 Algorithm::Ga => "mlp_ga",
                 Algorithm::Abc => "mlp_abc",
             },
-            Self::JointNetwork(Start::Random) => "mlp_joints_random",
-            Self::JointNetwork(Start::Swarm(algorithm)) => match algorithm {
+            Self::JointNetwork(TrainingStart::Random) => "mlp_joints_random",
+            Self::JointNetwork(TrainingStart::Swarm(algorithm)) => match algorithm {
                 Algorithm::Bas => "mlp_joints_bas",
                 Algorithm::Bso => "mlp_joints_bso",
                 Algorithm::Pso => "mlp_joints_pso",
@@ -68,7 +68,7 @@ impl Rival {
         matches!(self, Self::Curves | Self::JointNetwork(_))
     }
 
-    fn start(self) -> Option<Start> {
+    fn start(self) -> Option<TrainingStart> {
         match self {
             Self::Network(start) | Self::JointNetwork(start) => Some(start),
             _ => None,
@@ -81,7 +81,7 @@ impl Rival {
 pub struct CorrectionContest<'a> {
     pub rivals: Vec<Rival>,
     /// What joint curves and joint networks go through; without it they are no rivals.
-    pub arm: Option<&'a Arm>,
+    pub arm: Option<&'a ScrewArm>,
     pub prismatic: &'a [bool],
     /// How the kept correction is trained.
     pub recipe: Recipe,
@@ -128,7 +128,7 @@ impl Judged {
 
 /// Everything learnt from the samples: the rivals as judged, and the number of the one to keep (0: no correction).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comparison {
+pub struct RivalComparison {
     pub judged: Vec<Judged>,
     pub chosen: usize,
 }
@@ -155,7 +155,7 @@ pub fn fits(contest: &CorrectionContest) -> usize {
 
 impl CorrectionContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
-    fn has(&self, kind: fn(Start) -> Rival) -> bool {
+    fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
         self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
     }
 }
@@ -163,7 +163,7 @@ impl CorrectionContest<'_> {
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
+pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: impl Fn(usize, &str) + Sync) -> RivalComparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
     let poses = samples.poses();
@@ -194,7 +194,7 @@ pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(
         let mut grid = Vec::new();
         for hidden in &contest.hidden {
             for decay in &contest.decays {
-                grid.push((kind(Start::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
+                grid.push((kind(TrainingStart::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
             }
         }
         let results = run(&tasks(&grid));
@@ -214,12 +214,12 @@ pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(
     }
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
     let chosen = helping.min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean())).unwrap_or(0);
-    Comparison { judged, chosen }
+    RivalComparison { judged, chosen }
 }
 
 /// The rival learnt from all samples, with the course of a network's training. `None` where it cannot be fitted.
 pub fn learn(
-    samples: &Samples,
+    samples: &TrainingSamples,
     contest: &CorrectionContest,
     judged: &Judged,
     observe: impl FnMut(&Generation),
@@ -233,7 +233,7 @@ pub fn learn(
 
 fn fit(
     rival: Rival,
-    samples: &Samples,
+    samples: &TrainingSamples,
     contest: &CorrectionContest,
     recipe: &Recipe,
     observe: impl FnMut(&Generation),
@@ -257,7 +257,7 @@ fn fit(
 
 impl Task {
     /// `poses`: that of each row.
-    fn run(&self, samples: &Samples, poses: &[usize], contest: &CorrectionContest) -> Option<Done> {
+    fn run(&self, samples: &TrainingSamples, poses: &[usize], contest: &CorrectionContest) -> Option<Done> {
         let count = poses.iter().max()? + 1;
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);

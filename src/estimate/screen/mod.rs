@@ -15,7 +15,7 @@ use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
-use distance::{Standing, leave_one_out};
+use distance::{LeaveOneOut, leave_one_out};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A row that does not belong to the rest.
@@ -157,7 +157,7 @@ fn screen(
     let mut crowd = 0;
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
-        let Standing { residual, distance, .. } = &standings[row];
+        let LeaveOneOut { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
         if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row)
         {
@@ -179,7 +179,7 @@ fn screen(
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
-fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
+fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     for number in sets {
         let mut distances: Vec<f64> =
@@ -193,12 +193,12 @@ fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
 }
 
 /// Where far outside the bulk begins.
-fn limit(standings: &[Standing]) -> f64 {
+fn limit(standings: &[LeaveOneOut]) -> f64 {
     (FAR * nearest(&mut bulk(standings), BULK).unwrap_or(0.0)).min(GROSS)
 }
 
 /// Distances of the rows that are not gross.
-fn bulk(standings: &[Standing]) -> Vec<f64> {
+fn bulk(standings: &[LeaveOneOut]) -> Vec<f64> {
     standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
 }
 

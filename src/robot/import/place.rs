@@ -3,7 +3,7 @@
 //! A value that could not be read becomes NaN (or empty) after its fault was noted; so one pass finds all faults, and
 //! nothing unread can leave, because [`Faults::finish`] fails when there is any.
 
-use super::Text;
+use super::RobotFileText;
 use crate::error::{Error, Fault, Result};
 use crate::robot::Bound;
 use crate::units::Unit;
@@ -18,7 +18,7 @@ pub(super) struct Faults<'f> {
 
 impl<'f> Faults<'f> {
     /// Parses YAML or JSON, which is YAML too; fails where nothing of the file can be read.
-    pub fn parse(file: Text<'f>) -> Result<(Node, Self)> {
+    pub fn parse(file: RobotFileText<'f>) -> Result<(Node, Self)> {
         let (node, troubles) = yaml::parse(file.text);
         let list: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(file.label)).collect();
         match node {
@@ -55,7 +55,7 @@ enum Content<'a> {
 }
 
 #[derive(Clone)]
-pub(super) struct Place<'a> {
+pub(super) struct DocumentNode<'a> {
     content: Content<'a>,
     path: String,
     /// Of the nearest value that is there.
@@ -63,7 +63,7 @@ pub(super) struct Place<'a> {
     faults: &'a Faults<'a>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> DocumentNode<'a> {
     pub fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
         Self { content: Content::There(node), path: String::new(), mark: node.mark, faults }
     }

@@ -1,11 +1,11 @@
 //! What `learn` tells of the rivals and of a network's training.
 
-use crate::estimate::network::rivals::{Comparison, CorrectionContest};
+use crate::estimate::network::rivals::{CorrectionContest, RivalComparison};
 use crate::estimate::network::{Course, Judged, Phase, Rival};
 use crate::table::{Corrections, CorrectionsRow, Training, TrainingRow};
 
 /// What the comparison comes to, for the person who waits.
-pub(super) fn sentence(comparison: &Comparison, learnt: bool) -> String {
+pub(super) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
     let tell = |judged: &Judged| {
         let name = judged.rival.map_or("none", Rival::name);
         format!("{name} {:.3} mm", judged.mean() * 1e3)
@@ -16,7 +16,7 @@ pub(super) fn sentence(comparison: &Comparison, learnt: bool) -> String {
     format!("{what}; cross-validated error on its own training rows: {}", all.join(", "))
 }
 
-pub(super) fn table(step: &str, contest: &CorrectionContest, comparison: &Comparison, learnt: bool) -> Corrections {
+pub(super) fn table(step: &str, contest: &CorrectionContest, comparison: &RivalComparison, learnt: bool) -> Corrections {
     let chosen = if learnt { comparison.chosen } else { 0 };
     let best = &comparison.judged[chosen];
     let before = comparison.judged[0].mean() * 1e3;

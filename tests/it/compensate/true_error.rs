@@ -1,7 +1,7 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use crate::desk::{Desk, table};
-use calib::compensate::{Arm as Identified, Circumstance, Nominal, SETTLED, Wanted, least_change, one_step};
+use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, SETTLED, Wanted, least_change, one_step};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
