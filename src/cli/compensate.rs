@@ -3,7 +3,7 @@
 use super::model_arguments::ModelArguments;
 use crate::compensate::{Corrector, IdentifiedArm, Manner};
 use crate::error::{Error, Fault, Result, counted};
-use crate::identified::Identified;
+use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{self, Language, Partial, ProgramFile};
 use crate::raw;
@@ -45,8 +45,8 @@ pub(super) struct CompensateArguments {
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = What::Joints)]
     target: What,
     /// Orientation of joint targets: free, for the least change of joints, or kept as the nominal robot has it
-    #[arg(long, value_name = "HOW", value_enum, default_value_t = Orientation::Free)]
-    orientation: Orientation,
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = OrientationUse::Free)]
+    orientation: OrientationUse,
     /// One step by the nominal Jacobian instead of solving (Wang et al. 2020, Fig. 2)
     #[arg(long)]
     one_step: bool,
@@ -89,7 +89,7 @@ enum What {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum Orientation {
+enum OrientationUse {
     Free,
     Keep,
 }
@@ -156,7 +156,7 @@ fn unit(symbol: Option<&str>) -> Option<Unit> {
     symbol.and_then(Unit::parse)
 }
 
-fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Manner> {
+fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Result<Manner> {
     let robot = &identified.model.robot;
     let start = match &arguments.start {
         Some(start) if start.len() != robot.joints() => {
@@ -175,7 +175,7 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
     }
     Ok(Manner {
         cartesian: arguments.target == What::Pose,
-        oriented: arguments.orientation == Orientation::Keep,
+        oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,
         payload: arguments.payload,
         temperature: arguments.temperature,

@@ -1,6 +1,6 @@
 //! The local engine: threads of this process, each with one robot in hand, so that memory is bounded by their number.
 
-use super::ledger::{Ending, Record};
+use super::ledger::{Ending, RobotRecord};
 use super::work::{Visit, Watcher, Workshop};
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -23,7 +23,7 @@ pub struct WorkerOptions<'a> {
 
 /// What came of it, in the order of the roster; nothing where the work was stopped before.
 pub struct Worked {
-    pub records: Vec<Option<Record>>,
+    pub records: Vec<Option<RobotRecord>>,
     /// Robots computed now.
     pub computed: usize,
 }
@@ -31,7 +31,7 @@ pub struct Worked {
 /// Works through robots of the roster, by position. Fails where the store does; then all workers stop.
 pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watcher: &dyn Watcher) -> Result<Worked> {
     let roster = &workshop.fleet.roster.0;
-    let slots: Vec<Mutex<Option<Record>>> = roster.iter().map(|_| Mutex::new(None)).collect();
+    let slots: Vec<Mutex<Option<RobotRecord>>> = roster.iter().map(|_| Mutex::new(None)).collect();
     let (next, computed) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let halted = AtomicBool::new(false);
     let failure: Mutex<Option<Error>> = Mutex::new(None);

@@ -22,7 +22,7 @@ use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recor
 use std::path::{Path, PathBuf};
 
 /// What was identified, and from what.
-pub struct Identified {
+pub struct IdentifiedModel {
     pub robot: RobotDescription,
     pub parameters: Parameters,
     pub model: Model,
@@ -56,7 +56,7 @@ pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
     Ok(steps)
 }
 
-impl Identified {
+impl IdentifiedModel {
     /// The model of a run that is done: of `step`, else of the step that stands for it, else of the last stage that writes parameters.
     pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
         let run = &manifest.run_id;

@@ -5,13 +5,13 @@ use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
 use crate::stage::{Context, Output};
 use crate::store::frame::Frame;
-use crate::store::{Account, FinishedFile, Product, Store, TableRef};
+use crate::store::{Account, FinishedFile, PendingTable, Store, TableRef};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 /// Where a stage is executed.
-pub(super) struct Place<'a> {
+pub(super) struct ExecutionSite<'a> {
     pub store: &'a Store,
     pub threads: &'a rayon::ThreadPool,
     pub observer: &'a dyn Observer,
@@ -19,7 +19,12 @@ pub(super) struct Place<'a> {
 }
 
 /// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
-pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Account) -> Result<Vec<(String, Product)>> {
+pub(super) fn stage(
+    desk: &Desk,
+    index: usize,
+    place: &ExecutionSite,
+    account: &mut Account,
+) -> Result<Vec<(String, PendingTable)>> {
     let stage = &desk.plan.stages[index];
     let frames = load(desk, index, place.store)?;
     let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
@@ -40,11 +45,11 @@ pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Acco
         .zip(outputs)
         .map(|(port, output)| {
             let (kind, product) = match output {
-                Output::Frame(frame) => (frame.kind(), Product::Frame(frame)),
+                Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
                 Output::Streamed(streamed) => {
                     let file = streamed.handle.downcast::<FinishedFile>();
                     let file = file.map_err(|_| Error::Bug(format!("stage {}: a sink that is not the engine's", stage.id)))?;
-                    (streamed.kind, Product::File(*file))
+                    (streamed.kind, PendingTable::File(*file))
                 }
             };
             if kind != port.kind {

@@ -1,6 +1,6 @@
 //! What a run would do, without doing it.
 
-use super::desk::{Desk, Key};
+use super::desk::{Desk, KeyState};
 use super::plan::Plan;
 use super::reason;
 use super::select::Selection;
@@ -39,9 +39,9 @@ pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<
     for (index, stage) in plan.stages.iter().enumerate() {
         let inside = selected.stages.contains(&index);
         let prospect = match desk.key(index)? {
-            Key::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
-            Key::Pending(_) => Prospect::NotSelected,
-            Key::Known(key) => match store.action(&key)? {
+            KeyState::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
+            KeyState::Pending(_) => Prospect::NotSelected,
+            KeyState::Known(key) => match store.action(&key)? {
                 Lookup::Done(record) if !selected.forces(index) => {
                     desk.tables[index] = Some(record.tables);
                     Prospect::Cached

@@ -1,7 +1,7 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
 
-use super::desk::{self, Desk, Key};
-use super::execute::{self, Place};
+use super::desk::{self, Desk, KeyState};
+use super::execute::{self, ExecutionSite};
 use super::lock::ActionLock;
 use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
 use super::options::RunOptions;
@@ -18,13 +18,13 @@ use std::time::SystemTime;
 const GROUP: f64 = 1.0;
 
 /// A run that went through.
-pub struct Outcome {
+pub struct CompletedRun {
     pub manifest: Manifest,
     /// Reports and other documents, where people find them.
     pub documents: Vec<PathBuf>,
 }
 
-impl Outcome {
+impl CompletedRun {
     /// The tables of a kind, in pipeline order.
     pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
         self.manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
@@ -41,7 +41,7 @@ pub fn run(
     options: &RunOptions,
     surroundings: &Surroundings,
     observer: &dyn Observer,
-) -> Result<Outcome> {
+) -> Result<CompletedRun> {
     let selected = options.selection.of(plan)?;
     let threads =
         rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
@@ -73,7 +73,7 @@ pub fn run(
     let finished = store.finish_run(record, &manifest);
     // The first error is the one that explains the others.
     result.and(finished)?;
-    Ok(Outcome { manifest, documents })
+    Ok(CompletedRun { manifest, documents })
 }
 
 struct Running<'a> {
@@ -95,9 +95,9 @@ impl Running<'_> {
         let plan = self.desk.plan;
         let inside = self.selected.stages.contains(&index);
         let key = match self.desk.key(index)? {
-            Key::Known(key) => key,
-            Key::Pending(_) if !inside => return Ok(()),
-            Key::Pending(on) => {
+            KeyState::Known(key) => key,
+            KeyState::Pending(_) if !inside => return Ok(()),
+            KeyState::Pending(on) => {
                 let (id, on) = (&plan.stages[index].id, &plan.stages[on].id);
                 let message = format!("stage `{id}` reads from `{on}`, which is not cached and was not selected: select it too");
                 return Err(Error::spec("--only, --from", message));
@@ -139,7 +139,8 @@ impl Running<'_> {
         let started = (self.now)();
         self.event("begins", index, serde_json::json!({ "reason": reason }))?;
         self.manifest.stages[index].reason = Some(reason);
-        let place = Place { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
+        let place =
+            ExecutionSite { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
         let mut account = crate::store::Account { run: place.run.into(), started: rfc3339(started), ..Default::default() };
         let products = execute::stage(&self.desk, index, &place, &mut account)?;
         let ended = (self.now)();

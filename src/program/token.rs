@@ -6,7 +6,7 @@
 //! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
 //! binary integers are no coordinates). Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
 
-use super::{Found, Language};
+use super::{Gathered, Language};
 use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,12 +38,12 @@ impl Token {
 
 /// What is read, and how its words are compared: KRL and RAPID know no case.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'p> {
+pub(super) struct ProgramText<'p> {
     pub bytes: &'p [u8],
     pub language: Language,
 }
 
-impl Source<'_> {
+impl ProgramText<'_> {
     /// A token's text in capitals.
     pub fn upper(&self, token: &Token) -> String {
         String::from_utf8_lossy(&self.bytes[token.span.clone()]).to_ascii_uppercase()
@@ -111,8 +111,8 @@ fn in_word(byte: u8) -> bool {
 }
 
 /// The tokens of a program; what makes their reading doubtful is a fault.
-pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
-    let Source { bytes, language } = source;
+pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
+    let ProgramText { bytes, language } = source;
     let krl = language == Language::Krl;
     let comment = if krl { b';' } else { b'!' };
     let byte = |at: usize| bytes.get(at).copied();
@@ -173,7 +173,7 @@ pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
 }
 
 /// Bytes that readers take differently: what one takes for the end of a line, another takes into the comment.
-fn doubtful(bytes: &[u8], found: &mut Found) {
+fn doubtful(bytes: &[u8], found: &mut Gathered) {
     for (at, byte) in bytes.iter().enumerate() {
         match byte {
             0 => found.fault(at, "a zero byte: no program text (UTF-16 is not read)"),

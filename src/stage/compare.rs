@@ -137,14 +137,14 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
 }
 
 /// A recording with its fit.
-struct Fit {
+struct FittedRecording {
     data: Measurements,
     rows: Vec<usize>,
     model: Model,
     fitted: Fitted,
 }
 
-impl Fit {
+impl FittedRecording {
     fn as_session(&self) -> Session<'_> {
         Session { data: &self.data, rows: &self.rows, model: &self.model, fitted: &self.fitted }
     }
@@ -159,7 +159,7 @@ impl Compare {
         recording: &Recording,
         split: Option<&Split>,
         context: &Context,
-    ) -> Result<Fit> {
+    ) -> Result<FittedRecording> {
         let mut data = recording.measurements(&self.tracker);
         let rows: Vec<usize> = (0..data.rows()).collect();
         let mut placed = earlier.clone();
@@ -182,6 +182,6 @@ impl Compare {
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (fitted, screening) = fit_rows(&mut model, &data, &options, split.unwrap_or(&whole), split.is_some());
         let rows = if split.is_some() { screening.kept } else { rows };
-        Ok(Fit { data, rows, model, fitted })
+        Ok(FittedRecording { data, rows, model, fitted })
     }
 }

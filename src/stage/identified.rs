@@ -7,7 +7,7 @@ use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
-use crate::table::{Beside, CovarianceTable, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
+use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -173,7 +173,7 @@ impl Identified {
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
-        let beside = Beside {
+        let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),

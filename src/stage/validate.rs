@@ -15,13 +15,13 @@ use std::collections::BTreeMap;
 pub struct Validate {
     /// Figures from elsewhere (a paper, a data sheet, last year's report) to stand beside ours.
     #[serde(default)]
-    pub reference: Vec<Reference>,
+    pub reference: Vec<PublishedErrors>,
 }
 
 /// Published or agreed statistics of one step on one set.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
+pub struct PublishedErrors {
     /// Where the figures stand, e.g. `Table 9`.
     pub label: String,
     /// The step of ours that they belong beside.

@@ -1,6 +1,6 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
-use super::columns::{Columns, Role};
+use super::columns::{ColumnRole, TargetColumns};
 use super::fields::fields;
 use super::{Layout, Unreached, decimal};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector, turns};
@@ -47,7 +47,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     let cells = fields(body.trim_start_matches('\u{feff}'), delimiter)
         .map_err(|message| Error::Data(vec![Fault::new(format!("{}:{number}", layout.place), message)]))?;
     let names: Vec<String> = cells.into_iter().map(|field| field.1.into_owned()).collect();
-    let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
+    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let mut joints: Vec<(usize, usize, Unit)> =
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
@@ -181,7 +181,7 @@ struct Spans {
 
 struct Sheet<'a> {
     layout: &'a Layout<'a>,
-    columns: &'a Columns,
+    columns: &'a TargetColumns,
     /// Column, joint, unit; in the order of the columns.
     joints: Vec<(usize, usize, Unit)>,
     delimiter: char,
@@ -220,11 +220,14 @@ impl Sheet<'_> {
             parse(text, self.delimiter)
                 .map_err(|()| format!("column {}: field {} is `{text}`, no number", range.start + 1, index + 1))
         };
-        let mut row = Row::default();
+        let mut row = TargetRow::default();
         for (index, role) in &self.columns.roles {
             if let Some(value) = number(*index)? {
                 row.take(*role, value, self.layout.robot.joints.len());
-            } else if matches!(role, Role::Joint(..) | Role::Axis(..) | Role::Quaternion(_) | Role::Turn(..)) {
+            } else if matches!(
+                role,
+                ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
+            ) {
                 return Err(format!("column {} is empty", cells[*index].0.start + 1));
             }
         }
@@ -314,31 +317,31 @@ fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
 
 /// The numbers of one row, by what they mean.
 #[derive(Default)]
-pub(super) struct Row {
+pub(super) struct TargetRow {
     target: CommandTarget,
     point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
 }
 
-impl Row {
-    pub fn take(&mut self, role: Role, value: f64, joints: usize) {
+impl TargetRow {
+    pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
         let put =
             |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value;
         match role {
-            Role::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
-            Role::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
-            Role::Quaternion(part) => self.quaternion[part] = value,
-            Role::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
-            Role::Payload => self.target.payload = Some(value),
-            Role::Temperature => self.target.temperature = Some(value),
-            Role::Time => self.target.time = Some(value),
-            Role::Direction(joint) => put(&mut self.target.direction, joint, value),
-            Role::Current(joint) => put(&mut self.target.current, joint, value),
+            ColumnRole::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
+            ColumnRole::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
+            ColumnRole::Quaternion(part) => self.quaternion[part] = value,
+            ColumnRole::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
+            ColumnRole::Payload => self.target.payload = Some(value),
+            ColumnRole::Temperature => self.target.temperature = Some(value),
+            ColumnRole::Time => self.target.time = Some(value),
+            ColumnRole::Direction(joint) => put(&mut self.target.direction, joint, value),
+            ColumnRole::Current(joint) => put(&mut self.target.current, joint, value),
         }
     }
 
-    pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<CommandTarget, String> {
+    pub fn target(mut self, columns: &TargetColumns, cartesian: bool) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
         let joints =
             joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));

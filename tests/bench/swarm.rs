@@ -2,7 +2,7 @@
 //! dimensions, of which a network has more.
 
 use calib::estimate::swarm::{Algorithm, Landscape, SearchStop};
-use calib::stage::{Optimise, Problem};
+use calib::stage::{BenchmarkProblem, Optimise};
 use std::time::Instant;
 
 /// The paper's times to the target, s; none for its own method.
@@ -14,11 +14,11 @@ pub fn table() {
     let stage = Optimise::default();
     compare(&stage, &stage.problems[0], stage.seeds, &PUBLISHED);
     for function in [Landscape::Rastrigin, Landscape::Rosenbrock, Landscape::Ackley, Landscape::Michalewicz] {
-        compare(&stage, &Problem { function, dimensions: 10, tolerance: 1e-2 }, 30, &[]);
+        compare(&stage, &BenchmarkProblem { function, dimensions: 10, tolerance: 1e-2 }, 30, &[]);
     }
 }
 
-fn compare(stage: &Optimise, problem: &Problem, seeds: usize, published: &[(Algorithm, f64)]) {
+fn compare(stage: &Optimise, problem: &BenchmarkProblem, seeds: usize, published: &[(Algorithm, f64)]) {
     println!(
         "{}-D {}, absolute error {:e}, {seeds} seeds, at most {} evaluations, one core",
         problem.dimensions,

@@ -3,7 +3,7 @@
 use calib::error::Result;
 use calib::robot::description::{JointDescription, JointKind, RobotDescription};
 use calib::robot::import::{RobotFileText, read_calib};
-use calib::stage::{Context, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Source, Stage};
+use calib::stage::{Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Stage};
 use calib::table::Robot;
 use calib::twin::arm::Arm;
 use calib::twin::effect::{Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical};
@@ -177,7 +177,7 @@ fn tracker_noise_has_the_stated_size() {
 
 struct Quiet;
 impl Services for Quiet {
-    fn open(&self, _file: &RawFile) -> Result<Source> {
+    fn open(&self, _file: &RawFile) -> Result<OpenedInput> {
         panic!("simulate opens no file")
     }
     fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {

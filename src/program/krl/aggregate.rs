@@ -1,7 +1,7 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
-use super::super::token::{Sort, Source, Token};
-use super::super::{Found, Literal, TargetKind, quoted};
+use super::super::token::{ProgramText, Sort, Token};
+use super::super::{Gathered, Literal, TargetKind, quoted};
 use super::line::opens;
 use std::ops::Range;
 
@@ -50,7 +50,7 @@ impl Type {
 
 /// The tokens of an aggregate, braces included.
 pub(super) struct Aggregate<'t> {
-    source: Source<'t>,
+    source: ProgramText<'t>,
     tokens: &'t [Token],
     prefix: Option<String>,
     /// Between the commas.
@@ -58,7 +58,7 @@ pub(super) struct Aggregate<'t> {
 }
 
 impl<'t> Aggregate<'t> {
-    pub fn new(source: Source<'t>, tokens: &'t [Token]) -> Self {
+    pub fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, rest @ ..] = inner
@@ -130,7 +130,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// Takes it as a target of type `kind`, or says everything that is wrong with it.
-    pub fn take(&self, kind: Type, found: &mut Found) {
+    pub fn take(&self, kind: Type, found: &mut Gathered) {
         let open = self.tokens[0].span.start;
         let before = found.faults.len();
         let mut numbers: Vec<(String, f64, Range<usize>)> = Vec::new();
@@ -167,7 +167,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.
-    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Found) -> Option<(String, f64, Range<usize>)> {
+    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Gathered) -> Option<(String, f64, Range<usize>)> {
         let bytes = self.source.bytes;
         if first.sort != Sort::Word {
             found.fault(first.span.start, format!("{} has no name", quoted(bytes, self.source.over(field, 0))));

@@ -1,12 +1,12 @@
 //! Parts of a line of KRL: what it declares, what it sets, which braces belong together.
 
-use super::super::token::{Sort, Source, Token};
+use super::super::token::{ProgramText, Sort, Token};
 
 /// Types that need no DECL.
 const PREDEFINED: [&str; 11] = ["INT", "REAL", "BOOL", "CHAR", "FRAME", "POS", "E3POS", "E6POS", "AXIS", "E3AXIS", "E6AXIS"];
 
 /// The type and the names that a line declares, in capitals.
-pub(super) fn declared(source: Source, line: &[Token]) -> Option<(String, Vec<String>)> {
+pub(super) fn declared(source: ProgramText, line: &[Token]) -> Option<(String, Vec<String>)> {
     let skipped = line.iter().take_while(|token| source.is_word(token, &["DECL", "GLOBAL", "CONST"])).count();
     let rest = &line[skipped..];
     let [kind, first, ..] = rest else { return None };
@@ -30,7 +30,7 @@ pub(super) fn declared(source: Source, line: &[Token]) -> Option<(String, Vec<St
 }
 
 /// The type that a line declares as a structure: `[GLOBAL] STRUC NAME ...`.
-pub(super) fn structure(source: Source, line: &[Token]) -> Option<String> {
+pub(super) fn structure(source: ProgramText, line: &[Token]) -> Option<String> {
     let skipped = line.iter().take_while(|token| source.is_word(token, &["GLOBAL"])).count();
     match &line[skipped..] {
         [word, name, ..] if source.is_word(word, &["STRUC"]) && name.sort == Sort::Word => Some(source.upper(name)),
@@ -64,7 +64,7 @@ pub(super) fn closing(line: &[Token], open: usize) -> usize {
 }
 
 /// Behind a name: the last member of `[1].FRAME.X`, and what follows `=`; the second is none where nothing is set.
-pub(super) fn member<'t>(source: Source, rest: &'t [Token]) -> Option<(Option<String>, Option<&'t [Token]>)> {
+pub(super) fn member<'t>(source: ProgramText, rest: &'t [Token]) -> Option<(Option<String>, Option<&'t [Token]>)> {
     let mut member = None;
     let mut k = 0;
     loop {
@@ -81,7 +81,7 @@ pub(super) fn member<'t>(source: Source, rest: &'t [Token]) -> Option<(Option<St
 }
 
 /// The variable that is set where `before` ends in `NAME[1].MEMBER =`: its name, and whether a member of it.
-pub(super) fn variable(source: Source, before: &[Token]) -> Option<(String, Option<String>)> {
+pub(super) fn variable(source: ProgramText, before: &[Token]) -> Option<(String, Option<String>)> {
     let (last, mut rest) = before.split_last()?;
     if !last.is(b'=') {
         return None;

@@ -9,8 +9,8 @@ mod aggregate;
 mod frames;
 mod line;
 
-use super::token::{Sort, Source, Token, tokens};
-use super::{DEPTH, Found, Language, quoted};
+use super::token::{ProgramText, Sort, Token, tokens};
+use super::{DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,9 +32,9 @@ const KNOWN: [&str; 2] = ["FRAME", "INERTIA"];
 /// Frames of the system that are kept in files.
 const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
-pub(super) fn read(bytes: &[u8]) -> Found {
-    let mut found = Found::default();
-    let source = Source { bytes, language: Language::Krl };
+pub(super) fn read(bytes: &[u8]) -> Gathered {
+    let mut found = Gathered::default();
+    let source = ProgramText { bytes, language: Language::Krl };
     let tokens = tokens(source, &mut found);
     let lines: Vec<&[Token]> = tokens.split(|token| token.sort == Sort::LineEnd).filter(|line| !line.is_empty()).collect();
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -57,12 +57,12 @@ pub(super) fn read(bytes: &[u8]) -> Found {
 }
 
 struct Reader<'p> {
-    source: Source<'p>,
+    source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
-    found: Found,
+    found: Gathered,
 }
 
 impl Reader<'_> {

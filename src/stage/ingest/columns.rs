@@ -145,7 +145,7 @@ impl<'de> Visitor<'de> for Block {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Columns, A::Error> {
         let mut found: BTreeMap<&'static str, Mapped> = BTreeMap::new();
-        while let Some(setting) = access.next_key_seed(Key(&SETTINGS))? {
+        while let Some(setting) = access.next_key_seed(KnownKey(&SETTINGS))? {
             let Some(column) = recording_columns().find(|column| column.setting == setting) else { continue };
             let mapped = match column.shape {
                 ColumnShape::Text => access.next_value::<Option<_>>()?.map(Mapped::Text),
@@ -163,9 +163,9 @@ impl<'de> Visitor<'de> for Block {
 }
 
 /// A key that is one of these.
-struct Key(&'static [&'static str]);
+struct KnownKey(&'static [&'static str]);
 
-impl<'de> DeserializeSeed<'de> for Key {
+impl<'de> DeserializeSeed<'de> for KnownKey {
     type Value = &'static str;
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
         let name = Cow::<str>::deserialize(deserializer)?;
@@ -197,7 +197,7 @@ impl<'de> Visitor<'de> for OneConvention {
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
         let mut out = ConventionColumns::default();
         let known = CONVENTIONS.get(self.0.setting).map(Vec::as_slice).unwrap_or_default();
-        while let Some(key) = access.next_key_seed(Key(known))? {
+        while let Some(key) = access.next_key_seed(KnownKey(known))? {
             match key {
                 "unit" => out.unit = access.next_value()?,
                 "optional" => out.optional = access.next_value()?,

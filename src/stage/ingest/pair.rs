@@ -1,7 +1,7 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
 use super::layout::{Duplicates, Join};
-use super::scan::{Key, Scan};
+use super::scan::{IdFingerprint, Scan};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
@@ -91,7 +91,7 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
 }
 
 /// Sorts keys by id and leaves one of each id, or none. Copies of one row are one row: they do not contradict each other.
-fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
+fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, fates: &mut [Fate]) {
     keys.sort_unstable();
     let mut dropped = Vec::new();
     for same in keys.chunk_by(|a, b| (a.hash, a.check) == (b.hash, b.check)) {
@@ -119,7 +119,7 @@ fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
 }
 
 /// Pairs of rows with one id; both lists sorted, every id once.
-fn by_id(first: &[Key], second: &[Key]) -> Vec<(u32, u32)> {
+fn by_id(first: &[IdFingerprint], second: &[IdFingerprint]) -> Vec<(u32, u32)> {
     let (mut a, mut b) = (first.iter().peekable(), second.iter().peekable());
     let mut pairs = Vec::new();
     while let (Some(left), Some(right)) = (a.peek(), b.peek()) {
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn of_equal_ids_one_or_none_stays() {
-        let key = |hash, number| Key { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
+        let key = |hash, number| IdFingerprint { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
         let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
         let stays = |duplicates| {
             let (mut keys, mut fates) = (keys.clone(), [Fate::default()]);
