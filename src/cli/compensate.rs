@@ -1,7 +1,7 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{Corrector, IdentifiedArm, Manner};
+use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
@@ -156,7 +156,7 @@ fn unit(symbol: Option<&str>) -> Option<Unit> {
     symbol.and_then(Unit::parse)
 }
 
-fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Result<Manner> {
+fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Result<CorrectionOptions> {
     let robot = &identified.model.robot;
     let start = match &arguments.start {
         Some(start) if start.len() != robot.joints() => {
@@ -173,7 +173,7 @@ fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Resu
     if arguments.time.is_some() && !clock {
         return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
     }
-    Ok(Manner {
+    Ok(CorrectionOptions {
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,

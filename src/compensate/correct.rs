@@ -1,7 +1,7 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, Reach, Uncertainty, Wanted, beyond_limits, inverse,
+    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, Reach, ToolGoal, Uncertainty, beyond_limits, inverse,
     least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
@@ -36,7 +36,7 @@ pub struct CommandTarget {
 
 /// How to correct, and what holds where a target does not say.
 #[derive(Debug, Clone)]
-pub struct Manner {
+pub struct CorrectionOptions {
     /// Cartesian columns are the targets though there are joints; these then say near which posture.
     pub cartesian: bool,
     /// Whether joint targets keep the nominal orientation.
@@ -71,7 +71,7 @@ pub struct Corrector<'a> {
     arm: &'a IdentifiedArm,
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
-    manner: Manner,
+    manner: CorrectionOptions,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
@@ -119,13 +119,18 @@ impl CorrectionTotals {
 
 struct Job {
     /// None: the point that the nominal robot reaches at `home`.
-    wanted: Option<Wanted>,
+    wanted: Option<ToolGoal>,
     home: Vec<f64>,
     circumstance: Circumstance,
 }
 
 impl<'a> Corrector<'a> {
-    pub fn new(arm: &'a IdentifiedArm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
+    pub fn new(
+        arm: &'a IdentifiedArm,
+        coverage: Option<Coverage>,
+        uncertainty: Option<Uncertainty>,
+        manner: CorrectionOptions,
+    ) -> Self {
         let joints = arm.model().robot.joints();
         Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
     }
@@ -160,7 +165,7 @@ impl<'a> Corrector<'a> {
                 let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
                 let oriented = target.rotation.is_some();
                 let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
-                let wanted = Wanted { pose, oriented };
+                let wanted = ToolGoal { pose, oriented };
                 let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
                 (Some(wanted), home)
             }
@@ -186,7 +191,7 @@ impl<'a> Corrector<'a> {
 
     fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> CorrectedCommand {
         reach.under(&job.circumstance);
-        let wanted = job.wanted.unwrap_or_else(|| Wanted { pose: nominal.place(&job.home), oriented: self.manner.oriented });
+        let wanted = job.wanted.unwrap_or_else(|| ToolGoal { pose: nominal.place(&job.home), oriented: self.manner.oriented });
         let found: CommandSolution = if self.manner.one_step {
             one_step(reach, nominal, &wanted, &job.home)
         } else {
@@ -225,12 +230,12 @@ impl<'a> Corrector<'a> {
 
 impl Corrector<'_> {
     /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
-    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> CommandSolution {
+    fn reached(reach: &mut Reach, wanted: &ToolGoal, home: &[f64]) -> CommandSolution {
         let found = least_change(reach, wanted, home, home);
         if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
             return found;
         }
-        let point = Wanted { oriented: false, ..*wanted };
+        let point = ToolGoal { oriented: false, ..*wanted };
         let CommandSolution { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
         let turn = wanted.turn_left(&reach.place(&q));
         CommandSolution { q, residual, turn, before, iterations: iterations + found.iterations }

@@ -14,10 +14,10 @@ mod solve;
 mod uncertainty;
 
 pub use arm::{Circumstance, IdentifiedArm, Reach};
-pub use correct::{CommandTarget, CorrectedCommand, CorrectionTotals, Corrector, Manner, turns};
+pub use correct::{CommandTarget, CorrectedCommand, CorrectionOptions, CorrectionTotals, Corrector, turns};
 pub use coverage::Coverage;
 pub(crate) use coverage::beyond_limits;
 pub use inverse::inverse;
 pub use rigid::{LeftOut, distance, left_out, rigid};
-pub use solve::{Chain, CommandSolution, Nominal, SETTLED, Wanted, least_change, one_step};
+pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
 pub use uncertainty::Uncertainty;

@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::order::{Codes, InOrder, pack};
+use super::order::{Codes, SortedRows, pack};
 use super::source::{CellKind, TableFile};
 use crate::error::{Error, Result};
 
@@ -208,7 +208,7 @@ fn unite(mut a: (Vec<u64>, Vec<Box<str>>), mut b: (Vec<u64>, Vec<Box<str>>)) -> 
 
 /// Pairs rows by key. Where `occurrence` is set the first of equal keys goes with the first, the second with the second.
 pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
-    let (a, b) = rayon::join(|| InOrder::of(&a.codes), || InOrder::of(&b.codes));
+    let (a, b) = rayon::join(|| SortedRows::of(&a.codes), || SortedRows::of(&b.codes));
     let mut pairing = Pairing {
         partner: Vec::new(),
         paired: 0,

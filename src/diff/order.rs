@@ -84,7 +84,7 @@ impl Codes {
 }
 
 /// The rows of a file in the order of their keys, equal keys in the order of the rows.
-pub(super) struct InOrder<'c> {
+pub(super) struct SortedRows<'c> {
     codes: &'c Codes,
     order: Order,
 }
@@ -96,7 +96,7 @@ enum Order {
     Rows(Vec<u32>),
 }
 
-impl<'c> InOrder<'c> {
+impl<'c> SortedRows<'c> {
     pub fn of(codes: &'c Codes) -> Self {
         let rows = codes.rows();
         let order = if (1..rows).all(|row| codes.compare(row - 1, codes, row).is_le()) {
@@ -172,7 +172,7 @@ mod tests {
                 let wanted = (a[0][left], a[1][left]).cmp(&(b[0][right], b[1][right]));
                 assert_eq!(packed_a.compare(left, &packed_b, right), wanted, "case {case}");
             }
-            let order = InOrder::of(&packed_a);
+            let order = SortedRows::of(&packed_a);
             assert!((1..50).all(|at| order.compare(at - 1, &order, at).is_le()));
             let mut rows: Vec<usize> = (0..50).map(|at| order.row(at)).collect();
             rows.sort_unstable();

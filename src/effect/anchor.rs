@@ -42,7 +42,7 @@ impl Effect for AnchorShift {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let anchors = robot.gauging().anchors.iter();
+        let anchors = robot.setup().anchors.iter();
         let all = anchors.flat_map(|anchor| {
             AXES.iter().map(move |axis| ParameterSpec {
                 name: format!("{}{axis}", Self::prefix(&anchor.name)),

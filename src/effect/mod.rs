@@ -127,12 +127,12 @@ impl<'a> ArmState<'a> {
 
     /// The number of the target that the row measured; none where the robot knows no such target.
     pub fn target(&self, robot: &RobotModel) -> Option<usize> {
-        robot.gauging().target(self.data.target(self.row))
+        robot.setup().target(self.data.target(self.row))
     }
 
     /// The number of the anchor that the row measured from.
     pub fn anchor(&self, robot: &RobotModel) -> Option<usize> {
-        robot.gauging().anchor(self.data.anchor(self.row)?)
+        robot.setup().anchor(self.data.anchor(self.row)?)
     }
 
     /// Motor currents, A, where recorded.

@@ -93,8 +93,8 @@ impl PlacedRow<'_> {
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
     pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
-        let gauging = self.robot.gauging();
-        let anchor = gauging.anchors.get(gauging.anchor(anchor)?)?;
+        let setup = self.robot.setup();
+        let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
         Some(self.point - anchor.place - self.scratch.deflection.anchor)
     }
 

@@ -82,7 +82,7 @@ impl EffectStack {
             scratch.deflection.joint.copy_from_slice(joint);
             scratch.deflection.station.copy_from_slice(station);
         }
-        scratch.target = robot.gauging().target(data.target(row));
+        scratch.target = robot.setup().target(data.target(row));
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {

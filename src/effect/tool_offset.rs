@@ -50,7 +50,7 @@ impl Effect for ToolOffset {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let targets: Vec<(&str, usize)> = match robot.gauging().targets.as_slice() {
+        let targets: Vec<(&str, usize)> = match robot.setup().targets.as_slice() {
             [] => vec![("", 3)],
             targets => targets.iter().map(|target| (target.name.as_str(), width(target))).collect(),
         };
@@ -66,7 +66,7 @@ impl Effect for ToolOffset {
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let targets = &robot.gauging().targets;
+        let targets = &robot.setup().targets;
         let number = state.target(robot);
         if number.is_none() && !targets.is_empty() {
             return;

@@ -13,7 +13,7 @@ pub struct TriangularFactor {
 }
 
 /// Rows `[J | r]` on their way into a factor: chunks are written below the factor of those before them.
-pub(crate) struct Tall {
+pub(crate) struct StackedRows {
     /// Column-major; the first `top` rows hold the factor so far.
     rows: Mat<f64>,
     top: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Tall {
     memory: MemBuffer,
 }
 
-impl Tall {
+impl StackedRows {
     /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
     pub fn new(columns: usize, chunk: usize) -> Self {
         let height = columns + chunk;
@@ -65,7 +65,7 @@ impl Tall {
 impl TriangularFactor {
     /// The factor of rows `[J | r]` (m x (p + 1)).
     pub fn of(rows: &Mat<f64>) -> Self {
-        let mut tall = Tall::new(rows.ncols(), rows.nrows());
+        let mut tall = StackedRows::new(rows.ncols(), rows.nrows());
         for (j, column) in tall.chunk(rows.nrows()).into_iter().enumerate() {
             column.copy_from_slice(rows.col_as_slice(j));
         }
@@ -75,7 +75,7 @@ impl TriangularFactor {
 
     /// The factor of rows made of some of this one's columns above each other's.
     fn of_columns<'a>(height: usize, columns: impl ExactSizeIterator<Item = [&'a [f64]; 2]>) -> Self {
-        let mut tall = Tall::new(columns.len(), 2 * height);
+        let mut tall = StackedRows::new(columns.len(), 2 * height);
         for (to, [above, below]) in tall.chunk(2 * height).into_iter().zip(columns) {
             to[..above.len()].copy_from_slice(above);
             to[height..height + below.len()].copy_from_slice(below);

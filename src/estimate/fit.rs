@@ -101,7 +101,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
     let sight = problem.evaluate(model, options.candidates);
     problem.excess = excess_sigma(&problem, &sight, 0);
-    let mut search = Search {
+    let mut search = Minimisation {
         statuses: vec![ParameterStatus::Kept; specs.len()],
         course: Vec::new(),
         stop: Stop::NothingFree,
@@ -112,7 +112,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     if search.reconsider(&mut problem, model, options.candidates, &all) {
         all = problem.observe(model, options.candidates);
     }
-    let Search { mut statuses, course, stop, free } = search;
+    let Minimisation { mut statuses, course, stop, free } = search;
     let errors = problem.errors(&all.residuals);
     let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
@@ -168,7 +168,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
 }
 
 /// The way to a minimum in what the data see.
-struct Search {
+struct Minimisation {
     statuses: Vec<ParameterStatus>,
     course: Vec<Iteration>,
     stop: Stop,
@@ -176,7 +176,7 @@ struct Search {
     free: Vec<usize>,
 }
 
-impl Search {
+impl Minimisation {
     /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
     /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
     fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: &Evaluation) -> bool {

@@ -6,10 +6,10 @@
 
 use super::factor::TriangularFactor;
 use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
-use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
 use super::repeats::Poses;
+use super::row_error::row_error;
 use super::term::ObservationTerm;
 use crate::observation::KINDS;
 use crate::robot::Measurements;
@@ -196,7 +196,7 @@ impl Near {
         if bend > STRAIGHT * STRAIGHT * whole {
             return None;
         }
-        Some(part.iter().map(|row| miss(&other, problem.data, *row, &mut scratch).length).collect())
+        Some(part.iter().map(|row| row_error(&other, problem.data, *row, &mut scratch).length).collect())
     }
 
     /// Whitened derivatives and errors of the terms of some rows, three lines each, and the root of each one's Huber weight.
@@ -240,7 +240,7 @@ fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usi
     let mut other = model.clone();
     fit(&mut other, data, &FitOptions { rows: &kept, candidates });
     let mut scratch = other.stack.scratch(&other.robot);
-    part.iter().map(|row| miss(&other, data, *row, &mut scratch).length).collect()
+    part.iter().map(|row| row_error(&other, data, *row, &mut scratch).length).collect()
 }
 
 fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {

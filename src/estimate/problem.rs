@@ -1,6 +1,6 @@
 //! The calibration problem: weighted residuals of some rows under some free parameters.
 
-use super::factor::{Tall, TriangularFactor};
+use super::factor::{StackedRows, TriangularFactor};
 use super::model::Model;
 use super::term::{ObservationTerm, huber};
 use crate::effect::PlacedRow;
@@ -73,7 +73,7 @@ impl Problem<'_> {
         let kinds = kinds(self.data);
         // Three lines for each kind, whatever a row has of it.
         let lines_of_row = 3 * kinds.len();
-        let mut tall = Tall::new(p + 1, lines_of_row * rows.len().min(CHUNK));
+        let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
         for chunk in rows.chunks(CHUNK) {
             let height = lines_of_row * chunk.len();

@@ -204,9 +204,9 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<u
         (true, false) | (false, true) => 2,
         (false, false) => 0,
     };
-    let gauging = robot.gauging();
+    let setup = robot.setup();
     let place = if places { 3 } else { 0 };
-    let targets: usize = gauging.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
-    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * gauging.anchors.len();
+    let targets: usize = setup.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
+    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * setup.anchors.len();
     Some(seen - if places { translations } else { 0 } - rotations)
 }

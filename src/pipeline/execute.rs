@@ -1,6 +1,6 @@
 //! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
 
-use super::desk::{self, Desk};
+use super::run_state::{self, RunState};
 use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
 use crate::stage::{Context, Output};
@@ -20,16 +20,16 @@ pub(super) struct ExecutionSite<'a> {
 
 /// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
 pub(super) fn stage(
-    desk: &Desk,
+    state: &RunState,
     index: usize,
     place: &ExecutionSite,
     account: &mut Account,
 ) -> Result<Vec<(String, PendingTable)>> {
-    let stage = &desk.plan.stages[index];
-    let frames = load(desk, index, place.store)?;
+    let stage = &state.plan.stages[index];
+    let frames = load(state, index, place.store)?;
     let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
     let context =
-        Context { id: &stage.id, seed: desk.seed(index), jobs: place.threads.current_num_threads(), services: &services };
+        Context { id: &stage.id, seed: state.seed(index), jobs: place.threads.current_num_threads(), services: &services };
     let body = || place.threads.install(|| stage.stage.run(frames, &context));
     let outputs = catch_unwind(AssertUnwindSafe(body))
         .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
@@ -60,16 +60,16 @@ pub(super) fn stage(
         .collect()
 }
 
-fn load(desk: &Desk, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
-    let stages = &desk.plan.stages;
+fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
+    let stages = &state.plan.stages;
     let inputs = stages[index].inputs.iter();
     inputs
         .map(|input| {
             let frames = input.from.iter().map(|origin| {
                 let from = &stages[origin.stage];
-                let tables = desk.tables[origin.stage].as_ref();
+                let tables = state.tables[origin.stage].as_ref();
                 let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
-                Ok((from.id.clone(), store.load(desk::table(tables, from, origin.port)?)?))
+                Ok((from.id.clone(), store.load(run_state::table(tables, from, origin.port)?)?))
             });
             frames.collect()
         })

@@ -1,6 +1,5 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
-mod desk;
 mod execute;
 mod history;
 mod identity;
@@ -13,6 +12,7 @@ pub mod plan;
 mod preview;
 mod reason;
 mod run;
+mod run_state;
 mod schema;
 mod select;
 mod services;

@@ -20,14 +20,14 @@ use nalgebra::Vector3;
 const PAYLOADS: usize = 4;
 
 /// An effect at a place.
-type Name = (String, String);
+type EffectAtPlace = (String, String);
 
 /// A finding and a rival, and what tells them apart.
 pub struct Apart<'a> {
     request: &'a PoseRequest,
     run: String,
     finding: FindingRow,
-    rival: Name,
+    rival: EffectAtPlace,
     /// None where the two are one by an identity.
     form: Option<Form>,
     robot: RobotDescription,
@@ -137,7 +137,7 @@ fn name(text: &str) -> Result<(&str, Option<&str>)> {
 }
 
 /// The finding that is meant, and what to tell it from.
-fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, Name)> {
+fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, EffectAtPlace)> {
     let list: Vec<String> = findings.0.iter().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place)).collect();
     if list.is_empty() {
         return Err(Error::spec(place, "found nothing that could be told from something else"));

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// What was proposed and what for; made once, shown as text, JSON or file.
-pub struct Work<'a> {
+pub struct PoseProposal<'a> {
     pub(super) request: &'a PoseRequest,
     pub(super) robot: RobotDescription,
     pub(super) ranges: Vec<[f64; 2]>,
@@ -41,7 +41,12 @@ pub struct RobotFiles<'a> {
 }
 
 /// Proposes poses; `pair` are two effects to separate, or none, `against` a recording to compare with.
-pub fn proposal<'a>(request: &'a PoseRequest, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
+pub fn proposal<'a>(
+    request: &'a PoseRequest,
+    robot: &RobotFiles,
+    pair: &[String],
+    against: Option<&Path>,
+) -> Result<PoseProposal<'a>> {
     let imported = robot_file(robot.file, robot.urdf)?;
     let place = robot.file.display().to_string();
     let site = site(request, &imported, &place, None)?;
@@ -66,7 +71,18 @@ pub fn proposal<'a>(request: &'a PoseRequest, robot: &RobotFiles, pair: &[String
     let warnings = recording.and_then(|(_, warning)| warning).into_iter().collect();
     let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
     let ranges = site.ranges;
-    Ok(Work { request, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded, warnings })
+    Ok(PoseProposal {
+        request,
+        robot: imported,
+        ranges,
+        effects,
+        left_out,
+        parameters,
+        sigma: shown,
+        proposal,
+        recorded,
+        warnings,
+    })
 }
 
 type NamedEffects = (Vec<&'static str>, Vec<(&'static str, String)>);

@@ -73,7 +73,7 @@ pub struct Program<'p> {
 
 /// The answer to one literal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solved {
+pub struct SolvedLiteral {
     /// The corrected numbers, in the units and the order of [`Literal::values`].
     pub values: Vec<f64>,
     /// What is to be known of it; empty if nothing.
@@ -150,7 +150,7 @@ impl<'p> Program<'p> {
     /// The program with every literal's numbers replaced by its answer's; fails where one has none, with all the reasons.
     ///
     /// A number that is, to the decimals written, what it was stays as it was written.
-    pub fn rewritten(&self, answers: Vec<Result<Solved, String>>) -> Result<Rewritten, ProgramRefusal> {
+    pub fn rewritten(&self, answers: Vec<Result<SolvedLiteral, String>>) -> Result<Rewritten, ProgramRefusal> {
         assert_eq!(answers.len(), self.literals.len(), "one answer a literal");
         let (mut faults, mut remarks) = (Vec::new(), Vec::new());
         let mut bytes = Vec::with_capacity(self.bytes.len() + 16 * answers.len());

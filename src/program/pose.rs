@@ -3,17 +3,17 @@
 //! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::{Literal, Solved, TargetKind};
+use super::{Literal, SolvedLiteral, TargetKind};
 use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, turns};
 use crate::robot::RobotModel;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Every literal corrected, in their order; an error says why there is no command.
-pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<Solved, String>> {
+pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
     let answers = corrector.batch(literals.iter().map(target).collect());
     let solved = |(literal, answer): (&Literal, &CorrectedCommand)| match &answer.q {
-        Some(q) => Ok(Solved { values: values(literal, robot, q), remark: answer.remark.clone() }),
+        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, q), remark: answer.remark.clone() }),
         None => Err(answer.remark.clone()),
     };
     literals.iter().zip(&answers).map(solved).collect()

@@ -86,7 +86,7 @@ impl Stage for Identify {
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in asked.filter_map(|cause| cause.whole(&setting)) {
-            if effect.name() == AnchorShift::NAME && robot.gauging().anchors.is_empty() {
+            if effect.name() == AnchorShift::NAME && robot.setup().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
@@ -144,7 +144,7 @@ const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offse
 
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
-    let anchored = !model.robot.gauging().anchors.is_empty();
+    let anchored = !model.robot.setup().anchors.is_empty();
     let mut needed = GEOMETRY.iter().filter(|name| **name != AnchorShift::NAME || anchored);
     let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model

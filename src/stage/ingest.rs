@@ -116,7 +116,7 @@ impl Stage for Ingest {
         let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
         verdict::judge(self, &scans, &fates, &arm, context)?;
         let names = names(&scans);
-        let decided = write::Decided { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
+        let decided = write::JoinDecisions { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
         let (recording, rejected) = write::write(&decided, context)?;
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context) })
     }
@@ -135,7 +135,7 @@ fn names(scans: &[scan::Scan]) -> Vec<String> {
     numbered.collect()
 }
 
-fn intake(decided: &write::Decided, context: &Context) -> Intake {
+fn intake(decided: &write::JoinDecisions, context: &Context) -> Intake {
     let mut rows: Vec<IntakeRow> = Vec::new();
     for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
         let accepted = verdict::accepted(scan, fate);

@@ -116,13 +116,13 @@ impl Stage for Validate {
     }
 }
 
-type Groups<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;
+type RowsByStepAndSet<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;
 
 /// Rows by (step, set, held out), in that order; fails where a table tells of several steps.
 ///
 /// Rows that did not measure a whole point are a set of their own, e.g. `fit (distance)`: their errors are of another kind.
-fn groups(step: &Labelled<Prediction>) -> Result<Groups<'_>> {
-    let mut groups = Groups::new();
+fn groups(step: &Labelled<Prediction>) -> Result<RowsByStepAndSet<'_>> {
+    let mut groups = RowsByStepAndSet::new();
     for row in &step.table.0 {
         let set = match &row.measured {
             Some(measured) => Cow::Owned(format!("{} ({measured})", row.set)),

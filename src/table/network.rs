@@ -5,7 +5,7 @@ mod reading;
 
 use crate::estimate::network::arm::ScrewArm;
 use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
-use crate::estimate::network::correction::{Body, Correction, Dress, Feature, Map};
+use crate::estimate::network::correction::{Body, Correction, Feature, Map, NetworkScaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::region::Region;
 use crate::estimate::network::{Activation, LayerSizes};
@@ -100,7 +100,7 @@ impl Network {
         }
     }
 
-    fn dress(&mut self, dress: &Dress, prismatic: &[bool]) {
+    fn dress(&mut self, dress: &NetworkScaling, prismatic: &[bool]) {
         for (i, (feature, scaling)) in dress.features.iter().zip(&dress.inputs).enumerate() {
             let unit = feature_unit(*feature, prismatic);
             self.put(0, map_name(feature.map), [0, i + 1, feature.source + 1], 1.0);

@@ -31,7 +31,7 @@ crate::table::rows! { "parameters",
 use crate::effect::{AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
-use crate::robot::{self, Gauging, RobotModel, Target};
+use crate::robot::{self, MeasurementSetup, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -208,7 +208,7 @@ impl Parameters {
                 Some(_) => Load::GravityTorque,
                 None => load,
             };
-        let robot = self.gauging(robot);
+        let robot = self.with_setup(robot);
         let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
@@ -216,7 +216,7 @@ impl Parameters {
         let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
-        let targets = !robot.gauging().targets.is_empty();
+        let targets = !robot.setup().targets.is_empty();
         // Where these stand is their start: nothing is left to correct.
         let stands = |row: &ParameterRow| match row.effect.as_str() {
             BaseFrame::NAME | AnchorShift::NAME => true,
@@ -236,11 +236,11 @@ impl Parameters {
     }
 
     /// The robot with the targets and anchors that the parameters place.
-    fn gauging(&self, robot: RobotModel) -> RobotModel {
+    fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
         let anchors =
             self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
-        let mut gauging = Gauging { targets: Vec::new(), anchors: anchors.collect() };
+        let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
             self.0.iter().any(|row| row.name == rx)
@@ -252,9 +252,9 @@ impl Parameters {
                 oriented: turned(&name),
                 name,
             };
-            gauging.targets = targets.into_iter().map(target).collect();
+            setup.targets = targets.into_iter().map(target).collect();
         }
-        robot.measured_by(gauging)
+        robot.measured_by(setup)
     }
 
     /// Named things of an effect with their translation and rotation vector.

@@ -51,7 +51,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     let mut joints: Vec<(usize, usize, Unit)> =
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
-    let table = Sheet { layout, columns: &columns, joints, delimiter };
+    let table = TextTable { layout, columns: &columns, joints, delimiter };
     put(output, &format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())))?;
     let mut block = Block::default();
     loop {
@@ -179,7 +179,7 @@ struct Spans {
     comma: bool,
 }
 
-struct Sheet<'a> {
+struct TextTable<'a> {
     layout: &'a Layout<'a>,
     columns: &'a TargetColumns,
     /// Column, joint, unit; in the order of the columns.
@@ -187,7 +187,7 @@ struct Sheet<'a> {
     delimiter: char,
 }
 
-impl Sheet<'_> {
+impl TextTable<'_> {
     /// Header of what is appended, with its delimiters.
     fn appended_names(&self, sigma: bool) -> String {
         let mut names = Vec::new();

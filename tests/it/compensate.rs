@@ -3,7 +3,7 @@
 mod standing;
 mod true_error;
 
-use calib::compensate::{Chain, Nominal, SETTLED, Wanted, inverse, least_change};
+use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
 use nalgebra::Vector3;
@@ -15,7 +15,7 @@ use std::sync::OnceLock;
 fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
     let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
     let q = [0.3, 0.2, -0.4, 0.5, 0.8, -1.0];
-    let wanted = Wanted { pose: robot.forward(&q), oriented: true };
+    let wanted = ToolGoal { pose: robot.forward(&q), oriented: true };
     let found = inverse(&robot, &wanted, &[0.0; 6]);
     let placed = Nominal::new(&robot).place(&found);
     assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
@@ -30,7 +30,7 @@ fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
 fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
     let robot = RobotModel::new(Kind::Seven7r.description([60.0, 0.0, 20.0]));
     let home = [0.4, 0.7, -0.3, 1.0, 0.2, 0.6, -0.5];
-    let mut wanted = Wanted { pose: robot.forward(&home), oriented: false };
+    let mut wanted = ToolGoal { pose: robot.forward(&home), oriented: false };
     wanted.pose.translation += Vector3::new(3e-3, -2e-3, 4e-3);
     let mut chain = Nominal::new(&robot);
     let found = least_change(&mut chain, &wanted, &home, &home);

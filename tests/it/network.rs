@@ -1,7 +1,7 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
 use calib::estimate::network::arm::ScrewArm;
-use calib::estimate::network::correction::{Body, Dress, Networks, Scaling, features};
+use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
 use calib::estimate::network::region::Region;
 use calib::estimate::network::rivals::{CorrectionContest, RivalComparison, learn};
@@ -326,8 +326,11 @@ fn a_correction_comes_back_from_its_table() {
     let shape = LayerSizes { inputs: features.len(), hidden: 4, outputs: 3, activation: Activation::Tanh };
     let mut number = |from: f64, to: f64| rng.random_range(from..to);
     let mut scaling = || Scaling { mean: number(-1.0, 1.0), scale: number(0.1, 2.0) };
-    let dress =
-        Dress { inputs: features.iter().map(|_| scaling()).collect(), outputs: [scaling(), scaling(), scaling()], features };
+    let dress = NetworkScaling {
+        inputs: features.iter().map(|_| scaling()).collect(),
+        outputs: [scaling(), scaling(), scaling()],
+        features,
+    };
     assert_eq!(dress.features.len(), 6);
     let members = (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect();
     let sources: Vec<Vec<f64>> = (0..40).map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect()).collect();

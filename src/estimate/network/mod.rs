@@ -22,8 +22,8 @@ pub mod training;
 
 pub use activation::Activation;
 pub use arm::ScrewArm;
-pub use correction::{Applied, Body, Correction, Feature, Map};
+pub use correction::{AppliedCorrection, Body, Correction, Feature, Map};
 pub use perceptron::{LayerSizes, OUTPUTS};
-pub use rivals::{Judged, Rival, compare};
+pub use rivals::{JudgedRival, Rival, compare};
 pub use samples::TrainingSamples;
-pub use training::{Course, Phase, Recipe, TrainingStart, train};
+pub use training::{Phase, Recipe, TrainingStart, TrainingStep, train};

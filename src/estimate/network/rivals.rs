@@ -10,7 +10,7 @@ use super::linear::Linear;
 use super::process::Process;
 use super::region::Region;
 use super::samples::TrainingSamples;
-use super::training::{Course, Recipe, TrainingStart, dressed, train};
+use super::training::{Recipe, TrainingStart, TrainingStep, dressed, train};
 use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
@@ -95,7 +95,7 @@ pub struct CorrectionContest<'a> {
 
 /// What the cross-validation says of one rival.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judged {
+pub struct JudgedRival {
     /// `None`: no correction.
     pub rival: Option<Rival>,
     /// Length of what is left of each row, m.
@@ -110,7 +110,7 @@ pub struct Judged {
     pub settings: Option<(usize, f64)>,
 }
 
-impl Judged {
+impl JudgedRival {
     pub fn mean(&self) -> f64 {
         mean(&self.left)
     }
@@ -129,7 +129,7 @@ impl Judged {
 /// Everything learnt from the samples: the rivals as judged, and the number of the one to keep (0: no correction).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RivalComparison {
-    pub judged: Vec<Judged>,
+    pub judged: Vec<JudgedRival>,
     pub chosen: usize,
 }
 
@@ -186,7 +186,8 @@ pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: 
         rivals.iter().flat_map(each).collect()
     };
     let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
-    let nothing = Judged { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
+    let nothing =
+        JudgedRival { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
     let mut judged = vec![nothing];
     let trial = Recipe { jobs: 1, ..contest.trial.clone() };
     let mut entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
@@ -209,7 +210,7 @@ pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: 
     for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
         let settings = rival.start().is_some().then_some((recipe.hidden, recipe.decay));
         if let Some(row) = together(folds, &before, &poses) {
-            judged.push(Judged { rival: Some(*rival), settings, ..row });
+            judged.push(JudgedRival { rival: Some(*rival), settings, ..row });
         }
     }
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
@@ -221,9 +222,9 @@ pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: 
 pub fn learn(
     samples: &TrainingSamples,
     contest: &CorrectionContest,
-    judged: &Judged,
+    judged: &JudgedRival,
     observe: impl FnMut(&Generation),
-) -> Option<(Correction, Vec<Course>)> {
+) -> Option<(Correction, Vec<TrainingStep>)> {
     let (hidden, decay) = judged.settings.unwrap_or((contest.recipe.hidden, contest.recipe.decay));
     let (mut correction, course) =
         fit(judged.rival?, samples, contest, &Recipe { hidden, decay, ..contest.recipe.clone() }, observe)?;
@@ -237,7 +238,7 @@ fn fit(
     contest: &CorrectionContest,
     recipe: &Recipe,
     observe: impl FnMut(&Generation),
-) -> Option<(Correction, Vec<Course>)> {
+) -> Option<(Correction, Vec<TrainingStep>)> {
     let region = || Region::of(&samples.sources, recipe.joints);
     let body = match rival {
         Rival::Network(start) => return Some(train(samples, &Recipe { start, through: None, ..recipe.clone() }, observe)),
@@ -275,7 +276,7 @@ impl Task {
 }
 
 /// All folds of one rival; `None` where one could not be fitted.
-fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<Judged> {
+fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<JudgedRival> {
     let mut left = before.to_vec();
     for fold in folds {
         for (row, value) in &fold.as_ref()?.left {
@@ -291,7 +292,7 @@ fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<J
     let (count, rows) = (off.len() as f64, gains.len() as f64);
     let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0)).sqrt() / rows;
     let (numbers, evaluations) = (first.numbers, first.evaluations);
-    Some(Judged { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
+    Some(JudgedRival { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
 }
 
 fn length(v: [f64; 3]) -> f64 {

@@ -4,7 +4,7 @@
 
 use super::activation::Activation;
 use super::arm::ScrewArm;
-use super::correction::{Body, Correction, Dress, Feature, JointMotion, Networks, Scaling};
+use super::correction::{Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling};
 use super::descent::{DescentIteration, descend};
 use super::loss::{Batch, Loss, LossBuffers};
 use super::perceptron::{LayerSizes, OUTPUTS};
@@ -70,7 +70,7 @@ pub enum Phase {
 
 /// One generation or iteration of the training.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct TrainingStep {
     pub phase: Phase,
     /// From 1; the swarm serves all members and has 0.
     pub member: usize,
@@ -83,7 +83,7 @@ pub struct Course {
 }
 
 /// Trains on all samples; `observe` sees each generation of the swarm. Panics without samples or features.
-pub fn train(samples: &TrainingSamples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<Course>) {
+pub fn train(samples: &TrainingSamples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<TrainingStep>) {
     assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
     let prepared = Prepared::new(samples, recipe);
     let (starts, mut course) = prepared.starts(observe);
@@ -105,15 +105,15 @@ struct Prepared<'a> {
     joints: Option<JointMotion>,
     /// What each output does to the point at each row, in units of the scaled targets; empty without joints.
     ways: Vec<Vec<[f64; OUTPUTS]>>,
-    dress: Dress,
+    dress: NetworkScaling,
     region: Region,
 }
 
 /// Standardised inputs and outputs with their scaling.
-pub(super) fn dressed(samples: &TrainingSamples, features: &[Feature]) -> (Dress, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
+pub(super) fn dressed(samples: &TrainingSamples, features: &[Feature]) -> (NetworkScaling, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
     let inputs = features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
     let outputs: [Scaling; OUTPUTS] = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
-    let dress = Dress { features: features.to_vec(), inputs, outputs };
+    let dress = NetworkScaling { features: features.to_vec(), inputs, outputs };
     let x = samples.sources.iter().map(|row| dress.scaled(row)).collect();
     let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k]))).collect();
     (dress, x, y)
@@ -157,7 +157,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Where members start, best first, and the course of the swarm; chance has none.
-    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<Course>) {
+    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let mut rng = self.rng(0);
         let bounds = SearchBox::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
         match self.recipe.start {
@@ -172,12 +172,12 @@ impl<'a> Prepared<'a> {
         bounds: &SearchBox,
         rng: &mut ChaCha8Rng,
         mut observe: impl FnMut(&Generation),
-    ) -> (Vec<Vec<f64>>, Vec<Course>) {
+    ) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let rows = if self.y.len() > SWARM_ROWS { draw(rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
         let batch = self.batch(&rows);
         let loss = Loss { shape: self.shape, batch: &batch, decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64 };
         let mut scratch = LossBuffers::new(self.shape);
-        let mut course: Vec<Course> = Vec::new();
+        let mut course: Vec<TrainingStep> = Vec::new();
         // A lone beetle knows one place: each member has a search of its own, at a share of the cost.
         let searches = if algorithm == Algorithm::Bas { self.recipe.members } else { 1 };
         let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations) / searches as u64;
@@ -199,7 +199,7 @@ impl<'a> Prepared<'a> {
                     Some(last) if last.best == generation.best => last.train_rms,
                     _ => self.rms(loss.mean_squares(best, &mut scratch)),
                 };
-                course.push(Course {
+                course.push(TrainingStep {
                     phase: Phase::Swarm,
                     member: 0,
                     index: generation.index,
@@ -215,7 +215,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Trains member `m` (from 0) from `start`.
-    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<Course>) {
+    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<TrainingStep>) {
         let mut rng = self.rng(1 + m as u64);
         let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
         let (kept_back, rest) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
@@ -231,7 +231,7 @@ impl<'a> Prepared<'a> {
             start,
             self.recipe.iterations,
         );
-        let course = |i: DescentIteration| Course {
+        let course = |i: DescentIteration| TrainingStep {
             phase: Phase::Gradient,
             member: m + 1,
             index: i.index,

@@ -1,6 +1,6 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
-use super::super::token::{ProgramText, Sort, Token};
+use super::super::token::{ProgramText, Token, TokenKind};
 use super::super::{Gathered, Literal, TargetKind, quoted};
 use super::line::opens;
 use std::ops::Range;
@@ -62,7 +62,7 @@ impl<'t> Aggregate<'t> {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, rest @ ..] = inner
-            && name.sort == Sort::Word
+            && name.sort == TokenKind::Word
             && colon.is(b':')
         {
             (prefix, inner) = (Some(source.upper(name)), rest);
@@ -87,7 +87,7 @@ impl<'t> Aggregate<'t> {
         self.fields
             .iter()
             .filter_map(|field| field.first())
-            .filter(|token| token.sort == Sort::Word)
+            .filter(|token| token.sort == TokenKind::Word)
             .map(|token| self.source.upper(token))
     }
 
@@ -169,7 +169,7 @@ impl<'t> Aggregate<'t> {
     /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.
     fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Gathered) -> Option<(String, f64, Range<usize>)> {
         let bytes = self.source.bytes;
-        if first.sort != Sort::Word {
+        if first.sort != TokenKind::Word {
             found.fault(first.span.start, format!("{} has no name", quoted(bytes, self.source.over(field, 0))));
             return None;
         }
@@ -187,7 +187,7 @@ impl<'t> Aggregate<'t> {
         let span = self.value(field);
         // `T 'B101010'`: a bit pattern.
         if STATUS.contains(&name.as_str())
-            && matches!(value, [only] if only.sort == Sort::Text && bytes[only.span.start] == b'\'')
+            && matches!(value, [only] if only.sort == TokenKind::Text && bytes[only.span.start] == b'\'')
         {
             return Some((name, 0.0, span));
         }

@@ -9,7 +9,7 @@ mod aggregate;
 mod frames;
 mod line;
 
-use super::token::{ProgramText, Sort, Token, tokens};
+use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
@@ -36,7 +36,7 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
     let mut found = Gathered::default();
     let source = ProgramText { bytes, language: Language::Krl };
     let tokens = tokens(source, &mut found);
-    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == Sort::LineEnd).filter(|line| !line.is_empty()).collect();
+    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()).collect();
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for line in &lines {
         if let Some((kind, names)) = declared(source, line) {
@@ -179,8 +179,8 @@ impl Reader<'_> {
         let mut depth = 0;
         line.iter().filter(|_| !label && !heading).find_map(|token| {
             match token.sort {
-                Sort::Sign(b'{') => depth += 1,
-                Sort::Sign(b'}') => depth -= 1,
+                TokenKind::Sign(b'{') => depth += 1,
+                TokenKind::Sign(b'}') => depth -= 1,
                 _ => {}
             }
             (depth == 0 && token.is(b':')).then_some(token.span.start)

@@ -7,7 +7,7 @@
 
 mod list;
 
-use super::token::{ProgramText, Sort, Token, tokens};
+use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
 use list::{List, Want};
 use std::collections::BTreeMap;
@@ -91,7 +91,7 @@ fn statements<'t>(source: ProgramText, tokens: &'t [Token], found: &mut Gathered
             heading(source, &tokens[k..]).map(|length| (k + length, k + length))
         };
         let ends = token.is(b';') || token.is(b':') || source.is_word(token, &["THEN", "DO"]);
-        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == Sort::Pair(b':')) {
+        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == TokenKind::Pair(b':')) {
             let text = quoted(source.bytes, token.span.clone());
             found.fault(token.span.start, format!("`;` is missing before {text}"));
         }
@@ -135,10 +135,10 @@ struct Declaration<'t> {
 fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declaration<'t>> {
     let scoped = statement.iter().take_while(|token| source.is_word(token, &["LOCAL", "TASK"])).count();
     let [storage, kind, name, rest @ ..] = &statement[scoped..] else { return None };
-    if !source.is_word(storage, &STORAGE) || kind.sort != Sort::Word || name.sort != Sort::Word {
+    if !source.is_word(storage, &STORAGE) || kind.sort != TokenKind::Word || name.sort != TokenKind::Word {
         return None;
     }
-    let assign = rest.iter().position(|token| token.sort == Sort::Pair(b':'));
+    let assign = rest.iter().position(|token| token.sort == TokenKind::Pair(b':'));
     let dimensions = rest.iter().take_while(|token| !token.is(b'}')).count();
     let named =
         if rest.first().is_some_and(|token| token.is(b'{')) { rest.get(dimensions + 1..).unwrap_or_default() } else { rest };
@@ -172,7 +172,7 @@ impl Reader<'_> {
             self.found.fault(storage.span.start, "a declaration that is not understood; expected a type and a name");
             return;
         }
-        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {
+        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == TokenKind::Pair(b':')) {
             Some(k) if k > 0 && !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => {
                 self.assignment(statement, k)
             }
@@ -362,11 +362,11 @@ impl Reader<'_> {
 fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
     let mut depth = 0;
     tokens.iter().map(move |token| match token.sort {
-        Sort::Sign(b'[' | b'(' | b'{') => {
+        TokenKind::Sign(b'[' | b'(' | b'{') => {
             depth += 1;
             (token, depth - 1)
         }
-        Sort::Sign(b']' | b')' | b'}') => {
+        TokenKind::Sign(b']' | b')' | b'}') => {
             depth -= 1;
             (token, depth)
         }

@@ -17,7 +17,7 @@ const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
 const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
 
 #[derive(Clone, Copy)]
-struct Units {
+struct FileUnits {
     length: Unit,
     angle: Unit,
 }
@@ -51,16 +51,16 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
     }
 }
 
-fn units(value: DocumentNode) -> Units {
+fn units(value: DocumentNode) -> FileUnits {
     let unit = |key: &str, quantity: Quantity, fallback: Unit| {
         let allowed: Vec<_> = (Unit::symbols(quantity).into_iter()).filter_map(|s| Some((s, Unit::parse(s)?))).collect();
         value.get(key).choice(&allowed).unwrap_or(fallback)
     };
-    Units { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
+    FileUnits { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
 }
 
 /// The one kinematic format of the file, or none after a fault.
-fn chain(value: DocumentNode, units: Units, urdf: Option<RobotFileText>, faults: &Faults) -> Result<Option<FrameChain>> {
+fn chain(value: DocumentNode, units: FileUnits, urdf: Option<RobotFileText>, faults: &Faults) -> Result<Option<FrameChain>> {
     let mut given = FORMATS.into_iter().filter(|format| value.get(format).given().is_some());
     let chain = match (given.next(), given.next()) {
         (Some(_), Some(_)) => {
@@ -98,7 +98,7 @@ fn chain(value: DocumentNode, units: Units, urdf: Option<RobotFileText>, faults:
     Ok(Some(chain))
 }
 
-fn describe(root: &DocumentNode, chain: FrameChain, units: Units) -> RobotDescription {
+fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDescription {
     let tool = tool(root.get("tool"), &chain, units);
     let name = root.get("name").given().map_or_else(|| "robot".into(), |name| name.text());
     let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
@@ -145,7 +145,7 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: Units) -> RobotDescri
 }
 
 /// The tool frame at the zero pose in the base frame: the measured point, and the orientation of the tool's axes.
-fn tool(value: DocumentNode, chain: &FrameChain, units: Units) -> Isometry3<f64> {
+fn tool(value: DocumentNode, chain: &FrameChain, units: FileUnits) -> Isometry3<f64> {
     let on_link = chain.joints.iter().any(|joint| joint.frame.is_some());
     if value.given().is_none() && on_link {
         return chain.tip;
@@ -182,7 +182,7 @@ fn orientation(value: &DocumentNode, angle: Unit) -> UnitQuaternion<f64> {
 }
 
 /// What the file says of a joint beyond its screw.
-fn drive(joint: &mut JointDescription, value: DocumentNode, units: Units) {
+fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
     if value.given().is_none() {
         return;
     }
@@ -231,7 +231,7 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
     }
 }
 
-fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
+fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> (f64, Point3<f64>) {
     let value = value.map(&["mass", "centre", "frame"]);
     let centre = Point3::from(value.get("centre").sized_vector::<3>(Bound::Length, units.length));
     let of_link = value.get("frame");
@@ -267,7 +267,7 @@ fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
 }
 
 /// Rated mass, kg, and its centre, m, zero pose, base frame.
-fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f64>) {
+fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> (f64, Point3<f64>) {
     let point = Point3::from(tool.translation.vector);
     if value.given().is_none() {
         return (0.0, point);

@@ -69,7 +69,7 @@ impl Binding {
 }
 
 /// The names of a file's columns, if it has a header, else how many there are.
-pub(super) struct Head {
+pub(super) struct FileHeader {
     pub label: String,
     /// Line of the header, or of the first data row.
     pub line: u64,
@@ -78,13 +78,13 @@ pub(super) struct Head {
 }
 
 struct Binder<'a> {
-    head: &'a Head,
+    head: &'a FileHeader,
     binding: Binding,
     faults: Vec<Fault>,
 }
 
 /// Resolves every mapped column, or reports all that are missing.
-pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &RobotJoints) -> Result<Binding> {
+pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) -> Result<Binding> {
     let binding = Binding {
         width: head.width,
         id: None,
@@ -161,7 +161,7 @@ fn unit(symbol: Option<&str>) -> Result<Unit> {
 
 impl Binder<'_> {
     fn fault(&mut self, message: String) {
-        let Head { label, line, .. } = self.head;
+        let FileHeader { label, line, .. } = self.head;
         // Column names of a Parquet file stand on no line.
         let place = if *line == 0 { label.clone() } else { format!("{label}:{line}") };
         self.faults.push(Fault::new(place, message));

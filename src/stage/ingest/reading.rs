@@ -1,7 +1,7 @@
 //! One reading of one file from top to bottom, row by row.
 
 use super::arm::RobotJoints;
-use super::bind::{Head, bind};
+use super::bind::{FileHeader, bind};
 use super::encoding;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
 use super::lines::{RecordFields, TextReader, failed};
@@ -80,7 +80,7 @@ impl<'a> OpenedFile<'a> {
             };
             return Err(Error::data(label, message));
         }
-        let mut head = Head { label: label.clone(), line: record.line, width: record.len(), names: None };
+        let mut head = FileHeader { label: label.clone(), line: record.line, width: record.len(), names: None };
         if header {
             let name = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
             let mut names: Vec<String> = (0..record.len()).map(name).collect();
@@ -132,12 +132,12 @@ pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: Lim
 }
 
 /// Counts units of work up to the next sign of progress.
-pub(super) struct Pace<'a> {
+pub(super) struct ProgressCounter<'a> {
     context: &'a Context<'a>,
     rows: u64,
 }
 
-impl<'a> Pace<'a> {
+impl<'a> ProgressCounter<'a> {
     pub(super) fn new(context: &'a Context<'a>) -> Self {
         Self { context, rows: 0 }
     }

@@ -7,7 +7,7 @@ use super::Ingest;
 use super::arm::RobotJoints;
 use super::layout::{FileLayout, Join};
 use super::motion::{JointSamples, Track};
-use super::reading::{OpenedFile, Pace};
+use super::reading::{OpenedFile, ProgressCounter};
 use super::row::{Reason, RecordedRow, RowRefusal};
 use crate::error::{Error, Result};
 use crate::stage::Context;
@@ -46,12 +46,12 @@ pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal)
 
 /// Rows that say something odd about the whole file, with the first of them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Odd {
+pub(super) struct FileOddities {
     pub rows: u64,
     pub first: Option<(u64, usize, f64)>,
 }
 
-impl Odd {
+impl FileOddities {
     fn count(&mut self, line: u64, joint: usize, value: f64) {
         self.rows += 1;
         self.first.get_or_insert((line, joint, value));
@@ -60,7 +60,7 @@ impl Odd {
 
 /// The numbers and texts of the second file of a join, by data row.
 #[derive(Default)]
-pub(super) struct Packed {
+pub(super) struct PackedRows {
     pub slots: Vec<usize>,
     pub values: Vec<f64>,
     pub ids: Vec<String>,
@@ -68,7 +68,7 @@ pub(super) struct Packed {
     pub texts: Vec<Option<Vec<String>>>,
 }
 
-impl Packed {
+impl PackedRows {
     fn push(&mut self, row: &RecordedRow, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
         if named {
@@ -93,11 +93,11 @@ pub(super) struct Scan {
     pub times: Vec<(f64, u32)>,
     /// Usable data rows, for a join.
     pub usable: Vec<bool>,
-    pub packed: Option<Packed>,
+    pub packed: Option<PackedRows>,
     pub slots: Vec<usize>,
     /// Revolute joints beyond one and a half turns.
-    pub turns: Odd,
-    pub beyond: Odd,
+    pub turns: FileOddities,
+    pub beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
     pub largest: f64,
     /// Where the arm moves: of the file with the joints.
@@ -126,7 +126,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
     let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
-    let packed = (joined && index > 0).then(|| Packed { slots: slots.clone(), texts: texts(), ..Packed::default() });
+    let packed = (joined && index > 0).then(|| PackedRows { slots: slots.clone(), texts: texts(), ..PackedRows::default() });
     let mut scan = Scan {
         label,
         lines: 0,
@@ -138,8 +138,8 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         usable: Vec::new(),
         packed,
         slots,
-        turns: Odd::default(),
-        beyond: Odd::default(),
+        turns: FileOddities::default(),
+        beyond: FileOddities::default(),
         largest: 0.0,
         track: None,
     };
@@ -148,7 +148,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
     let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    let mut pace = Pace::new(context);
+    let mut pace = ProgressCounter::new(context);
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
         if let Some((joint, angle)) = row.turned {

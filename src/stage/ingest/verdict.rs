@@ -4,7 +4,7 @@ use super::Ingest;
 use super::arm::RobotJoints;
 use super::columns::Columns;
 use super::layout::{Join, LimitPolicy};
-use super::pair::Fate;
+use super::pair::FileDecision;
 use super::row::Reason;
 use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
@@ -14,7 +14,7 @@ use crate::stage::Context;
 const SMALL_IN_DEGREES: f64 = 6.5;
 
 /// Rows of a file that become part of the recording.
-pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
+pub(super) fn accepted(scan: &Scan, fate: &FileDecision) -> u64 {
     if fate.partners.is_empty() {
         return scan.used() - fate.twins.len() as u64;
     }
@@ -22,7 +22,13 @@ pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
 }
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
-pub(super) fn judge(settings: &Ingest, scans: &[Scan], fates: &[Fate], arm: &RobotJoints, context: &Context) -> Result<()> {
+pub(super) fn judge(
+    settings: &Ingest,
+    scans: &[Scan],
+    fates: &[FileDecision],
+    arm: &RobotJoints,
+    context: &Context,
+) -> Result<()> {
     let mut faults = unequal(settings, scans);
     for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
         let angles = implausible(scan, &layout.columns, settings.limits);
@@ -92,7 +98,7 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy) -> Option<Fa
     None
 }
 
-fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: usize) -> Option<Fault> {
+fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], index: usize) -> Option<Fault> {
     let (scan, fate) = (scans.get(index)?, fates.get(index)?);
     let accepted = accepted(scan, fate);
     let rejected = scan.read - accepted;

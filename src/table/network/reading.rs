@@ -5,7 +5,7 @@ use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map
 use crate::error::{Error, Result, counted};
 use crate::estimate::network::arm::{Hinge, ScrewArm};
 use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
-use crate::estimate::network::correction::{Body, Correction, Dress, Feature, JointMotion, Map, Networks, Scaling};
+use crate::estimate::network::correction::{Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
 use crate::estimate::network::region::{Jointly, Region, Valid};
@@ -62,7 +62,7 @@ fn region(numbers: &Numbers, prismatic: &[bool]) -> Result<Region> {
     Ok(Region { ranges, jointly })
 }
 
-fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Dress> {
+fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<NetworkScaling> {
     let mut features = BTreeMap::new();
     for map in [Map::Value, Map::Sin, Map::Cos] {
         for ((_, to, from), _) in numbers.all(map_name(map)) {
@@ -80,7 +80,7 @@ fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Dress>
     let inputs = features.iter().enumerate().map(|(i, f)| scaling("input", i + 1, feature_unit(*f, prismatic)));
     let inputs = inputs.collect::<Result<Vec<Scaling>>>()?;
     let outputs = [scaling("output", 1, MILLI)?, scaling("output", 2, MILLI)?, scaling("output", 3, MILLI)?];
-    Ok(Dress { features, inputs, outputs })
+    Ok(NetworkScaling { features, inputs, outputs })
 }
 
 fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {

@@ -1,7 +1,7 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use crate::desk::{Desk, table};
-use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, SETTLED, Wanted, least_change, one_step};
+use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, SETTLED, ToolGoal, least_change, one_step};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
@@ -155,7 +155,7 @@ impl Cell {
         &self,
         arm: &Identified,
         targets: &[Point],
-        solve: impl Fn(&mut calib::compensate::Reach, &Wanted, &[f64]) -> Vec<f64>,
+        solve: impl Fn(&mut calib::compensate::Reach, &ToolGoal, &[f64]) -> Vec<f64>,
     ) -> f64 {
         let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
         let robot = RobotModel::new(self.robot.clone());
@@ -169,7 +169,7 @@ impl Cell {
                 direction: target.direction.clone(),
                 current: None,
             });
-            let wanted = Wanted { pose: robot.forward(&target.q), oriented: false };
+            let wanted = ToolGoal { pose: robot.forward(&target.q), oriented: false };
             commands.push(Point { q: solve(&mut reach, &wanted, &target.q), ..target.clone() });
         }
         let shots = self.measure(commands, &exact);
@@ -290,7 +290,7 @@ fn a_learned_correction_is_made_up_for() {
         let arm = Identified::new(model.clone(), correction);
         let rigid = Identified::new(model, None);
         let targets = cell.targets(&[0.0]);
-        let solve = |reach: &mut calib::compensate::Reach, wanted: &Wanted, q: &[f64]| {
+        let solve = |reach: &mut calib::compensate::Reach, wanted: &ToolGoal, q: &[f64]| {
             let found = least_change(reach, wanted, q, q);
             assert!(found.residual <= SETTLED, "round trip {} m", found.residual);
             found.q

@@ -10,7 +10,7 @@ use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-pub(super) struct Desk<'a> {
+pub(super) struct RunState<'a> {
     pub plan: &'a Plan,
     /// Tables by port, for every stage whose tables are known.
     pub tables: Vec<Option<BTreeMap<String, TableRef>>>,
@@ -23,7 +23,7 @@ pub(super) enum KeyState {
     Pending(usize),
 }
 
-impl<'a> Desk<'a> {
+impl<'a> RunState<'a> {
     pub fn new(plan: &'a Plan) -> Self {
         Self { plan, tables: vec![None; plan.stages.len()], hashes: BTreeMap::new() }
     }
