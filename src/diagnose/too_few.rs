@@ -13,9 +13,9 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let Question { robot, data, fit, .. } = *question;
     let base = align(robot, data, fit);
     let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
-    let mut model = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let (fitted, screening) = fit_screened(&mut model, data, &FitOptions { rows: fit, candidates: &candidates }, question.set);
+    let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
+    let candidates: Vec<usize> = (0..start.x.len()).collect();
+    let (model, fitted, screening) = fit_screened(&start, data, &FitOptions { rows: fit, candidates: &candidates }, question.set);
     let predicted = model.predict(data);
     let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
     let errors = ErrorLengths::of(data, &predicted, &misfit.rows);

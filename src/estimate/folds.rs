@@ -237,8 +237,7 @@ impl Near {
 /// Errors of the rows `part` under a fit to the others.
 fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usize], part: &[usize]) -> Vec<f64> {
     let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
-    let mut other = model.clone();
-    fit(&mut other, data, &FitOptions { rows: &kept, candidates });
+    let (other, _) = fit(model, data, &FitOptions { rows: &kept, candidates });
     let mut scratch = other.stack.scratch(&other.robot);
     part.iter().map(|row| row_error(&other, data, *row, &mut scratch).length).collect()
 }

@@ -180,7 +180,7 @@ impl Compare {
         self.repeatability.apply(&model, &mut data, &rows, context);
         let whole = Split::default();
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, split.unwrap_or(&whole), split.is_some());
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, split.unwrap_or(&whole), split.is_some());
         let rows = if split.is_some() { screening.kept } else { rows };
         Ok(FittedRecording { data, rows, model, fitted })
     }

@@ -98,7 +98,7 @@ impl Stage for Identify {
         let (candidates, held) = self.parameter_set().apply(&mut model, |_| true, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -197,7 +197,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
     rival.known.clone_from(&model.known);
     let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
-    let refitted = fit(&mut rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
+    let (rival, refitted) = fit(&rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
     if gain > DECISIVE {
         context.services.warn(format!(

@@ -8,7 +8,7 @@ mod told;
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::network::correction::features;
-use crate::estimate::network::rivals::{CorrectionContest, fits, learn};
+use crate::estimate::network::rivals::{RivalContest, fits, learn};
 use crate::estimate::network::{Activation, OUTPUTS, Recipe, Rival, ScrewArm, TrainingSamples, TrainingStart, compare};
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
@@ -312,13 +312,7 @@ impl Learn {
         }
     }
 
-    fn contest<'a>(
-        &self,
-        rows: usize,
-        arm: Option<&'a ScrewArm>,
-        prismatic: &'a [bool],
-        context: &Context,
-    ) -> CorrectionContest<'a> {
+    fn contest<'a>(&self, rows: usize, arm: Option<&'a ScrewArm>, prismatic: &'a [bool], context: &Context) -> RivalContest<'a> {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
         let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
@@ -338,7 +332,7 @@ impl Learn {
         }
         let twice = |k: usize| rivals[..k].contains(&rivals[k]);
         let once = (0..rivals.len()).filter(|k| !twice(*k)).map(|k| rivals[k]).collect();
-        CorrectionContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
+        RivalContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
     }
 }
 

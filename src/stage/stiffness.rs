@@ -65,7 +65,7 @@ impl Stage for Stiffness {
         let (candidates, _) = self.parameter_set().apply(&mut model, open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let specs = model.stack.specs();
         let held: Vec<usize> =
             (0..specs.len()).filter(|k| specs[*k].name.starts_with(EFFECT) && !candidates.contains(k)).collect();

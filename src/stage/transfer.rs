@@ -65,7 +65,7 @@ impl Stage for Transfer {
         let (candidates, held) = self.parameter_set().apply(&mut model, open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,

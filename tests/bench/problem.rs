@@ -106,10 +106,9 @@ impl Case {
 
     /// The whole identification: alignment, visibility, fit, uncertainty.
     pub fn fit(&self) -> (Model, Fitted) {
-        let mut model = model(&self.robot, align(&self.robot, &self.data, &self.rows), &self.effects);
+        let model = model(&self.robot, align(&self.robot, &self.data, &self.rows), &self.effects);
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        let fitted = fit(&mut model, &self.data, &FitOptions { rows: &self.rows, candidates: &candidates });
-        (model, fitted)
+        fit(&model, &self.data, &FitOptions { rows: &self.rows, candidates: &candidates })
     }
 }
 

@@ -327,9 +327,8 @@ fn table_of<T: calib::table::Table>(folder: &Path, name: &str) -> T {
 fn left(truth: &Model, other: &Model, free: &[usize], data: &Measurements) -> f64 {
     let mut data = data.clone();
     data.position = truth.predict(&data);
-    let mut fitted = other.clone();
     let rows: Vec<usize> = (0..data.rows()).collect();
-    fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
+    let (fitted, _) = fit(other, &data, &FitOptions { rows: &rows, candidates: free });
     let off = fitted.predict(&data).into_iter().zip(&data.position).zip(&data.sigma);
     off.map(|((model, point), sigma)| (model - point).component_div(sigma).norm_squared()).sum()
 }

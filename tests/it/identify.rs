@@ -95,10 +95,9 @@ fn recording_drawn(
 fn identify(data: &Measurements, description: &RobotDescription, effects: &[&str], rows: &[usize]) -> (Model, Fitted) {
     let robot = RobotModel::new(description.clone());
     let base = align(&robot, data, rows);
-    let mut model = model(&robot, base, effects);
+    let model = model(&robot, base, effects);
     let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows, candidates: &candidates })
 }
 
 fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {

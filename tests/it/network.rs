@@ -4,7 +4,7 @@ use calib::estimate::network::arm::ScrewArm;
 use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
 use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
 use calib::estimate::network::region::Region;
-use calib::estimate::network::rivals::{CorrectionContest, RivalComparison, learn};
+use calib::estimate::network::rivals::{RivalComparison, RivalContest, learn};
 use calib::estimate::network::{
     Activation, Correction, LayerSizes, Recipe, Rival, TrainingSamples, TrainingStart, compare, train,
 };
@@ -162,8 +162,8 @@ fn waves(rows: usize, arm: &ScrewArm, noise: f64, seed: u64) -> TrainingSamples 
     samples
 }
 
-fn contest<'a>(arm: Option<&'a ScrewArm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> CorrectionContest<'a> {
-    CorrectionContest {
+fn contest<'a>(arm: Option<&'a ScrewArm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> RivalContest<'a> {
+    RivalContest {
         rivals: rivals.to_vec(),
         arm,
         prismatic: &[false; 6],

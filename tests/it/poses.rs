@@ -95,8 +95,7 @@ fn scatter(robot: &RobotDescription, poses: &Measurements, free: &[usize], scale
         let mut data = poses.clone();
         data.position = truth.predict(&data);
         data.position.iter_mut().for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
-        let mut fitted = model(robot, &effects);
-        let outcome = fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
+        let (fitted, outcome) = fit(&model(robot, &effects), &data, &FitOptions { rows: &rows, candidates: free });
         for (k, parameter) in free.iter().enumerate() {
             assert!(
                 matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),

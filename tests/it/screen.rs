@@ -81,11 +81,11 @@ impl Trial {
     }
 
     fn screen(&self) -> (Model, Screening) {
-        let mut model = self.start();
-        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let start = self.start();
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
         let set: Vec<usize> = (0..self.rows()).map(|row| usize::from(row % 4 == 3)).collect();
         let rows = self.fit_rows();
-        let (_, screening) = fit_screened(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
+        let (model, _, screening) = fit_screened(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
         (model, screening)
     }
 
@@ -96,11 +96,10 @@ impl Trial {
     }
 
     fn plain(&self) -> Model {
-        let mut model = self.start();
-        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let start = self.start();
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
         let rows = self.fit_rows();
-        fit(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
-        model
+        fit(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }).0
     }
 
     /// `count` different rows.

@@ -134,13 +134,13 @@ impl<'a> Fitter<'a> {
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
     pub fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
-        let (mut model, ranges) = with_causes(from, &causes);
-        let first = ranges.first().map_or(model.x.len(), |range| range.start);
+        let (start, ranges) = with_causes(from, &causes);
+        let first = ranges.first().map_or(start.x.len(), |range| range.start);
         let all: Vec<usize> = (0..first).collect();
         let base = self.free.as_ref().unwrap_or(&all);
-        let candidates: Vec<usize> = base.iter().copied().chain(first..model.x.len()).collect();
+        let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
         let options = FitOptions { rows: self.question.fit, candidates: &candidates };
-        let (fitted, screening) = fit_screened(&mut model, &self.data, &options, self.question.set);
+        let (model, fitted, screening) = fit_screened(&start, &self.data, &options, self.question.set);
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
             ..cause

@@ -78,7 +78,7 @@ impl Rival {
 
 /// What is compared.
 #[derive(Debug, Clone)]
-pub struct CorrectionContest<'a> {
+pub struct RivalContest<'a> {
     pub rivals: Vec<Rival>,
     /// What joint curves and joint networks go through; without it they are no rivals.
     pub arm: Option<&'a ScrewArm>,
@@ -148,12 +148,12 @@ struct Done {
 }
 
 /// How many fits [`compare`] makes.
-pub fn fits(contest: &CorrectionContest) -> usize {
+pub fn fits(contest: &RivalContest) -> usize {
     let grids = KINDS.iter().filter(|kind| contest.has(**kind)).count();
     (contest.rivals.len() + grids * contest.decays.len() * contest.hidden.len()) * contest.folds
 }
 
-impl CorrectionContest<'_> {
+impl RivalContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
     fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
         self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
@@ -163,7 +163,7 @@ impl CorrectionContest<'_> {
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: impl Fn(usize, &str) + Sync) -> RivalComparison {
+pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: impl Fn(usize, &str) + Sync) -> RivalComparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
     let poses = samples.poses();
@@ -221,7 +221,7 @@ pub fn compare(samples: &TrainingSamples, contest: &CorrectionContest, observe: 
 /// The rival learnt from all samples, with the course of a network's training. `None` where it cannot be fitted.
 pub fn learn(
     samples: &TrainingSamples,
-    contest: &CorrectionContest,
+    contest: &RivalContest,
     judged: &JudgedRival,
     observe: impl FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
@@ -235,7 +235,7 @@ pub fn learn(
 fn fit(
     rival: Rival,
     samples: &TrainingSamples,
-    contest: &CorrectionContest,
+    contest: &RivalContest,
     recipe: &Recipe,
     observe: impl FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
@@ -258,7 +258,7 @@ fn fit(
 
 impl Task {
     /// `poses`: that of each row.
-    fn run(&self, samples: &TrainingSamples, poses: &[usize], contest: &CorrectionContest) -> Option<Done> {
+    fn run(&self, samples: &TrainingSamples, poses: &[usize], contest: &RivalContest) -> Option<Done> {
         let count = poses.iter().max()? + 1;
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);

@@ -1,6 +1,6 @@
 //! What `learn` tells of the rivals and of a network's training.
 
-use crate::estimate::network::rivals::{CorrectionContest, RivalComparison};
+use crate::estimate::network::rivals::{RivalComparison, RivalContest};
 use crate::estimate::network::{JudgedRival, Phase, Rival, TrainingStep};
 use crate::table::{Corrections, CorrectionsRow, Training, TrainingRow};
 
@@ -16,7 +16,7 @@ pub(super) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
     format!("{what}; cross-validated error on its own training rows: {}", all.join(", "))
 }
 
-pub(super) fn table(step: &str, contest: &CorrectionContest, comparison: &RivalComparison, learnt: bool) -> Corrections {
+pub(super) fn table(step: &str, contest: &RivalContest, comparison: &RivalComparison, learnt: bool) -> Corrections {
     let chosen = if learnt { comparison.chosen } else { 0 };
     let best = &comparison.judged[chosen];
     let before = comparison.judged[0].mean() * 1e3;

@@ -60,10 +60,9 @@ impl Truth {
     pub fn fit(&self, data: &Measurements, asked: impl Fn(&str) -> bool) -> (Model, Fitted) {
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &BTreeMap::new()).unwrap();
-        let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
+        let model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
         let candidates: Vec<usize> = (0..model.x.len()).filter(|k| asked(&model.stack.specs()[*k].name)).collect();
-        let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-        (model, fitted)
+        fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
     }
 
     /// How the target is turned in every row, by differences of points.
