@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use clap::Args;
 use serde_json::json;
 
-/// List the effects that calib knows: formula, usual size, what each is easily taken for, and what a recording needs to show it.
+/// List the effects that calib knows: formula, usual size, what each is confounded with, and what a recording needs to show it.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib effects
@@ -41,7 +41,7 @@ pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
 
 fn entry(about: &CauseDescription) -> String {
     format!(
-        "{} ({})\n  formula     {}\n  usual size  {}\n  taken for   {}\n  needs       {}\n",
+        "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n",
         about.name, about.place, about.formula, about.size, about.confounded, about.needs
     )
 }

@@ -6,7 +6,7 @@ use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::Measurements;
 use crate::spatial::{Pose, Twist};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Under which conditions a command will be carried out.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +128,14 @@ impl Reach<'_> {
         self.scratch.points_and_partials();
         stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
         stack.only_points(robot, &self.data, x, &mut self.scratch);
+    }
+
+    /// Sum over the revolute joints of the outer products of the point's derivatives (m per rad, base frame) at command `q`.
+    pub(super) fn joint_scatter(&mut self, q: &[f64]) -> Matrix3<f64> {
+        self.place(q);
+        let robot = &self.arm.model.robot;
+        let revolute = self.velocities.iter().enumerate().filter(|(joint, _)| robot.is_revolute(*joint));
+        revolute.map(|(_, velocity)| velocity.fixed_rows::<3>(0).into_owned()).map(|v| v * v.transpose()).sum()
     }
 
     fn fill_sources(&mut self) {

@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, Reach, ToolGoal, Uncertainty, beyond_limits, inverse,
-    least_change, one_step,
+    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, PositionUncertainty, Reach, ToolGoal, Uncertainty,
+    beyond_limits, inverse, least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -61,7 +61,7 @@ pub struct CorrectedCommand {
     pub uncorrected: f64,
     pub residual: f64,
     pub iterations: usize,
-    pub sigma: Option<f64>,
+    pub uncertainty: Option<PositionUncertainty>,
     /// What is wrong with it; empty if nothing.
     pub remark: String,
 }
@@ -78,7 +78,7 @@ pub struct Corrector<'a> {
     pub tally: CorrectionTotals,
 }
 
-/// What became of all targets.
+/// Results of all targets.
 #[derive(Debug, Clone, Default)]
 pub struct CorrectionTotals {
     pub targets: u64,
@@ -198,7 +198,7 @@ impl<'a> Corrector<'a> {
             Self::reached(reach, &wanted, &job.home)
         };
         let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
-        let sigma = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
+        let uncertainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
         let mut remarks = Vec::new();
         let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
         let faces = !turned || found.turn <= TURNED_AWAY;
@@ -222,7 +222,7 @@ impl<'a> Corrector<'a> {
             uncorrected: found.before,
             residual: found.residual,
             iterations: found.iterations,
-            sigma,
+            uncertainty,
             remark: remarks.join("; "),
         }
     }

@@ -20,4 +20,4 @@ pub(crate) use coverage::beyond_limits;
 pub use inverse::inverse;
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
-pub use uncertainty::Uncertainty;
+pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};

@@ -1,4 +1,4 @@
-//! Where the residual sits and what it goes with, before any name is given: what each place and each variable could explain at most.
+//! Where the residual sits and what it depends on, before any name is given: what each place and each variable could explain at most.
 
 use super::pool::{Conditional, HypothesisSet};
 use super::types::{ExplainedShare, Located, SpectrumLine};

@@ -35,7 +35,7 @@ use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
-/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` hears what is going on.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
     if question.fit.len() < too_few::FEWEST {
         return too_few::not_asked(question);
@@ -59,6 +59,13 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let outcome = history.after(&now, &next);
         if outcome == RoundOutcome::Again {
             now = next;
+            continue;
+        }
+        if let Some(memory) = fitter.memory_left_by(&next) {
+            fitter.recall(memory);
+            tell(words::of_the_memory(&fitter));
+            now = fitter.fit(&next.model, Vec::new());
+            history = RoundHistory::default();
             continue;
         }
         let structureless = outcome == RoundOutcome::Settled && found.last > SIGNIFICANT;

@@ -1,4 +1,4 @@
-//! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should tell apart.
+//! A finding and a rival as two explanations in one model, each at the size that it has in the recording: what poses should separate.
 
 use super::pool::{CachedHypotheses, HypothesisSet};
 use super::round::compliance;

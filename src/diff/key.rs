@@ -206,7 +206,7 @@ fn unite(mut a: (Vec<u64>, Vec<Box<str>>), mut b: (Vec<u64>, Vec<Box<str>>)) -> 
     ((a.0, Meaning::Text(all.clone())), (b.0, Meaning::Text(all)))
 }
 
-/// Pairs rows by key. Where `occurrence` is set the first of equal keys goes with the first, the second with the second.
+/// Pairs rows by key. Where `occurrence` is set the first of equal keys is paired with the first, the second with the second.
 pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
     let (a, b) = rayon::join(|| SortedRows::of(&a.codes), || SortedRows::of(&b.codes));
     let mut pairing = Pairing {

@@ -10,7 +10,7 @@ use super::source::{CellKind, TableFile, push_numbers};
 use super::{ColumnDiff, DifferenceStatistics};
 use crate::error::Result;
 
-/// What became of a row of A; the greatest of its cells counts.
+/// Class of a row of A; the greatest of its cells counts.
 pub(super) const SAME: u8 = 0;
 pub(super) const WITHIN: u8 = 1;
 pub(super) const CHANGED: u8 = 2;
@@ -37,7 +37,7 @@ pub(super) enum CellValue {
     Text(String),
 }
 
-/// Two files side by side: which row goes with which, and the class of every row of A.
+/// Two files side by side: which rows are paired, and the class of every row of A.
 #[derive(Clone, Copy)]
 pub(super) struct ComparedTables<'d> {
     pub a: &'d TableFile,

@@ -7,6 +7,11 @@ use crate::units::Unit;
 
 pub struct ThermalGrowth;
 
+/// 1/K: more than any polymer or metal that links are made of, four times aluminium.
+const PER_KELVIN: f64 = 1e-4;
+/// The same over a warm-up by 60 K.
+const MOST: f64 = 60.0 * PER_KELVIN;
+
 /// What separates warmth of the arm from that of its surroundings.
 pub(super) const MEASURE: Measure =
     Measure { rank: 4, advice: "log the arm's temperature from a cold start and watch a fixed target on the floor" };
@@ -32,7 +37,9 @@ impl Cause for ThermalGrowth {
             for (first, last) in (0..links).flat_map(|first| (first..links).map(move |last| (first, last))) {
                 // A run begins and ends with a link that can grow, else it is the same as a shorter one.
                 if long(&first) && long(&last) {
-                    out.push(Hypothesis::new(Term::new(&Self, Motion::Links { first, last }, law), tried).positive());
+                    let largest = if matches!(law.first.basis, Basis::Settling { .. }) { MOST } else { PER_KELVIN };
+                    let term = Term::new(&Self, Motion::Links { first, last }, law);
+                    out.push(Hypothesis::new(term, tried).positive().within(largest));
                 }
             }
         }

@@ -4,7 +4,7 @@ use super::factor::TriangularFactor;
 use super::model::Model;
 use super::triangle::{Triangle, dot};
 use crate::robot::Measurements;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -61,10 +61,10 @@ impl Covariance {
         })
     }
 
-    /// Length (m) of the one-sigma error of a point with these derivatives (m per unit) by [`Covariance::parameters`].
-    pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> f64 {
+    /// Covariance (m2) of a point with these derivatives (m per unit) by [`Covariance::parameters`].
+    pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> Matrix3<f64> {
         let along = |k: usize| -> Vector3<f64> { self.root.column(k).iter().zip(jacobian).map(|(root, by)| by * *root).sum() };
-        (0..self.free.len()).map(|k| along(k).norm_squared()).sum::<f64>().sqrt()
+        (0..self.free.len()).map(along).map(|along| along * along.transpose()).sum()
     }
 
     /// Standard deviation of the `row`-th free parameter, SI.

@@ -25,7 +25,7 @@ pub struct FitOptions<'a> {
     pub candidates: &'a [usize],
 }
 
-/// What became of a parameter of the stack.
+/// How a fit treated a parameter of the stack.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParameterStatus {
     /// Estimated, with its standard deviation (SI).

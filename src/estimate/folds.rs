@@ -59,20 +59,33 @@ pub fn cross_validate(
     Some(Folds { count, random: gather(data, rows, &random, one), blocks: gather(data, rows, &blocks, other) })
 }
 
-/// [`Folds::random`] alone.
-pub(crate) fn random_folds(
+/// How rows are dealt into folds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FoldKind {
+    /// As [`Folds::random`], drawn with a seed.
+    Random(u64),
+    /// As [`Folds::blocks`].
+    Blocks,
+}
+
+/// One kind of [`Folds`] alone.
+pub(crate) fn folds_of(
+    kind: FoldKind,
     model: &Model,
     data: &Measurements,
     rows: &[usize],
     fitted: &Fitted,
     count: usize,
-    seed: u64,
 ) -> Option<Vec<f64>> {
     let parts = parts(data, rows);
     let whole = Whole { model, data, rows, fitted };
-    let random = at_random(whole.divisible(&parts, count)?, rows.len(), count, seed);
-    let errors = whole.without_each(&random.iter().collect::<Vec<_>>());
-    Some(gather(data, rows, &random, &errors))
+    let order = whole.divisible(&parts, count)?;
+    let folds = match kind {
+        FoldKind::Random(seed) => at_random(order, rows.len(), count, seed),
+        FoldKind::Blocks => deal(&order, rows.len(), count),
+    };
+    let errors = whole.without_each(&folds.iter().collect::<Vec<_>>());
+    Some(gather(data, rows, &folds, &errors))
 }
 
 /// Poses dealt in an order that `seed` draws.

@@ -36,7 +36,7 @@ pub use change::{ParameterChange, Session, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
-pub(crate) use folds::random_folds;
+pub(crate) use folds::{FoldKind, folds_of};
 pub use folds::{Folds, cross_validate};
 pub use gauge::gauge;
 pub use known::{Bounds, CONFLICT, Known, Prior, PriorCheck};

@@ -6,7 +6,7 @@
 use super::factor::TriangularFactor;
 use super::triangle::{axpy, dot};
 
-/// What became of a candidate parameter.
+/// How a candidate parameter was classed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Visibility {
     Seen,

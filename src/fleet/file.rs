@@ -43,7 +43,7 @@ pub struct FleetFile {
     pub prior: Option<PriorFrom>,
 }
 
-/// What robots are told apart by in tables and pools.
+/// What distinguishes robots in tables and pools.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Groups {

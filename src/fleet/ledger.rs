@@ -1,4 +1,4 @@
-//! What became of every robot, in the store: the only truth about which are done, whoever computed them.
+//! The result of every robot, in the store: the only truth about which are done, whoever computed them.
 //!
 //! `fleets/<fleet>/records/ab/<key>.json`, put if absent; `claims/` are locks of the living, on which no result depends;
 //! `runs/<id>.json` is the roster of a run, for the tasks of a cluster and for later campaigns; `cancelled.json` names a run.
@@ -48,7 +48,7 @@ pub struct RobotTable {
     pub table: TableRef,
 }
 
-/// What became of a robot.
+/// Result of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotRecord {
     pub record_format: u32,
@@ -175,7 +175,7 @@ impl<'a> Ledger<'a> {
         Ok(record.filter(whole))
     }
 
-    /// Records what became of a robot; the record that stands is handed back, be it another's.
+    /// Records a robot's result; the record that stands is handed back, be it another's.
     pub fn put(&self, record: RobotRecord) -> Result<RobotRecord> {
         let (place, name) = (self.records(&record.key), format!("{}.json", record.key));
         if self.store.put_note_once(&place, &name, &record)? {

@@ -1,12 +1,13 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
 mod robot_file;
+mod scatter;
 mod standing;
 
 pub use robot_file::robot_file;
 pub use standing::standing_of;
 
-use crate::compensate::{Coverage, IdentifiedArm, Uncertainty};
+use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
 use crate::estimate::network::Correction;
@@ -29,6 +30,8 @@ pub struct IdentifiedModel {
     pub correction: Option<Correction>,
     /// Of the estimated parameters, where it is known.
     pub covariance: Option<Covariance>,
+    /// How the arm scatters about the model.
+    pub scatter: Scatter,
     /// The recording, where it is known.
     pub data: Option<Measurements>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
@@ -92,7 +95,8 @@ impl IdentifiedModel {
         let covariance = covariance.map(|output| CovarianceTable::from_frame(&load(&output.table)?)).transpose()?;
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
-        Ok(Self { correction, covariance, data, warnings, ..own })
+        let scatter = scatter::of(stage, learned.filter(|_| correction.is_some()), load)?;
+        Ok(Self { correction, covariance, scatter, data, warnings, ..own })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -117,16 +121,27 @@ impl IdentifiedModel {
             return Err(Error::spec(origin, message));
         }
         let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
-        Ok(Self { robot, parameters, model, correction: None, covariance: None, data: None, origin, warnings: Vec::new() })
+        let scatter = Scatter::default();
+        Ok(Self {
+            robot,
+            parameters,
+            model,
+            correction: None,
+            covariance: None,
+            scatter,
+            data: None,
+            origin,
+            warnings: Vec::new(),
+        })
     }
 
     pub fn coverage(&self) -> Option<Coverage> {
         self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
     }
 
-    /// The uncertainty of what the model predicts, from the rows that it was fitted to; none for a table of parameters alone.
+    /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
     pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
-        self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance))
+        self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance, self.scatter))
     }
 }
 

@@ -109,7 +109,7 @@ pub enum StageStatus {
     NotRun,
 }
 
-/// What became of one stage.
+/// One stage's report: its state, keys and tables.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StageReport {
     pub id: String,
@@ -172,7 +172,7 @@ impl Manifest {
         self.purpose == Purpose::Run && self.status == RunStatus::Done && self.stages.iter().all(has)
     }
 
-    /// What the run is, in a word; only a `run` can be HEAD.
+    /// Kind of run as it is listed; only a `run` can be HEAD.
     pub fn what(&self) -> &'static str {
         match (self.purpose, self.status) {
             (Purpose::Compensate, _) => "compensate",

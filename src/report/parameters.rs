@@ -8,7 +8,7 @@ use serde::Serialize;
 pub(super) struct ParametersSection {
     groups: Vec<Group>,
     /// What was not estimated, and what has a remark.
-    remarks: Vec<Remark>,
+    remarks: Vec<RemarkView>,
 }
 
 /// The parameters of one effect.
@@ -36,7 +36,7 @@ struct ParameterView {
 }
 
 #[derive(Serialize)]
-struct Remark {
+struct RemarkView {
     name: String,
     place: String,
     status: String,
@@ -64,7 +64,7 @@ impl ParametersSection {
         Self {
             groups: groups.collect(),
             remarks: remarked
-                .map(|p| Remark {
+                .map(|p| RemarkView {
                     name: p.name.clone(),
                     place: p.place.clone(),
                     status: p.status.clone(),

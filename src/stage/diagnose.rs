@@ -87,7 +87,7 @@ impl Stage for Diagnose {
             context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
             context.services.warn("parameters correct that simulation: they are not the robot file's".into());
         }
-        // Causes are told apart by whole points; what else was measured takes no part.
+        // Causes are separated by whole points; other measurements take no part.
         let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
         if fit.len() < FEWEST {
             let message = format!("{} whole points to fit do not even place the robot: at least {FEWEST} are needed", fit.len());

@@ -177,6 +177,9 @@ impl Identified {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
+            earlier: of_model
+                .as_ref()
+                .map_or(0, |all| all.parameters().len() - fitted.covariance.as_ref().map_or(0, |own| own.parameters().len())),
         };
         let prediction =
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())

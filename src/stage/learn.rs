@@ -180,7 +180,7 @@ writes! {
 impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str = "learns what the model leaves over: rivals compared, the best kept, and only where it helps";
-    const IMPLEMENTATION: u32 = 6;
+    const IMPLEMENTATION: u32 = 7;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 
@@ -380,13 +380,11 @@ fn corrected(
         (row.x_mm, row.y_mm, row.z_mm) = (row.x_mm + x, row.y_mm + y, row.z_mm + z);
         (row.dx_mm, row.dy_mm, row.dz_mm) = (row.dx_mm - x, row.dy_mm - y, row.dz_mm - z);
         row.error_mm = (row.dx_mm * row.dx_mm + row.dy_mm * row.dy_mm + row.dz_mm * row.dz_mm).sqrt();
+        // Cross-validation was of the model without a correction, whichever rows the correction learned from.
+        (row.fold_error_mm, row.block_error_mm) = (None, None);
     }
     for row in trained {
         rows[*row].held_out = false;
-        if correction.is_some() {
-            // Those were of the model alone.
-            (rows[*row].fold_error_mm, rows[*row].block_error_mm) = (None, None);
-        }
     }
     if fading + outside > 0 {
         context.services.note(format!(

@@ -53,7 +53,7 @@ writes! {
 impl Stage for Validate {
     const NAME: &'static str = "validate";
     const SUMMARY: &'static str = "States the position error after every step, on held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 
@@ -70,7 +70,8 @@ impl Stage for Validate {
             let fit = reads.observability.iter().find(|fit| fit.stage == step.stage);
             let value =
                 |quantity: &str| fit.and_then(|fit| fit.table.0.iter().find(|row| row.quantity == quantity)).map(|row| row.value);
-            let unmodelled = value("unmodelled_mm");
+            // A step on top of another carries that one's covariance, which scales with that one's residuals.
+            let unmodelled = value("unmodelled_mm").filter(|_| value("earlier").is_none());
             let fitted = step.table.0.iter().filter(|row| row.fold_error_mm.is_some()).count();
             // Without a k-th part of the rows, three values each.
             let inflation = value("folds").zip(value("free")).map(|(folds, free)| {

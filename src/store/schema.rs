@@ -250,10 +250,10 @@ impl FieldSchema {
         let unit_known = self.unit.as_deref().is_none_or(|unit| unit == "row" || Unit::parse(unit).is_some());
         let numeric = matches!(self.column_type, ColumnType::Int64 | ColumnType::Float64);
         if self.per_joint != self.name.contains("{j}") {
-            return Some("`per_joint` goes with `{j}` in the name".into());
+            return Some("`per_joint` needs `{j}` in the name".into());
         }
         if self.either.is_some() && !self.per_joint {
-            return Some("`either` goes with `per_joint`".into());
+            return Some("`either` needs `per_joint`".into());
         }
         if !unit_known {
             return Some(format!("unit `{}` is unknown", self.unit.as_deref().unwrap_or_default()));

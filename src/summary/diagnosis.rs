@@ -145,7 +145,7 @@ impl DiagnosisSummary {
             text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
         }
         text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
-        for (by, what) in [("place", "where"), ("variable", "goes with")] {
+        for (by, what) in [("place", "where"), ("variable", "depends on")] {
             let all = self.located(by);
             let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
             if !all.is_empty() {

@@ -41,7 +41,7 @@ pub fn run(manifest: &Manifest) -> String {
     text
 }
 
-/// What became of a stage, in a word.
+/// The state of a stage as it is printed.
 pub(super) fn word(stage: &StageReport) -> String {
     serde_json::to_value(stage.status)
         .ok()
@@ -78,7 +78,7 @@ pub fn stage(stage: &StageReport) -> String {
     text
 }
 
-/// What became of a run.
+/// The state of a run as it is printed.
 pub fn status(manifest: &Manifest) -> &'static str {
     match manifest.status {
         RunStatus::Running => "running or killed",

@@ -1,4 +1,4 @@
-//! Where the residual sits and what it goes with, before and after the findings: two tables.
+//! Where the residual sits and what it depends on, before and after the findings: two tables.
 
 use crate::diagnose::{Diagnosis, Located};
 

@@ -24,12 +24,14 @@ pub struct FitContext {
     pub repeatability: Option<f64>,
     /// Parts of the cross-validation.
     pub folds: Option<usize>,
+    /// Parameters of the model whose covariance is an earlier step's.
+    pub earlier: usize,
 }
 
 impl Observability {
     /// What a fit could see.
     pub fn of(step: &str, fitted: &Fitted, beside: &FitContext) -> Self {
-        let FitContext { geometry, repeatability, folds } = *beside;
+        let FitContext { geometry, repeatability, folds, earlier } = *beside;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
@@ -45,6 +47,9 @@ impl Observability {
         };
         push("free", 0, fitted.singular.len() as f64, "parameters estimated");
         push("candidates", 0, fitted.singular_all.len() as f64, "parameters asked for");
+        if earlier > 0 {
+            push("earlier", 0, earlier as f64, "parameters of the model that an earlier step estimated");
+        }
         if let Some((rank, expected)) = geometry {
             push("rank", 0, rank as f64, "geometric parameters that the data see");
             push("rank_expected", 0, expected as f64, "4 per revolute joint + 2 per prismatic joint + 3 of the measured point");

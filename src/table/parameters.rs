@@ -1,4 +1,4 @@
-//! The identified model: every parameter by name, with what became of it.
+//! The identified model: every parameter by name, with its status.
 
 crate::table::rows! { "parameters",
     /// Parameters, one a row; key `name`. Values are in the row's own `unit`.

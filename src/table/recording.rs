@@ -50,7 +50,7 @@ pub struct Recording {
     pub target: Option<Vec<Option<String>>>,
     /// What was measured beside points: numbers of a setting, SI, row-major; NaN where a row measured none.
     pub readings: BTreeMap<&'static str, Vec<f64>>,
-    /// Names that go with them, e.g. of anchors.
+    /// Associated names, e.g. of anchors.
     pub names: BTreeMap<&'static str, Vec<Option<String>>>,
 }
 

@@ -68,6 +68,7 @@ fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: b
         append("iterations", DataType::Int64);
         if sigma {
             append("sigma_mm", DataType::Float64);
+            append("u95_mm", DataType::Float64);
         }
         append("remark", DataType::Utf8);
     }
@@ -131,8 +132,9 @@ fn answered(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, answe
         out.push(numbers(&|answer| answer.uncorrected * 1e3));
         out.push(numbers(&|answer| answer.residual * 1e3));
         out.push(Arc::new(answers.iter().map(|answer| answer.iterations as i64).collect::<Int64Array>()));
-        if answers.iter().any(|answer| answer.sigma.is_some()) {
-            out.push(numbers(&|answer| answer.sigma.unwrap_or_default() * 1e3));
+        if answers.iter().any(|answer| answer.uncertainty.is_some()) {
+            out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3));
+            out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3));
         }
         out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark.as_str())).collect::<StringArray>()));
     }

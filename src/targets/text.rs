@@ -203,7 +203,7 @@ impl TextTable<'_> {
         }
         if !self.layout.plain {
             names.extend(["uncorrected_mm", "residual_mm", "iterations"].map(String::from));
-            names.extend(sigma.then(|| "sigma_mm".to_string()));
+            names.extend(["sigma_mm", "u95_mm"].into_iter().filter(|_| sigma).map(String::from));
             names.push("remark".into());
         }
         names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
@@ -236,7 +236,7 @@ impl TextTable<'_> {
         Ok((row.target(self.columns, self.layout.cartesian)?, Spans { joints, comma }))
     }
 
-    /// Lines with what became of their targets; lines without one as they are.
+    /// Lines with their targets' results; lines without one as they are.
     fn lines(&self, rows: &[(&str, Option<(Spans, CorrectedCommand)>)]) -> String {
         let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
         for (line, answered) in rows {
@@ -276,8 +276,9 @@ impl TextTable<'_> {
             append(Some(answer.uncorrected * 1e3), 4);
             append(Some(answer.residual * 1e3), 6);
             append(Some(answer.iterations as f64), 0);
-            if let Some(sigma) = answer.sigma {
-                append(Some(sigma * 1e3), 4);
+            if let Some(known) = answer.uncertainty {
+                append(Some(known.sigma * 1e3), 4);
+                append(Some(known.u95 * 1e3), 4);
             }
             let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
             out.push(self.delimiter);

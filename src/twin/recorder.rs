@@ -9,7 +9,7 @@ use super::motion::Motion;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
 use super::statics::Row;
-use super::tracker::Tracker;
+use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
 use super::way::{Path, Way};
 use crate::robot::description::RobotDescription;
@@ -79,7 +79,7 @@ impl Experiment<'_> {
         }
         let later: f64 = effects.iter().map(Physical::later).sum();
         let base = self.tracker.base();
-        let mut beam = Noise::new(self.seed, Purpose::Tracker);
+        let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
         let lasts = if way.wander_s > 0.0 { (-1.0 / (way.rate_hz * way.wander_s)).exp() } else { 0.0 };
         let mut astray: Vec<f64> = self.repeatability_arcsec.iter().map(|_| play.normal()).collect();
@@ -134,7 +134,7 @@ impl Experiment<'_> {
             effect.shape(&mut arm);
         }
         let base = self.tracker.base();
-        let mut beam = Noise::new(self.seed, Purpose::Tracker);
+        let mut beam = Beam::new(self.seed);
         let mut meter = Noise::new(self.seed, Purpose::Current);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
         let mut shots = Vec::with_capacity(points.len());

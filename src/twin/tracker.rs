@@ -1,7 +1,7 @@
 //! The laser tracker: a pose in the room and a noise that grows with range.
 
 use super::matrix::{self, Matrix, Vector};
-use super::noise::Noise;
+use super::noise::{Noise, Purpose};
 use super::true_value::{TrueValue, true_value};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,45 @@ pub enum Scatter {
     Student,
     /// Gaussian, point by point wider or narrower, log-normally.
     Uneven,
+    /// Gaussian, 0.9 of a point's error being that of the point before: air or a tripod that moves.
+    Wandering,
+    /// Gaussian, across the beam 2.5 times as large as along it.
+    Directional,
+}
+
+/// All of them.
+pub const SCATTERS: [Scatter; 5] =
+    [Scatter::Gaussian, Scatter::Student, Scatter::Uneven, Scatter::Wandering, Scatter::Directional];
+
+impl Scatter {
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaussian => "gaussian",
+            Self::Student => "student",
+            Self::Uneven => "uneven",
+            Self::Wandering => "wandering",
+            Self::Directional => "directional",
+        }
+    }
+}
+
+/// Correlation of a wandering tracker's errors from point to point.
+const WANDERING: f64 = 0.9;
+
+/// A directional tracker's error across the beam over that along it.
+const ACROSS: f64 = 2.5;
+
+/// The state of a tracker from point to point: its randomness, and where it has wandered to in standard deviations.
+pub struct Beam {
+    noise: Noise,
+    astray: Option<Vector>,
+}
+
+impl Beam {
+    pub fn new(seed: u64) -> Self {
+        Self { noise: Noise::new(seed, Purpose::Tracker), astray: None }
+    }
 }
 
 /// Where the tracker stands and how well it measures.
@@ -75,8 +114,9 @@ impl Tracker {
     }
 
     /// What the tracker says where `point` (m, tracker frame) is.
-    pub fn measure(&self, point: Vector, noise: &mut Noise) -> Vector {
+    pub fn measure(&self, point: Vector, beam: &mut Beam) -> Vector {
         let sigma = self.sigma(point);
+        let Beam { noise, astray } = beam;
         match self.scatter {
             Scatter::Gaussian => point.map(|coordinate| coordinate + sigma * noise.normal()),
             Scatter::Student => point.map(|coordinate| {
@@ -88,6 +128,21 @@ impl Tracker {
                 // exp(w z) has a mean square of exp(2 w^2).
                 let wide = (UNEVENNESS * noise.normal() - UNEVENNESS * UNEVENNESS).exp();
                 point.map(|coordinate| coordinate + sigma * wide * noise.normal())
+            }
+            Scatter::Wandering => {
+                let fresh = [(); 3].map(|()| noise.normal());
+                let part = (1.0 - WANDERING * WANDERING).sqrt();
+                let now = astray.map_or(fresh, |last| std::array::from_fn(|k| WANDERING * last[k] + part * fresh[k]));
+                *astray = Some(now);
+                std::array::from_fn(|k| point[k] + sigma * now[k])
+            }
+            Scatter::Directional => {
+                // Two directions across and one along have the mean square of three equal ones.
+                let along = sigma * (3.0 / (2.0 * ACROSS * ACROSS + 1.0)).sqrt();
+                let drawn = [(); 3].map(|()| noise.normal());
+                let beam = matrix::scale(point, 1.0 / matrix::norm(point));
+                let part: f64 = (0..3).map(|k| drawn[k] * beam[k]).sum();
+                std::array::from_fn(|k| point[k] + along * (ACROSS * (drawn[k] - part * beam[k]) + part * beam[k]))
             }
         }
     }

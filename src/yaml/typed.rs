@@ -39,7 +39,7 @@ pub fn typed<T: DeserializeOwned>(node: &Node) -> Result<T, Vec<Trouble>> {
     }
 }
 
-/// Finds the place of a fault inside a block that serde had to buffer (variants told apart by a key), where places are lost:
+/// Finds the place of a fault inside a block that serde had to buffer (variants distinguished by a key), where places are lost:
 /// the value that, put out of shape, still is not what was expected there.
 fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
     let (Some(clue), Some(block)) = (trouble.clue.clone(), root.at(&trouble.path)) else { return trouble };

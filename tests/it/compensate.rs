@@ -2,6 +2,7 @@
 
 mod standing;
 mod true_error;
+mod within;
 
 use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
@@ -169,13 +170,15 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let said = text(&output.stdout);
     let mut lines = said.lines();
-    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,remark"));
+    assert!(lines.next().expect("a header").ends_with("q6_deg,uncorrected_mm,residual_mm,iterations,sigma_mm,u95_mm,remark"));
     let first: Vec<&str> = lines.next().expect("a row").split(',').collect();
     let number = |k: usize| first[k].parse::<f64>().expect("a number");
     assert!((0.1..3.0).contains(&number(6)), "{first:?}");
     assert!(number(7) < 1e-5 && (2.0..8.0).contains(&number(8)), "{first:?}");
     assert!((0.001..0.1).contains(&number(9)), "{first:?}");
-    assert_eq!(first[10], "");
+    // Between 1.96 standard deviations along one axis and 2.8 along three, in lengths of one sigma 1.96 to 1.62.
+    assert!((1.6..2.0).contains(&(number(10) / number(9))), "{first:?}");
+    assert_eq!(first[11], "");
     assert!(lines.next().expect("a row").contains("joint 6 beyond its limits"), "{said}");
     assert!(text(&output.stderr).contains("1 of them leave the joint limits"));
 }

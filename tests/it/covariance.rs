@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
-use calib::compensate::{Circumstance, IdentifiedArm, Uncertainty};
+use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::Measurements;
@@ -49,11 +49,11 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let covariance = CovarianceTable::of(&model, &fitted, None).of_model(&read).expect("a covariance");
     let want = fitted.covariance.as_ref().expect("a covariance").of_predictions(&model, &data);
     let arm = IdentifiedArm::new(read, None);
-    let uncertainty = Uncertainty::new(&arm, covariance);
+    let uncertainty = Uncertainty::new(&arm, covariance, Scatter::default());
     let mut reach = arm.reach();
     for (row, want) in want.iter().enumerate() {
         reach.under(&Circumstance { payload: data.payload[row], ..Circumstance::unknown(data.joints) });
-        let found = uncertainty.at(&mut reach, data.q(row));
+        let found = uncertainty.at(&mut reach, data.q(row)).sigma;
         assert!((found / want - 1.0).abs() < 1e-3, "row {row}: {found} and {want}");
     }
 }

@@ -1,4 +1,4 @@
-//! HEAD is the last complete run; what other verbs ran is told apart, goes by its id, and takes no kept run's place.
+//! HEAD is the last complete run; runs of other commands are listed as such, addressed by id, and displace no kept run.
 
 use crate::compensate::{calib, cell};
 use serde_json::Value;

@@ -111,7 +111,7 @@ fn nothing_is_missing_on_a_way_though_its_noise_lasts_from_row_to_row() {
     }
 }
 
-/// In four seconds the arm hardly gets anywhere: what goes with its speed goes with its place as well.
+/// In four seconds the arm hardly gets anywhere: what depends on its speed depends on its place as well.
 #[test]
 fn what_too_short_a_way_would_hide_is_said() {
     let hidden = |rate: &str| {

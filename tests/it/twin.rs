@@ -9,9 +9,8 @@ use calib::twin::arm::Arm;
 use calib::twin::effect::{Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical};
 use calib::twin::equilibrium::{Equilibrium, settle};
 use calib::twin::motion::Motion;
-use calib::twin::noise::{Noise, Purpose};
 use calib::twin::statics::Row;
-use calib::twin::tracker::Tracker;
+use calib::twin::tracker::{Beam, Scatter, Tracker};
 use calib::twin::truth::{CouplingError, LinkError, TrueRobot};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
@@ -166,13 +165,49 @@ fn tracker_noise_has_the_stated_size() {
     let point = [0.0, 4.0, 3.0];
     // (10 + 2.5 * 5) / 2.
     assert!((tracker.sigma(point) - 11.25e-6).abs() < 1e-18);
-    let mut noise = Noise::new(7, Purpose::Tracker);
-    let draws: Vec<f64> = (0..20_000).map(|_| tracker.measure(point, &mut noise)[1] - 4.0).collect();
+    let mut beam = Beam::new(7);
+    let draws: Vec<f64> = (0..20_000).map(|_| tracker.measure(point, &mut beam)[1] - 4.0).collect();
     let mean = draws.iter().sum::<f64>() / draws.len() as f64;
     let sigma = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64).sqrt();
     // Four standard errors of a mean and of a standard deviation of 20,000 draws.
     assert!(mean.abs() < 4.0 * 11.25e-6 / 20_000f64.sqrt(), "mean {mean}");
     assert!((sigma / 11.25e-6 - 1.0).abs() < 4.0 / 40_000f64.sqrt(), "sigma {sigma}");
+}
+
+/// Errors (in standard deviations) of a tracker that looks along z 20,000 times.
+fn errors_along_z(scatter: Scatter) -> Vec<[f64; 3]> {
+    let tracker = Tracker { scatter, ..Tracker::default() };
+    let point = [0.0, 0.0, 4.0];
+    let (sigma, mut beam) = (tracker.sigma(point), Beam::new(11));
+    let mut error = || {
+        let seen = tracker.measure(point, &mut beam);
+        std::array::from_fn(|axis| (seen[axis] - point[axis]) / sigma)
+    };
+    (0..20_000).map(|_| error()).collect()
+}
+
+fn mean_product(errors: &[[f64; 3]], of: impl Fn(&[f64; 3], &[f64; 3]) -> f64) -> f64 {
+    errors.windows(2).map(|pair| of(&pair[0], &pair[1])).sum::<f64>() / (errors.len() - 1) as f64
+}
+
+#[test]
+fn a_wandering_tracker_keeps_nine_tenths_of_its_error_from_point_to_point() {
+    let errors = errors_along_z(Scatter::Wandering);
+    // 20,000 draws with 0.9 count as 20,000 (1 - 0.81) / (1 + 0.81) = 2,100 for a variance: 3 % is one standard error.
+    let variance = mean_product(&errors, |a, _| a[1] * a[1]);
+    assert!((variance - 1.0).abs() < 0.12, "{variance}");
+    let next = mean_product(&errors, |a, b| a[1] * b[1]) / variance;
+    assert!((next - 0.9).abs() < 0.02, "{next}");
+    assert!(mean_product(&errors, |a, _| a[0] * a[2]).abs() < 0.15);
+}
+
+#[test]
+fn a_directional_tracker_errs_across_the_beam_more_than_along_it() {
+    let errors = errors_along_z(Scatter::Directional);
+    let sigma = [0, 1, 2].map(|axis| mean_product(&errors, |a, _| a[axis] * a[axis]).sqrt());
+    assert!((sigma[0] / sigma[2] - 2.5).abs() < 0.08 && (sigma[1] / sigma[2] - 2.5).abs() < 0.08, "{sigma:?}");
+    let square: f64 = sigma.iter().map(|sigma| sigma * sigma).sum();
+    assert!((square - 3.0).abs() < 0.1, "as much in all as the stated noise: {square}");
 }
 
 struct Quiet;

@@ -4,7 +4,7 @@
     python3 tests/reference/score.py CASES_DIR --command "python other.py {case}"        # another program that prints the same JSON
 
 A case is a folder with controller.csv, tracker.csv and robot.json. Its answer is want.json in the folder (`effects`: a list of
-{effect, where}; `accept`: further sets that count as right, where the recording cannot tell them apart) or ../sealed/CASE.json
+{effect, where}; `accept`: further sets that count as right, where the recording cannot separate them) or ../sealed/CASE.json
 (`want`; `accepted`: single effects that may stand for one of them). Each case is copied without truth.json and want.json, so nothing can leak.
 Grades: exact; rival (each wanted effect is a finding or a rival of one, and nothing else was found); extra; missing; wrong; failed.
 """

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-/// Run one pipeline over many robots: fleet files, workers, what became of each, tables and a page.
+/// Run one pipeline over many robots: fleet files, workers, the state of each, tables and a page.
 #[derive(Args)]
 pub(super) struct FleetArguments {
     #[command(subcommand)]

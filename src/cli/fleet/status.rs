@@ -10,7 +10,7 @@ use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
 
-/// Say what became of every robot, or of one: its record, its run and its tables.
+/// Show the state of every robot, or of one: its record, its run and its tables.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib fleet status FLEET.yaml

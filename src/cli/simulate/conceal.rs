@@ -7,6 +7,7 @@ use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::FAMILIES;
 use crate::twin::conceal::robots::KINDS;
+use crate::twin::tracker::{SCATTERS, Scatter};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -59,6 +60,13 @@ pub(super) struct ConcealArguments {
     /// Share of recordings with gross errors or exchanged points
     #[arg(long, value_name = "SHARE", default_value_t = 0.08)]
     faulty: f64,
+    /// How trackers scatter: gaussian, student (heavy tails), uneven, wandering (0.9 from point to point), directional (2.5 to 1)
+    /// [default: gaussian, of nulls also student and uneven]
+    #[arg(long, value_name = "FORM")]
+    scatter: Option<String>,
+    /// Rounds the logged joints to steps of so many degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    log_step: f64,
     /// Worker threads; no result depends on it [default: all cores]
     #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
@@ -118,6 +126,19 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
     for name in arguments.robot.iter().filter(|name| !kinds.contains(&name.as_str())) {
         faults.push(unknown("--robot", name, &kinds));
     }
+    let scatter = arguments.scatter.as_deref().map(|name| {
+        SCATTERS
+            .into_iter()
+            .find(|scatter| scatter.name() == name)
+            .ok_or_else(|| unknown("--scatter", name, &SCATTERS.map(Scatter::name)))
+    });
+    let scatter = scatter.transpose().unwrap_or_else(|fault| {
+        faults.push(fault);
+        None
+    });
+    if !(0.0..=1.0).contains(&arguments.log_step) {
+        faults.push(Fault::new("--log-step", format!("{} is no step of a log; allowed: 0 to 1 deg", arguments.log_step)));
+    }
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
     }
@@ -133,6 +154,8 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         other_forms: arguments.other_forms,
         natural: arguments.natural,
         faulty: arguments.faulty,
+        scatter,
+        log_step_deg: arguments.log_step,
     })
 }
 

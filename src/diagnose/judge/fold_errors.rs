@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
-use crate::estimate::{autocorrelation_time, random_folds};
+use crate::estimate::{FoldKind, autocorrelation_time, folds_of};
 use std::collections::BTreeMap;
 
 /// Parts of the rows that were fitted, the same for every model that is compared.
@@ -32,7 +32,10 @@ impl FoldErrors {
     /// `None` where the poses are too few for folds.
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
         let (data, rows) = (&fitter.data, &now.screening.kept);
-        let errors = random_folds(&now.model, data, rows, &now.fitted, FOLDS, fitter.question.seed)?;
+        // Where noise lasts, its neighbours in time would lend a row what wanders: whole stretches are left out.
+        let random = FoldKind::Random(fitter.question.seed);
+        let kind = if fitter.memory.is_some() { FoldKind::Blocks } else { random };
+        let errors = folds_of(kind, &now.model, data, rows, &now.fitted, FOLDS)?;
         let squares = rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
         Some(Self { squares, moving: data.in_motion(rows) })
     }

@@ -61,7 +61,7 @@ fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<
     let weak = groups.into_iter().filter_map(|(key, members)| Some((strength(&members)?, key, members)));
     let (size, (effect, place), members) = weak.filter(|(size, ..)| *size < 1.0).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let why = if size == 0.0 {
-        "these data do not tell it from the rest of the model"
+        "these data cannot separate it from the rest of the model"
     } else {
         "in the whole model it is smaller than its own uncertainty"
     };
@@ -202,7 +202,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         // Without a joint that yields a payload moves nothing.
         let (kept, said) = left(0.0, &[TRUE, PAYLOAD]);
         assert_eq!(kept, [TRUE]);
-        assert_eq!(said, ["payload_error at tool: these data do not tell it from the rest of the model"]);
+        assert_eq!(said, ["payload_error at tool: these data cannot separate it from the rest of the model"]);
     }
 
     #[test]

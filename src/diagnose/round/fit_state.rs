@@ -2,8 +2,9 @@
 
 use super::base_model::base_model;
 use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
+use super::stretches::thinned;
 use crate::diagnose::types::{JointRepeatability, Question};
-use crate::diagnose::whitened::WhitenedProblem;
+use crate::diagnose::whitened::{Memory, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
 use crate::robot::{Measurements, RobotModel};
@@ -80,7 +81,14 @@ pub(crate) struct Fitter<'a> {
     spread: Vec<Matrix3<f64>>,
     /// Whether the repeatability is that of a residual.
     asked: bool,
+    /// Noise that lasts from row to row of standing points.
+    pub memory: Option<Memory>,
+    /// How often that was learned.
+    recalled: usize,
 }
+
+/// What lasts is learned at most so often: what it makes of slow causes changes what it is estimated from.
+const RECALLS: usize = 3;
 
 /// A repeatability that changes by less than this share is settled.
 const SETTLED: f64 = 0.25;
@@ -95,6 +103,8 @@ impl<'a> Fitter<'a> {
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: Vec::new(),
             asked: false,
+            memory: None,
+            recalled: 0,
         };
         let base = base_model(question.robot, &fitter.data, question.fit);
         let mut now = fitter.fit(&base, Vec::new());
@@ -130,6 +140,22 @@ impl<'a> Fitter<'a> {
         self.asked = true;
         self.repeatability.sigma = sigma;
         self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
+    }
+
+    /// How what a settled model leaves lasts from row to row (not at all: `Some(None)`), if otherwise than is believed.
+    pub fn memory_left_by(&self, settled: &FitState) -> Option<Option<Memory>> {
+        let rows = thinned(&settled.screening.kept);
+        if self.recalled >= RECALLS || self.data.in_motion(&rows) {
+            return None;
+        }
+        let problem = WhitenedProblem::new(&settled.model, &self.data, rows);
+        Memory::shown_by(problem.of_points(), &problem.rows, self.memory)
+    }
+
+    /// Takes the memory that a residual showed.
+    pub fn recall(&mut self, memory: Option<Memory>) {
+        self.memory = memory;
+        self.recalled += 1;
     }
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.

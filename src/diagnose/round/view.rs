@@ -25,6 +25,9 @@ impl<'a> RoundView<'a> {
             problem = problem.with_currents();
         }
         let autocorrelation_time = bounded_autocorrelation_time(&problem);
+        if let Some(memory) = fitter.memory {
+            problem = problem.with_memory(memory);
+        }
         let pose = poses(&fitter.data, &problem.rows, autocorrelation_time);
         Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }
     }

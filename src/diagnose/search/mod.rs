@@ -154,19 +154,26 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
 
     /// From causes to the best set.
     pub fn run_from<'f>(&mut self, causes: impl Iterator<Item = &'f Form>) -> SearchResult {
-        let mut start: Vec<usize> = causes.map(|form| self.position(Hypothesis::new(form.clone(), 1))).collect();
+        let mut start: Vec<usize> = causes.map(|form| self.position(self.like(form))).collect();
         start.sort_unstable();
         start.dedup();
         self.run(start)
     }
 
+    /// A form that an earlier round refined, with the prior of the form that it was refined from.
+    fn like(&self, form: &Form) -> Hypothesis {
+        let key = form.key();
+        let kin = self.pool.keys.iter().position(|other| *other == key).map(|at| self.pool.hypotheses[at].clone());
+        kin.map_or_else(|| Hypothesis::new(form.clone(), 1), |kin| Hypothesis { form: form.clone(), ..kin })
+    }
+
     /// The hypothesis' position in the pool, where it is put if it is not there.
     fn position(&mut self, hypothesis: Hypothesis) -> usize {
         let same = |other: &Hypothesis| other.form == hypothesis.form;
-        match self.pool.hypotheses.iter().position(same) {
-            Some(at) => at,
-            None => self.pool.add(vec![hypothesis]),
+        if let Some(at) = self.pool.hypotheses.iter().position(same) {
+            return at;
         }
+        self.pool.add(vec![hypothesis])
     }
 }
 

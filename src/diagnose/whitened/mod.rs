@@ -3,12 +3,15 @@
 //! Residual rows are in standard deviations: three a row of the recording for the measured point, then one for each usable motor current.
 
 mod currents;
+mod memory;
 
 use crate::effect::{Deflection, Effect, Form, PointMotion};
 use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
 use currents::Currents;
 use faer::Mat;
+use memory::Innovations;
+pub(crate) use memory::Memory;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -23,6 +26,8 @@ pub(crate) struct WhitenedProblem<'a> {
     currents: Option<Currents>,
     /// What a standard deviation of a current counts: that of the points as they are left by the model.
     current_weight: f64,
+    /// What each row says beyond those before it, where noise lasts from row to row.
+    innovations: Option<Innovations>,
     model: &'a Model,
     /// Whitened measured - predicted.
     pub residual: Vec<f64>,
@@ -44,7 +49,18 @@ impl<'a> WhitenedProblem<'a> {
             residual.extend(weight.apply(&(data.position[*row] - motion.point)).iter());
         }
         let current_weight = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        Self { robot: &model.robot, data, rows, residual, motions, weights, currents: None, current_weight, model }
+        Self {
+            robot: &model.robot,
+            data,
+            rows,
+            residual,
+            motions,
+            weights,
+            currents: None,
+            current_weight,
+            innovations: None,
+            model,
+        }
     }
 
     /// With the motor currents, which say something where a joint yields to torques.
@@ -52,6 +68,21 @@ impl<'a> WhitenedProblem<'a> {
         self.currents = Currents::new(self.robot, self.data, &self.rows, &self.motions);
         self.residual.extend(self.currents.iter().flat_map(Currents::whitened).map(|value| value * self.current_weight));
         self
+    }
+
+    /// With noise that lasts from row to row: all columns become innovations.
+    pub fn with_memory(mut self, memory: Memory) -> Self {
+        let (innovations, points) = (memory.filter(&self.rows), self.points());
+        innovations.apply(&mut self.residual[..points]);
+        self.innovations = Some(innovations);
+        self
+    }
+
+    /// What is left of the points' columns once it is known what lasts from row to row.
+    fn innovate(&self, column: &mut [f64]) {
+        if let Some(innovations) = &self.innovations {
+            innovations.apply(&mut column[..3 * self.rows.len()]);
+        }
     }
 
     fn points(&self) -> usize {
@@ -93,6 +124,13 @@ impl<'a> WhitenedProblem<'a> {
 
     /// Columns of a form, one after another.
     pub fn columns(&self, form: &Form) -> Vec<f64> {
+        let mut out = self.motions_by(form);
+        out.chunks_mut(self.residual_rows().max(1)).for_each(|column| self.innovate(column));
+        out
+    }
+
+    /// The same whatever lasts from row to row: whitened motions of the points per unit of each parameter.
+    pub fn motions_by(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];
         let rows = self.residual_rows();
@@ -135,6 +173,9 @@ impl<'a> WhitenedProblem<'a> {
                     }
                 }
             });
+        }
+        for j in 0..free.len() {
+            self.innovate(out.col_as_slice_mut(j));
         }
         if let Some(currents) = &self.currents {
             for row in 0..currents.residual_rows() {

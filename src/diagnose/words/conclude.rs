@@ -2,7 +2,7 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
-use super::statement::{next, not_observable};
+use super::statement::{next, not_observable, slower_than_noise};
 use super::unseen::by_speed;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
@@ -36,6 +36,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let signature = signature(&rest, &last, something_left, misfit.not_carried);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(by_speed(&last));
+    not_observable.extend(fitter.memory.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
     let folds = cross_validate(&state.model, data, &state.screening.kept, &state.fitted, FOLDS, fitter.question.seed);

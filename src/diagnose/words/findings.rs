@@ -4,12 +4,12 @@ use super::faults::{faults, reversals, rows_apart};
 use super::groups::{FindingKey, groups};
 use super::last_round::LastRound;
 use super::rivals::{exact, rivals};
-use super::statement::sentence;
+use super::statement::{not_so, sentence};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::pool::{HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding};
-use crate::effect::{Basis, Clock, Effect, Form, ParameterEstimate, Place, Summary, Variable, people};
+use crate::effect::{Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, people};
 use crate::estimate::{ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first.
@@ -74,10 +74,34 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     };
     let parameters = parameters(state, effect, members);
     let clock = Clock::of(last.survey.data);
-    let statement = sentence(effect, &Summary { place, forms: &forms, parameters: &parameters, clock }, effect_rms);
+    let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
+    let (effect, statement) = match impossible(last, members) {
+        Some(why) => (Unknown::NAME, not_so(effect, &summary, why, effect_rms)),
+        None => (effect, sentence(effect, &summary, effect_rms)),
+    };
     let valid = valid(&forms, last);
     Finding { effect, place, statement, parameters, evidence: Some(evidence), rivals, valid, forms }
 }
+
+/// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows.
+fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
+    let state = &last.judged.state;
+    members.iter().find_map(|i| {
+        let Hypothesis { positive, largest, .. } = last.pool.hypotheses[last.judged.set[*i]];
+        state.ranges[*i].clone().find_map(|k| {
+            let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else { return None };
+            let value = state.model.x[k];
+            if positive && value < -FIRM * sigma {
+                Some("has the wrong sign")
+            } else {
+                (value.abs() - FIRM * sigma > largest).then_some("is more than is possible")
+            }
+        })
+    })
+}
+
+/// Standard errors by which a number must be beyond what is possible.
+const FIRM: f64 = 2.0;
 
 /// The fitted parameters of some causes, as people read them.
 fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
@@ -121,7 +145,7 @@ fn size<'a>(pool: &HypothesisSet, own: impl Iterator<Item = (usize, &'a [f64])>)
     // In standard deviations of the rows; the mean noise turns it into a length.
     let mut sum = vec![0.0; pool.residual_rows];
     for (k, coefficients) in own {
-        let columns = pool.problem.columns(&pool.hypotheses[k].form);
+        let columns = pool.problem.motions_by(&pool.hypotheses[k].form);
         for (column, coefficient) in columns.chunks(pool.residual_rows).zip(coefficients) {
             sum.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
         }

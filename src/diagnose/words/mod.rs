@@ -16,6 +16,7 @@ pub use statement::other_means;
 
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
+use super::whitened::Memory;
 use crate::effect::Form;
 use crate::error::counted;
 
@@ -26,6 +27,17 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
         counted(now.screening.kept.len(), "row"),
         counted(fitter.free().len(), "number")
     )
+}
+
+/// What the noise does from point to point.
+pub(crate) fn of_the_memory(fitter: &Fitter) -> String {
+    match fitter.memory {
+        Some(Memory { lasts, share }) => format!(
+            "noise lasts from point to point: {:.0} % of its variance with a correlation of {lasts:.2}; slow causes are judged against it",
+            100.0 * share
+        ),
+        None => "noise does not last from point to point".into(),
+    }
 }
 
 /// A round in a line, which leaves what is noise with a probability of `rest`.

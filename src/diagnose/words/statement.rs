@@ -1,12 +1,23 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
 use crate::diagnose::types::Finding;
+use crate::diagnose::whitened::Memory;
 use crate::effect::{Clock, Summary, Survey, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
 pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
     let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
+}
+
+/// The sentence of a finding whose numbers no such effect can have.
+pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: f64) -> String {
+    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    format!(
+        "something unknown acts at {}: {effect} fits best ({text}), but {why} ({} um rms at the tool).",
+        summary.place,
+        figure(rms * 1e6, 0)
+    )
 }
 
 /// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
@@ -39,7 +50,7 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     }
     if survey.data.temperature.is_none() {
         let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
-        out.push(format!("temperature: none was recorded; growth is told from drift by {by} alone"));
+        out.push(format!("temperature: none was recorded; growth and drift are separated by {by} alone"));
     }
     if survey.data.current.is_none() {
         out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
@@ -49,6 +60,15 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     }
     out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
     out
+}
+
+/// What noise that lasts from point to point hides.
+pub(super) fn slower_than_noise(memory: Memory) -> String {
+    format!(
+        "small slow causes (drift, steps, warm-up): noise lasts from point to point (correlation {:.2}), as moving air or a tripod leaves \
+         it; measure a fixed target every few poses",
+        memory.lasts
+    )
 }
 
 /// Links whose weight the robot file does not give.
@@ -70,7 +90,7 @@ fn masses(survey: &Survey) -> Option<String> {
 }
 
 /// Where nothing else is needed.
-const POSES: &str = "more poses, chosen to tell them apart (`calib poses --run`)";
+const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
 
 /// What would tell findings from their rivals, a sentence each.
 pub(super) fn next(findings: &[Finding]) -> Vec<String> {

@@ -1,4 +1,4 @@
-//! What the way of a moving arm is too short or too slow to show: there geometry takes up most of what goes with the speed.
+//! What the way of a moving arm is too short or too slow to show: there geometry takes up most of what depends on the speed.
 
 use super::last_round::LastRound;
 use crate::effect::{Effect, JointLogLag, Place, Variable, ViscousWindup};

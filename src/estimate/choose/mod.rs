@@ -60,7 +60,7 @@ pub struct Proposal {
     pub score: Score,
     /// The same for random sets of as many poses.
     pub random: Vec<Score>,
-    /// For each effect to separate: its non-centrality in units of the random sets' median, geometric mean over what is told apart.
+    /// For each effect to separate: its non-centrality in units of the random sets' median, geometric mean over what is separated.
     pub separation: Vec<Separation>,
     /// Poses spread over the workspace, for scores of other sets.
     pub workspace: Measurements,
@@ -70,7 +70,7 @@ pub struct Proposal {
 pub struct Separation {
     pub effect: String,
     pub rival: String,
-    /// Parameters that are told apart, with their standard deviation (SI) beside the rival: proposed, and median of random sets.
+    /// Parameters that are separated, with their standard deviation (SI) beside the rival: proposed, and median of random sets.
     pub sigma: Vec<(usize, f64, f64)>,
     /// Parameters that the rival and the others imitate at every allowed pose.
     pub imitated: Vec<usize>,

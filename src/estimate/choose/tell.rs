@@ -55,7 +55,7 @@ pub struct Proposed {
     pub random: [f64; 2],
 }
 
-/// Explanations whose L is below this cannot be told apart.
+/// Explanations whose L is below this cannot be separated.
 pub const TOLD: f64 = 25.0;
 
 /// Of a squared effect less than this is rounding and second order.

@@ -65,7 +65,7 @@ impl PoseAnswer for Apart<'_> {
         let mut text = format!("finding {}: {}\nrival: {}\n", self.finding.rank, self.finding.statement, names[1]);
         text.push_str(&format!(
             "\nexpected separation L, what is left (squared, over the noise) where the other is fitted in its place; below {TOLD} they\n\
-             cannot be told apart. Points good to {:.3} mm per axis\n",
+             cannot be separated. Points good to {:.3} mm per axis\n",
             self.sigma
         ));
         let count = self.told.proposed.as_ref().map_or(0, |proposed| proposed.poses.rows());

@@ -306,7 +306,7 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
     }
     match join {
         Join::Id {} if settings.duplicates == Duplicates::Keep => {
-            faults.push(Fault::new("duplicates", "`keep` cannot go with a join by id; allowed: reject, first, last"));
+            faults.push(Fault::new("duplicates", "`keep` cannot be combined with a join by id; allowed: reject, first, last"));
         }
         Join::Time { tolerance_s, offset_s } => {
             if !(tolerance_s.is_finite() && *tolerance_s >= 0.0) {

@@ -5,7 +5,7 @@ use super::family::{Bench, Cause, Column, Draft, FAMILIES, Form};
 use super::points::{self, Amount, FIT};
 use super::robots::Kind;
 use super::visible::{Shadow, Site, norm};
-use crate::robot::description::RobotDescription;
+use crate::robot::description::{JointKind, RobotDescription};
 use crate::twin::effect::{HoldingFriction, Physical};
 use crate::twin::noise::{Noise, Purpose};
 use crate::twin::plan::{Climate, Poses};
@@ -78,6 +78,7 @@ impl Case {
         let robot = kind.description(aside);
         let truth = errors(&robot, &mut draw);
         let tracker = tracker(kind, content == Content::Null, &mut draw);
+        let tracker = Tracker { scatter: design.scatter.unwrap_or(tracker.scatter), ..tracker };
         let (play_rad, repeated) = if draw.chance(0.5) { (1e-6 * draw.uniform(4.0, 16.0), 0.1) } else { (0.0, 0.0) };
         let fit = design.points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
@@ -122,6 +123,9 @@ impl Case {
         let mut faults = Noise::new(seed, Purpose::Faults);
         let thermometer_c = warmth.iter().map(|celsius| celsius + THERMOMETER_K * faults.normal()).collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);
+        if design.log_step_deg > 0.0 {
+            shots.iter_mut().for_each(|shot| round(&mut shot.q, &robot, design.log_step_deg));
+        }
         Ok(Case {
             name: format!("c{:04}", number + 1),
             content,
@@ -218,6 +222,13 @@ fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
         },
         ..Tracker::default()
     }
+}
+
+/// Rounds angles (rad) of revolute joints to whole steps, as a controller's log does.
+fn round(q: &mut [f64], robot: &RobotDescription, step_deg: f64) {
+    let step = step_deg.to_radians();
+    let angles = q.iter_mut().zip(&robot.joints).filter(|(_, joint)| joint.kind == JointKind::Revolute);
+    angles.for_each(|(angle, _)| *angle = (*angle / step).round() * step);
 }
 
 /// A part of a joint's range that a cell may leave free, deg.

@@ -3,6 +3,7 @@
 use super::family::{FAMILIES, Family};
 use super::robots::{KINDS, Kind};
 use crate::twin::noise::{Noise, Purpose};
+use crate::twin::tracker::Scatter;
 
 /// Shares and bounds of a set of cases; everything else comes from the seed.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +26,10 @@ pub struct Design {
     pub natural: f64,
     /// Share of cases with gross errors or exchanged points in the recording.
     pub faulty: f64,
+    /// How every tracker scatters; none: Gaussian, of recordings without an effect also heavy-tailed and uneven.
+    pub scatter: Option<Scatter>,
+    /// Step (deg) to which joints are rounded in the log; 0: none.
+    pub log_step_deg: f64,
 }
 
 impl Default for Design {
@@ -41,6 +46,8 @@ impl Default for Design {
             other_forms: 0.5,
             natural: 0.2,
             faulty: 0.08,
+            scatter: None,
+            log_step_deg: 0.0,
         }
     }
 }

@@ -44,7 +44,7 @@ pub struct Draft {
     /// The form, in a few words.
     pub form: &'static str,
     pub causes: Vec<Cause>,
-    /// Names that are true as well, or that no position data can tell apart: they neither count nor hurt.
+    /// Names that are true as well, or that no position data can separate: they neither count nor hurt.
     pub accepted: Vec<(&'static str, String)>,
     /// Columns without which nobody can name it.
     pub needs: Vec<Column>,

@@ -12,7 +12,7 @@ pub struct ViscousWindup {
     pub joint: usize,
     /// Arcsec for each deg/s (um for each mm/s of a prismatic joint), at 20 deg/s.
     pub arcsec_per_deg_s: f64,
-    /// Friction goes with this power of the speed: 1 for oil, less for grease.
+    /// Friction grows with this power of the speed: 1 for oil, less for grease.
     #[serde(default = "one")]
     pub exponent: f64,
 }

@@ -4,12 +4,12 @@ use super::interval::{Interval, intervals};
 use super::paper::{Answer, Finding, Truth};
 use std::collections::BTreeSet;
 
-/// What became of a cause.
+/// How a cause was named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     /// Named, at its place, as the first choice.
     Exact,
-    /// Among the explanations that the data cannot tell apart, or by a name that is accepted for it.
+    /// Among the explanations that the data cannot separate, or by a name that is accepted for it.
     InSet,
     /// Not named, and something else was.
     Wrong,
@@ -28,7 +28,7 @@ impl Outcome {
     }
 }
 
-/// A cause and what became of it.
+/// A cause and how it was named.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
     pub effect: String,

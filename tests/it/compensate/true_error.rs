@@ -1,7 +1,7 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use crate::desk::{Desk, table};
-use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, SETTLED, ToolGoal, least_change, one_step};
+use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change, one_step};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
@@ -19,8 +19,8 @@ use calib::twin::truth::{LinkError, TrueRobot};
 use nalgebra::Vector3;
 use serde_json::json;
 
-struct Cell {
-    robot: RobotDescription,
+pub struct Cell {
+    pub robot: RobotDescription,
     truth: TrueRobot,
     effects: Vec<Physical>,
     tracker: Tracker,
@@ -29,14 +29,14 @@ struct Cell {
 }
 
 /// What a recording of the cell comes to.
-struct Recorded {
-    robot: Robot,
-    recording: Recording,
-    split: Split,
+pub struct Recorded {
+    pub robot: Robot,
+    pub recording: Recording,
+    pub split: Split,
 }
 
 impl Cell {
-    fn new(kind: Kind, effects: Vec<Physical>) -> Self {
+    pub fn new(kind: Kind, effects: Vec<Physical>) -> Self {
         let robot = kind.description([60.0, -45.0, 35.0]);
         let n = robot.joints.len();
         let scale = kind.reach_m();
@@ -57,7 +57,7 @@ impl Cell {
         Self { robot, truth, effects, tracker, poses, climate: Climate::default() }
     }
 
-    fn points(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
+    pub fn points(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
         let blocks: Vec<Block> = payload_kg
             .iter()
             .map(|kg| Block { usage: "fit".into(), points: count / payload_kg.len(), payload_kg: *kg })
@@ -66,7 +66,7 @@ impl Cell {
         plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed).expect("poses are allowed")
     }
 
-    fn measure(&self, points: Vec<Point>, tracker: &Tracker) -> Vec<Shot> {
+    fn measure(&self, points: Vec<Point>, tracker: &Tracker, seed: u64) -> Vec<Shot> {
         let motors = Motors::default();
         let experiment = Experiment {
             robot: &self.robot,
@@ -78,16 +78,20 @@ impl Cell {
             poses: &self.poses,
             blocks: &[],
             climate: &self.climate,
-            seed: 77,
+            seed,
         };
         experiment.measure(points, || {})
     }
 
     /// A recording of `count` points, of which three quarters are fitted.
     fn recorded(&self, count: usize, payload_kg: &[f64]) -> Recorded {
-        let points = self.points(count, payload_kg, 5);
+        self.recorded_by(self.points(count, payload_kg, 5), 77)
+    }
+
+    /// A recording of these points with the noise of a seed.
+    pub fn recorded_by(&self, points: Vec<Point>, seed: u64) -> Recorded {
         let payload: Vec<f64> = points.iter().map(|point| point.payload_kg).collect();
-        let shots = self.measure(points, &self.tracker);
+        let shots = self.measure(points, &self.tracker, seed);
         let recording = Recording {
             joints: self.robot.joints.len(),
             prismatic: self.robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
@@ -145,18 +149,28 @@ impl Cell {
 
     /// Unseen targets: later than the recording, with another seed.
     fn targets(&self, payload_kg: &[f64]) -> Vec<Point> {
-        let mut targets = self.points(500, payload_kg, 99);
+        self.targets_by(500, payload_kg, 99)
+    }
+
+    pub fn targets_by(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
+        let mut targets = self.points(count, payload_kg, seed);
         targets.iter_mut().for_each(|target| target.time_s += 1e5);
         targets
     }
 
     /// Rms (mm) of where the true robot goes, with the commands that `solve` makes of each target.
-    fn true_error(
+    fn true_error(&self, arm: &Identified, targets: &[Point], solve: impl Fn(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>) -> f64 {
+        let square = self.misses(arm, targets, solve).into_iter().map(|miss| miss * miss).sum::<f64>();
+        (square / targets.len() as f64).sqrt() * 1e3
+    }
+
+    /// By how much (m) the true robot misses each target, with the commands that `solve` makes of it.
+    pub fn misses(
         &self,
         arm: &Identified,
         targets: &[Point],
-        solve: impl Fn(&mut calib::compensate::Reach, &ToolGoal, &[f64]) -> Vec<f64>,
-    ) -> f64 {
+        mut solve: impl FnMut(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
+    ) -> Vec<f64> {
         let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
         let robot = RobotModel::new(self.robot.clone());
         let mut reach = arm.reach();
@@ -172,12 +186,9 @@ impl Cell {
             let wanted = ToolGoal { pose: robot.forward(&target.q), oriented: false };
             commands.push(Point { q: solve(&mut reach, &wanted, &target.q), ..target.clone() });
         }
-        let shots = self.measure(commands, &exact);
-        let square = shots.iter().zip(targets).map(|(shot, target)| {
-            let wanted = arm.base().point(&robot.forward(&target.q).translation);
-            (Vector3::from(shot.position) - wanted).norm_squared()
-        });
-        (square.sum::<f64>() / targets.len() as f64).sqrt() * 1e3
+        let shots = self.measure(commands, &exact, 77);
+        let wanted = |target: &Point| arm.base().point(&robot.forward(&target.q).translation);
+        shots.iter().zip(targets).map(|(shot, target)| (Vector3::from(shot.position) - wanted(target)).norm()).collect()
     }
 }
 
@@ -290,13 +301,13 @@ fn a_learned_correction_is_made_up_for() {
         let arm = Identified::new(model.clone(), correction);
         let rigid = Identified::new(model, None);
         let targets = cell.targets(&[0.0]);
-        let solve = |reach: &mut calib::compensate::Reach, wanted: &ToolGoal, q: &[f64]| {
+        let solve = |reach: &mut Reach, wanted: &ToolGoal, q: &[f64]| {
             let found = least_change(reach, wanted, q, q);
             assert!(found.residual <= SETTLED, "round trip {} m", found.residual);
             found.q
         };
         let (before, after) = (cell.true_error(&rigid, &targets, solve), cell.true_error(&arm, &targets, solve));
-        let shot = cell.measure(cell.points(1, &[0.0], 3), &cell.tracker).remove(0);
+        let shot = cell.measure(cell.points(1, &[0.0], 3), &cell.tracker, 77).remove(0);
         let floor = 3f64.sqrt() * shot.sigma * 1e3;
         println!("{}: geometry alone {before:.4} mm, learned {after:.4} mm, {:.2} floors", cell.robot.name, after / floor);
         assert!(after < 1.5 * floor && after < 0.5 * before, "{before:.4} -> {after:.4} mm, floor {floor:.4} mm");

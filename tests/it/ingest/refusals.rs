@@ -155,7 +155,7 @@ fn files_that_do_not_fit_together_are_faults_of_the_settings() {
         faults(&format!("{id}{time}{q}"), &format!("{id}{time}{xyz}"), "join: {by: id}\nduplicates: keep"),
         [
             "files[1].columns.time: mapped in two files; map it in one",
-            "duplicates: `keep` cannot go with a join by id; allowed: reject, first, last"
+            "duplicates: `keep` cannot be combined with a join by id; allowed: reject, first, last"
         ]
     );
     let clock = faults(&format!("{time}{q}"), &format!("{time}{xyz}"), "join: {by: time, tolerance_s: -1}");

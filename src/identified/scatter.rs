@@ -1,0 +1,36 @@
+//! How an arm scatters about its identified model, by the tables of the stages that identified it.
+
+use crate::compensate::Scatter;
+use crate::error::Result;
+use crate::pipeline::StageReport;
+use crate::store::TableRef;
+use crate::store::frame::Frame;
+use crate::table::{Corrections, Observability, Prediction, Table, Verdict};
+
+/// Of the stage whose model stands, and of the one that learned a correction on top of it.
+pub(super) fn of(
+    stage: &StageReport,
+    learned: Option<&StageReport>,
+    load: impl Fn(&TableRef) -> Result<Frame>,
+) -> Result<Scatter> {
+    let table = |stage: &StageReport, kind: &str| {
+        stage.outputs.iter().find(|output| output.kind == kind).map(|output| load(&output.table)).transpose()
+    };
+    let diagnosed = table(stage, Verdict::KIND)?.map(|frame| Verdict::from_frame(&frame)).transpose()?;
+    let fitted = table(stage, Observability::KIND)?.map(|frame| Observability::from_frame(&frame)).transpose()?;
+    let repeatability = diagnosed
+        .and_then(|verdict| verdict.0.first().map(|row| row.repeatability_rad))
+        .or_else(|| fitted?.0.iter().find(|row| row.quantity == "joint_repeatability_rad").map(|row| row.value));
+    let prediction = table(stage, Prediction::KIND)?.map(|frame| Prediction::from_frame(&frame)).transpose()?;
+    let corrections = match learned {
+        Some(learned) => table(learned, Corrections::KIND)?.map(|frame| Corrections::from_frame(&frame)).transpose()?,
+        None => None,
+    };
+    let mut unexplained = prediction.as_ref().map_or(0.0, Prediction::unexplained_mm);
+    if let (Some(rms), Some(prediction)) = (corrections.as_ref().and_then(Corrections::rms_mm), &prediction) {
+        // The errors of a correction's folds hold the noise, the parameters' uncertainty and what is left.
+        let left = rms.powi(2) - prediction.mean_square_noise_mm2();
+        unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
+    }
+    Ok(Scatter { unexplained: unexplained * 1e-3, repeatability: repeatability.unwrap_or(0.0) })
+}

@@ -1,0 +1,64 @@
+//! Of targets that no fit has seen, the true robot hits 95 % within the radius that is stated for them.
+
+use super::true_error::Cell;
+use crate::desk::{Desk, table};
+use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
+use calib::effect::Load;
+use calib::robot::RobotModel;
+use calib::stage::{Identify, IdentifyReads};
+use calib::table::{CovarianceTable, Parameters, Prediction};
+use calib::twin::conceal::robots::Kind;
+use calib::twin::effect::{JointCompliance, Physical};
+use serde_json::json;
+
+const RECORDINGS: u64 = 100;
+const TARGETS: usize = 5;
+
+/// Share of `RECORDINGS` x `TARGETS` targets within their stated radius, each recording with poses and noise of its own.
+fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
+    let stage: Identify = serde_json::from_value(json!({"effects": effects})).expect("settings");
+    let robot = RobotModel::new(cell.robot.clone());
+    let mut hits = 0;
+    for seed in 0..RECORDINGS {
+        let recorded = cell.recorded_by(cell.points(80, payload_kg, 1000 + seed), 2000 + seed);
+        let reads = IdentifyReads { robot: recorded.robot, recording: recorded.recording, split: recorded.split };
+        let tables = Desk::default().run(&stage, reads).expect("an identification");
+        let parameters: Parameters = table(&tables).remove(0);
+        let covariance: CovarianceTable = table(&tables).remove(0);
+        let prediction: Prediction = table(&tables).remove(0);
+        let model = parameters.model(robot.clone(), &[], Load::GravityTorque).expect("a model");
+        let covariance = covariance.of_model(&model).expect("a covariance");
+        let arm = IdentifiedArm::new(model, None);
+        let scatter = Scatter { unexplained: prediction.unexplained_mm() * 1e-3, repeatability: 0.0 };
+        let uncertainty = Uncertainty::new(&arm, covariance, scatter);
+        let targets = cell.targets_by(TARGETS, &payload_kg[payload_kg.len() - 1..], 3000 + seed);
+        let mut radius = Vec::new();
+        let misses = cell.misses(&arm, &targets, |reach, wanted, q| {
+            let found = least_change(reach, wanted, q, q);
+            assert!(found.residual <= SETTLED);
+            radius.push(uncertainty.at(reach, &found.q).u95);
+            found.q
+        });
+        hits += misses.iter().zip(&radius).filter(|(miss, radius)| miss <= radius).count();
+    }
+    hits as f64 / (RECORDINGS as usize * TARGETS) as f64
+}
+
+const GEOMETRY: [&str; 5] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+
+#[test]
+fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_an_offset_wrist() {
+    let share = within(&Cell::new(Kind::Compact6, Vec::new()), &GEOMETRY, &[0.0]);
+    println!("within the stated 95 %: {:.1} %", 100.0 * share);
+    assert!((0.93..=0.97).contains(&share), "{share}");
+}
+
+#[test]
+fn of_500_targets_95_of_100_are_hit_within_the_stated_radius_of_a_loaded_arm() {
+    let effects = [2, 3].map(|joint| Physical::JointCompliance(JointCompliance { joint, rad_per_nm: 8e-8 }));
+    let cell = Cell::new(Kind::Sr210d, effects.into());
+    let effects: Vec<&str> = GEOMETRY.into_iter().chain(["joint_compliance"]).collect();
+    let share = within(&cell, &effects, &[0.0, 150.0]);
+    println!("within the stated 95 %: {:.1} %", 100.0 * share);
+    assert!((0.93..=0.97).contains(&share), "{share}");
+}
