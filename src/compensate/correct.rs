@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, PositionUncertainty, Reach, ToolGoal, Uncertainty,
-    beyond_limits, inverse, least_change, one_step,
+    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, PositionUncertainty, Reach, Remark, ToolGoal,
+    Uncertainty, beyond_limits, inverse, least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -62,8 +62,15 @@ pub struct CorrectedCommand {
     pub residual: f64,
     pub iterations: usize,
     pub uncertainty: Option<PositionUncertainty>,
-    /// What is wrong with it; empty if nothing.
-    pub remark: String,
+    /// What is wrong with it.
+    pub remarks: Vec<Remark>,
+}
+
+impl CorrectedCommand {
+    /// What is wrong with it, in words; empty if nothing.
+    pub fn remark(&self) -> String {
+        self.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// Corrects targets in their order: what a target does not say follows from the one before.
@@ -204,17 +211,19 @@ impl<'a> Corrector<'a> {
         let faces = !turned || found.turn <= TURNED_AWAY;
         let reached = off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
         if !reached {
-            remarks.push(if faces { format!("not reached, {:.3} mm off", found.residual * 1e3) } else { "not reached".into() });
+            remarks.push(Remark::NotReached(faces.then_some(found.residual)));
         }
         if turned {
-            remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
+            remarks.push(Remark::Turned(found.turn));
         }
         if reached {
-            remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
-            remarks.extend(self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance)));
+            let limits = beyond_limits(self.arm.model().robot.description(), &found.q);
+            remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
+            let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
+            remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             let share = reach.share();
             if share < 1.0 {
-                remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+                remarks.push(Remark::Faded(share));
             }
         }
         CorrectedCommand {
@@ -223,7 +232,7 @@ impl<'a> Corrector<'a> {
             residual: found.residual,
             iterations: found.iterations,
             uncertainty,
-            remark: remarks.join("; "),
+            remarks,
         }
     }
 }
@@ -251,9 +260,10 @@ impl CorrectionTotals {
             self.residual_max = self.residual_max.max(answer.residual);
         }
         self.not_reached += u64::from(answer.q.is_none());
-        self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
-        self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
-        self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
+        let any = |is: fn(&Remark) -> bool| u64::from(answer.remarks.iter().any(is));
+        self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
+        self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
+        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
     }
 }
 

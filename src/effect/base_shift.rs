@@ -40,4 +40,8 @@ impl Cause for BaseShift {
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
     }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
 }

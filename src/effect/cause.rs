@@ -57,6 +57,16 @@ pub trait Cause: Sync {
         false
     }
 
+    /// Whether it is how a joint yields to its load torque: errors of the torque model move nothing without.
+    fn yields_to_torque(&self) -> bool {
+        false
+    }
+
+    /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
+    fn is_separable_by_poses(&self) -> bool {
+        true
+    }
+
     /// Whether its forms describe something that is in no list.
     fn is_nameless(&self) -> bool {
         false

@@ -39,7 +39,7 @@ impl Cause for GearMotorCyclic {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let amplitude = amplitude(summary.parameters.get(0..2));
+        let amplitude = amplitude(&summary.parameters.iter().collect::<Vec<_>>());
         format!("{} errs periodically with its motor's angle, amplitude {amplitude}", summary.place)
     }
 }

@@ -7,7 +7,6 @@ use super::{
     Summary, Survey, Variable,
 };
 use crate::robot::{Measurements, RobotModel};
-use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
 pub struct JointCompliance;
@@ -54,6 +53,10 @@ impl Cause for JointCompliance {
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Windup::deserialize(body).map(Form::from))
     }
+
+    fn yields_to_torque(&self) -> bool {
+        true
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,9 +89,10 @@ impl Effect for Windup {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let (unit, prior_sigma) = match self.load {
-            Load::GravityTorque => (Unit::RadianPerNewtonMetre, 1e-3),
-            Load::MotorCurrent => (Unit::RadianPerAmpere, 1e-2),
+        let unit = self.load.unit_of_compliance();
+        let prior_sigma = match self.load {
+            Load::GravityTorque => 1e-3,
+            Load::MotorCurrent => 1e-2,
         };
         self.joints(robot)
             .map(|j| ParameterSpec { name: format!("joint_compliance.j{}", j + 1), place: Place::Joint(j), unit, prior_sigma })

@@ -105,6 +105,10 @@ impl Cause for JointHardening {
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(BentWindup::deserialize(body).map(Form::from))
     }
+
+    fn yields_to_torque(&self) -> bool {
+        true
+    }
 }
 
 impl BentWindup {

@@ -74,8 +74,8 @@ impl Cause for JointLogLag {
                 figure(n.value * 100.0, 2)
             ),
             Some(_) => {
-                let shares = summary.parameters.iter().filter(|n| n.name.contains("share"));
-                let most = shares.map(|n| n.value * 100.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+                let shares = summary.parameters.iter().map(|n| n.value * 100.0);
+                let most = shares.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
                 format!(
                     "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
                      still to come",
@@ -92,6 +92,10 @@ impl Cause for JointLogLag {
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Lag::deserialize(body).map(Form::from))
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }
 

@@ -72,11 +72,9 @@ impl Cause for JointTable {
 }
 
 /// The strongest orders per joint turn of a table, in words.
-pub(super) fn strongest_orders(table: &Term, numbers: &[ParameterEstimate]) -> String {
+pub(super) fn strongest_orders(table: &Term, numbers: &[&ParameterEstimate]) -> String {
     let Basis::Fading { low, high, .. } = table.basis() else { return String::new() };
-    let wave =
-        |n: &ParameterEstimate| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
-    let mut waves: Vec<(f64, f64)> = numbers.iter().filter(|n| n.name.contains("cos")).filter_map(wave).collect();
+    let mut waves: Vec<(f64, f64)> = (1..).zip(numbers).map(|(k, n)| (f64::from(k), n.value.abs())).collect();
     waves.sort_by(|a, b| b.1.total_cmp(&a.1));
     // A cosine of k half periods over the range makes k pi / range periods a turn.
     let orders = waves.iter().take(4).map(|(k, _)| format!("{:.0}", k * PI / (high - low)));

@@ -210,6 +210,21 @@ pub enum Load {
     MotorCurrent,
 }
 
+impl Load {
+    /// The unit of a joint's compliance to this load.
+    pub fn unit_of_compliance(self) -> Unit {
+        match self {
+            Self::GravityTorque => Unit::RadianPerNewtonMetre,
+            Self::MotorCurrent => Unit::RadianPerAmpere,
+        }
+    }
+
+    /// The load to which a compliance of this unit belongs.
+    pub fn of_compliance(unit: Unit) -> Option<Self> {
+        [Self::GravityTorque, Self::MotorCurrent].into_iter().find(|load| load.unit_of_compliance() == unit)
+    }
+}
+
 /// What an effect needs to be made.
 #[derive(Debug, Clone, Copy)]
 pub struct EffectContext {

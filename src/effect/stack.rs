@@ -45,6 +45,11 @@ impl EffectStack {
         self.effects.iter().map(|(effect, range)| (effect.as_ref(), range.clone()))
     }
 
+    /// Positions of the parameters of an effect by its canonical name, at all of its places.
+    pub fn parameters_of(&self, name: &str) -> impl Iterator<Item = usize> {
+        self.effects().filter(move |(effect, _)| effect.name() == name).flat_map(|(_, range)| range)
+    }
+
     pub fn scratch(&self, robot: &RobotModel) -> PlacementBuffers {
         PlacementBuffers::new(robot.joints())
     }

@@ -36,4 +36,8 @@ impl Cause for ToolShift {
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
     }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
 }

@@ -82,4 +82,8 @@ impl Cause for TrackerDrift {
     fn measure(&self) -> Option<Measure> {
         Some(super::thermal_growth::MEASURE)
     }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
 }

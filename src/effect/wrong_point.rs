@@ -19,6 +19,10 @@ impl Cause for Outlier {
     fn is_of_the_measurement(&self) -> bool {
         true
     }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
 }
 
 pub struct MislabelledPoint;
@@ -37,5 +41,9 @@ impl Cause for MislabelledPoint {
 
     fn is_of_the_measurement(&self) -> bool {
         true
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

@@ -41,4 +41,8 @@ impl Cause for ZeroShift {
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
     }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
+    }
 }

@@ -45,8 +45,7 @@ const TIE: f64 = 0.99;
 /// Tests every parameter but the base's, in order of precedence.
 pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<ParameterChange> {
     let stack = &before.model.stack;
-    let base: Vec<usize> =
-        stack.effects().filter(|(effect, _)| effect.name() == BaseFrame::NAME).flat_map(|(_, range)| range).collect();
+    let base: Vec<usize> = stack.parameters_of(BaseFrame::NAME).collect();
     let shared: Vec<usize> = (0..stack.specs().len()).filter(|k| !base.contains(k)).collect();
     let mut reduced = Reduced::of(before, after, &shared, &base);
     let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;

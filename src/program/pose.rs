@@ -13,8 +13,8 @@ use std::f64::consts::PI;
 pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
     let answers = corrector.batch(literals.iter().map(target).collect());
     let solved = |(literal, answer): (&Literal, &CorrectedCommand)| match &answer.q {
-        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, q), remark: answer.remark.clone() }),
-        None => Err(answer.remark.clone()),
+        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, q), remark: answer.remark() }),
+        None => Err(answer.remark()),
     };
     literals.iter().zip(&answers).map(solved).collect()
 }

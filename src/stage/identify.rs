@@ -2,7 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, identified, whole};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
@@ -95,7 +95,8 @@ impl Stage for Identify {
             }
         }
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
-        let (candidates, held) = self.parameter_set().apply(&mut model, |_| true, context);
+        let all: Vec<usize> = (0..model.x.len()).collect();
+        let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
@@ -163,21 +164,19 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
 const PLAUSIBLE_RATIO: f64 = 5e-4;
-const COMPLIANCE: &str = "joint_compliance";
 
 /// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
 fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &EffectContext, context: &Context) {
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
-        let specs = model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("reduction_ratio."));
-        let free = specs.filter_map(|(k, _)| match &fitted.statuses[k] {
-            ParameterStatus::Free(sigma) if model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => Some(k),
-            _ => None,
-        });
-        free.collect()
+        let beyond = |k: &usize| match &fitted.statuses[*k] {
+            ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
+            _ => false,
+        };
+        model.stack.parameters_of(ReductionRatio::NAME).filter(beyond).collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = whole(COMPLIANCE, setting) else { return };
-    let asked = model.stack.effects().any(|(effect, _)| effect.name() == COMPLIANCE);
+    let Some(compliance) = whole(JointCompliance::NAME, setting) else { return };
+    let asked = model.stack.effects().any(|(effect, _)| effect.name() == JointCompliance::NAME);
     if suspects.is_empty() || asked {
         return;
     }
@@ -201,8 +200,9 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
     if gain > DECISIVE {
         context.services.warn(format!(
-            "{opening}; with `{COMPLIANCE}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
+            "{opening}; with `{}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
+            JointCompliance::NAME,
             list(&rival, &suspects),
             fitted.excess_sigma * 1e3,
             refitted.excess_sigma * 1e3

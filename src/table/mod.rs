@@ -90,7 +90,7 @@ pub use corrections::{Corrections, CorrectionsRow};
 pub use covariance::{CovarianceRow, CovarianceTable};
 pub use curves::{CurveRow, Curves};
 pub use document::{Document, DocumentRow};
-pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals};
+pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals, is_separable_by_poses};
 pub use fit::{Fit, FitRow};
 pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
 pub use intake::{Intake, IntakeRow};

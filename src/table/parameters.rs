@@ -28,7 +28,9 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ToolOffset, identified, whole};
+use crate::effect::{
+    AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, JointCompliance, Load, ToolOffset, identified, whole,
+};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
 use crate::robot::{self, MeasurementSetup, RobotModel, Target};
@@ -202,12 +204,8 @@ impl Parameters {
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
     pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let load =
-            match self.0.iter().find(|row| row.effect == "joint_compliance" && row.form.is_none()).map(|row| row.unit.as_str()) {
-                Some("rad/A") => Load::MotorCurrent,
-                Some(_) => Load::GravityTorque,
-                None => load,
-            };
+        let compliance = self.0.iter().find(|row| row.effect == JointCompliance::NAME && row.form.is_none());
+        let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
         let robot = self.with_setup(robot);
         let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
@@ -270,6 +268,18 @@ impl Parameters {
         }
         let pose = |[x, y, z, rx, ry, rz]: [f64; 6]| Pose::from_rotation_vector(Vector3::new(rx, ry, rz), Vector3::new(x, y, z));
         parts.into_iter().map(|(name, part)| (name, pose(part))).collect()
+    }
+
+    /// The same of a robot whose base stands elsewhere in the tracker's frame.
+    pub fn standing_at(mut self, base: &Pose) -> Self {
+        let (translation, rotation) = (base.translation, base.rotation_vector());
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
+                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
+                self.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
+            }
+        }
+        self
     }
 
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.

@@ -35,7 +35,7 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
         let targets = targets(&batch, &columns, layout, rows)?;
         let answers = corrector.batch(targets);
         for (k, answer) in answers.iter().enumerate().filter(|(_, answer)| answer.q.is_none()) {
-            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark);
+            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark());
         }
         let columns = answered(&batch, &columns, layout, &answers);
         let batch = RecordBatch::try_new(out_schema.clone(), columns).map_err(|error| Error::Bug(error.to_string()))?;
@@ -136,7 +136,7 @@ fn answered(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, answe
             out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3));
             out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3));
         }
-        out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark.as_str())).collect::<StringArray>()));
+        out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark())).collect::<StringArray>()));
     }
     out
 }

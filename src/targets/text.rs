@@ -88,7 +88,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             .collect();
         for (k, answer) in rows.iter().enumerate().filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1))) {
             if answer.q.is_none() {
-                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark);
+                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark());
             }
         }
         let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
@@ -280,9 +280,10 @@ impl TextTable<'_> {
                 append(Some(known.sigma * 1e3), 4);
                 append(Some(known.u95 * 1e3), 4);
             }
-            let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
+            let remark = answer.remark();
+            let quote = if remark.contains(self.delimiter) { "\"" } else { "" };
             out.push(self.delimiter);
-            out.extend([quote, &answer.remark, quote]);
+            out.extend([quote, &remark, quote]);
         }
         out.push_str(ending);
     }

@@ -201,7 +201,13 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
         places.insert(form.place());
         let numbers: Vec<ParameterEstimate> = specs
             .iter()
-            .map(|spec| ParameterEstimate { name: spec.name.clone(), value: 1.5, unit: people(spec.unit).1, sigma: None })
+            .map(|spec| ParameterEstimate {
+                name: spec.name.clone(),
+                form: 0,
+                value: 1.5,
+                unit: people(spec.unit).1,
+                sigma: None,
+            })
             .collect();
         let summary =
             Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock: Clock::Seconds };

@@ -108,7 +108,7 @@ impl PoseAnswer for Apart<'_> {
             "run": self.run,
             "seed": self.request.seed,
             "finding": { "rank": self.finding.rank, "effect": self.finding.effect, "where": self.finding.place },
-            "rival": { "effect": self.rival.0, "where": self.rival.1, "form": self.form },
+            "rival": { "effect": self.rival.0, "where": self.rival.1.to_string(), "form": self.form },
             "sigma_mm": self.sigma,
             "temperature_c": self.circumstances.temperature,
             "points": self.rows,
