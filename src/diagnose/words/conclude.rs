@@ -39,7 +39,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(fitter.memory.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
-    let folds = cross_validate(&state.model, data, &state.screening.kept, &state.fitted, FOLDS, fitter.question.seed);
+    let folds = cross_validate(
+        &Session { data, rows: &state.screening.kept, model: &state.model, fitted: &state.fitted },
+        FOLDS,
+        fitter.question.seed,
+    );
     Diagnosis {
         verdict,
         noise_floor: misfit.noise_floor,
