@@ -51,7 +51,7 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
-//! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::Kind`] | its `mod`, and one line in [`observation::KINDS`] |
+//! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |

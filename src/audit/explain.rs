@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::{Error, Result, nearest};
-use crate::pipeline::{Change, Manifest, StageReport, changes_of};
+use crate::pipeline::{KeyChange, Manifest, StageReport, changes_of};
 use crate::store::Store;
 
 #[derive(Debug, Clone, Serialize)]
@@ -13,7 +13,7 @@ pub struct Explanation {
     /// The run that the stage is compared with: the last one before of this pipeline that had it, of a complete run a
     /// complete one.
     pub before: Option<String>,
-    pub changes: Vec<Change>,
+    pub changes: Vec<KeyChange>,
     /// For every input that changed: the stage that wrote it.
     pub writers: Vec<(String, String)>,
 }

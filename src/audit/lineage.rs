@@ -8,14 +8,14 @@ use crate::store::{ActionRecord, Store, TableHash};
 
 /// A table with the action that made it.
 #[derive(Debug, Clone, Serialize)]
-pub struct Node {
+pub struct LineageNode {
     pub table_hash: TableHash,
     /// Nothing where the store has no record of who made it.
-    pub made: Option<Made>,
+    pub made: Option<Provenance>,
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Made {
+pub struct Provenance {
     pub stage: String,
     pub uses: String,
     pub implementation: u32,
@@ -30,12 +30,12 @@ pub struct Made {
     /// Raw files: name and blake3.
     pub files: Vec<(String, String)>,
     /// Input tables by port; empty where they were told already.
-    pub reads: Vec<(String, Node)>,
+    pub reads: Vec<(String, LineageNode)>,
     pub told_before: bool,
 }
 
 /// Traces the table whose content hash begins with `start`.
-pub fn lineage(store: &Store, start: &str) -> Result<Node> {
+pub fn lineage(store: &Store, start: &str) -> Result<LineageNode> {
     let mut makers: BTreeMap<TableHash, (ActionRecord, String)> = BTreeMap::new();
     for record in store.records()? {
         for (port, table) in &record.tables {
@@ -54,7 +54,7 @@ pub fn lineage(store: &Store, start: &str) -> Result<Node> {
     }
 }
 
-fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>, told: &mut BTreeSet<String>) -> Node {
+fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>, told: &mut BTreeSet<String>) -> LineageNode {
     let made = makers.get(hash).map(|(record, port)| {
         let told_before = !told.insert(record.id.to_string());
         let table = record.tables.get(port);
@@ -64,7 +64,7 @@ fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>,
         } else {
             reads.map(|(port, read)| (port.clone(), trace(&read.table, makers, told))).collect()
         };
-        Made {
+        Provenance {
             stage: record.key.id.clone(),
             uses: record.key.stage.clone(),
             implementation: record.key.implementation,
@@ -81,5 +81,5 @@ fn trace(hash: &TableHash, makers: &BTreeMap<TableHash, (ActionRecord, String)>,
             told_before,
         }
     });
-    Node { table_hash: hash.clone(), made }
+    LineageNode { table_hash: hash.clone(), made }
 }

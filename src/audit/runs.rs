@@ -5,21 +5,21 @@ use std::collections::BTreeSet;
 
 use crate::diff::{DiffOptions, TableDiff, compare};
 use crate::error::Result;
-use crate::pipeline::{Change, Manifest, OutputRecord, changes_of};
+use crate::pipeline::{KeyChange, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
 
 #[derive(Debug, Clone, Serialize)]
 pub struct RunDiff {
-    pub a: Told,
-    pub b: Told,
+    pub a: RunSummary,
+    pub b: RunSummary,
     /// What was put in: settings, files, seeds, implementations. What follows from these is no cause.
-    pub causes: Vec<Setting>,
+    pub causes: Vec<SettingChange>,
     pub tables: Vec<TableChange>,
 }
 
 /// A run in a line.
 #[derive(Debug, Clone, Serialize)]
-pub struct Told {
+pub struct RunSummary {
     pub run: String,
     pub pipeline: String,
     pub started: String,
@@ -27,10 +27,10 @@ pub struct Told {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Setting {
+pub struct SettingChange {
     pub stage: String,
     #[serde(flatten)]
-    pub change: Change,
+    pub change: KeyChange,
 }
 
 /// A table of one or both runs.
@@ -51,7 +51,7 @@ impl RunDiff {
 }
 
 /// Compares run `a` with run `b`: all stages or one, all its ports or one.
-pub fn compare_runs(store: &Store, a: &Place, b: &Place, options: &DiffOptions) -> Result<RunDiff> {
+pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &DiffOptions) -> Result<RunDiff> {
     let (left, right) = (Manifest::of(store, &a.run)?, Manifest::of(store, &b.run)?);
     let (outputs_a, outputs_b) = (outputs(&left, a), outputs(&right, b));
     let names: BTreeSet<&String> = outputs_a.iter().chain(&outputs_b).map(|(name, _)| name).collect();
@@ -70,14 +70,14 @@ pub fn compare_runs(store: &Store, a: &Place, b: &Place, options: &DiffOptions) 
 
 /// A run, or one stage of it, or one of its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct RunAddress {
     pub run: String,
     pub stage: Option<String>,
     pub port: Option<String>,
 }
 
-fn told(manifest: &Manifest) -> Told {
-    Told {
+fn told(manifest: &Manifest) -> RunSummary {
+    RunSummary {
         run: manifest.run_id.clone(),
         pipeline: manifest.pipeline.name.clone(),
         started: manifest.started.clone(),
@@ -85,32 +85,33 @@ fn told(manifest: &Manifest) -> Told {
     }
 }
 
-fn outputs(manifest: &Manifest, place: &Place) -> Vec<(String, OutputRecord)> {
+fn outputs(manifest: &Manifest, place: &RunAddress) -> Vec<(String, OutputRecord)> {
     let stages = manifest.stages.iter().filter(|stage| place.stage.as_ref().is_none_or(|id| id == &stage.id));
     let named = stages.flat_map(|stage| stage.outputs.iter().map(move |output| (stage, output)));
     let wanted = named.filter(|(_, output)| place.port.as_ref().is_none_or(|port| port == &output.port));
     wanted.map(|(stage, output)| (format!("{}.{}", stage.id, output.port), output.clone())).collect()
 }
 
-fn causes(a: &Manifest, b: &Manifest) -> Vec<Setting> {
+fn causes(a: &Manifest, b: &Manifest) -> Vec<SettingChange> {
     let mut causes = Vec::new();
     if a.tool.version != b.tool.version {
-        let change = Change { what: "calib", name: String::new(), before: a.tool.version.clone(), now: b.tool.version.clone() };
-        causes.push(Setting { stage: String::new(), change });
+        let change =
+            KeyChange { what: "calib", name: String::new(), before: a.tool.version.clone(), now: b.tool.version.clone() };
+        causes.push(SettingChange { stage: String::new(), change });
     }
     for stage in &b.stages {
         let before = a.stage(&stage.id);
         if before.is_none() {
-            let change = Change { what: "stage", name: stage.id.clone(), before: "-".into(), now: stage.uses.clone() };
-            causes.push(Setting { stage: stage.id.clone(), change });
+            let change = KeyChange { what: "stage", name: stage.id.clone(), before: "-".into(), now: stage.uses.clone() };
+            causes.push(SettingChange { stage: stage.id.clone(), change });
         }
         let (Some(old), Some(new)) = (before.and_then(|stage| stage.key.as_ref()), &stage.key) else { continue };
         let own = changes_of(old, new).into_iter().filter(|change| change.what != "input");
-        causes.extend(own.map(|change| Setting { stage: stage.id.clone(), change }));
+        causes.extend(own.map(|change| SettingChange { stage: stage.id.clone(), change }));
     }
     for stage in a.stages.iter().filter(|stage| b.stage(&stage.id).is_none()) {
-        let change = Change { what: "stage", name: stage.id.clone(), before: stage.uses.clone(), now: "-".into() };
-        causes.push(Setting { stage: stage.id.clone(), change });
+        let change = KeyChange { what: "stage", name: stage.id.clone(), before: stage.uses.clone(), now: "-".into() };
+        causes.push(SettingChange { stage: stage.id.clone(), change });
     }
     causes
 }

@@ -1,9 +1,9 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{Arm, Corrector, Manner};
+use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
 use crate::error::{Error, Fault, Result, counted};
-use crate::identified::Identified;
+use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{self, Language, Partial, ProgramFile};
 use crate::raw;
@@ -45,8 +45,8 @@ pub(super) struct CompensateArguments {
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = What::Joints)]
     target: What,
     /// Orientation of joint targets: free, for the least change of joints, or kept as the nominal robot has it
-    #[arg(long, value_name = "HOW", value_enum, default_value_t = Orientation::Free)]
-    orientation: Orientation,
+    #[arg(long, value_name = "HOW", value_enum, default_value_t = OrientationUse::Free)]
+    orientation: OrientationUse,
     /// One step by the nominal Jacobian instead of solving (Wang et al. 2020, Fig. 2)
     #[arg(long)]
     one_step: bool,
@@ -89,7 +89,7 @@ enum What {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum Orientation {
+enum OrientationUse {
     Free,
     Keep,
 }
@@ -104,7 +104,7 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
     let identified = arguments.model.load(Purpose::Compensate, command_line)?;
-    let arm = Arm::new(identified.model.clone(), identified.correction.clone());
+    let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
     let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
@@ -156,7 +156,7 @@ fn unit(symbol: Option<&str>) -> Option<Unit> {
     symbol.and_then(Unit::parse)
 }
 
-fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Manner> {
+fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Result<CorrectionOptions> {
     let robot = &identified.model.robot;
     let start = match &arguments.start {
         Some(start) if start.len() != robot.joints() => {
@@ -173,9 +173,9 @@ fn manner(arguments: &CompensateArguments, identified: &Identified) -> Result<Ma
     if arguments.time.is_some() && !clock {
         return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
     }
-    Ok(Manner {
+    Ok(CorrectionOptions {
         cartesian: arguments.target == What::Pose,
-        oriented: arguments.orientation == Orientation::Keep,
+        oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,
         payload: arguments.payload,
         temperature: arguments.temperature,

@@ -1,6 +1,6 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::means::{Means, Task};
+use super::means::{CommandTask, Means};
 use super::pipeline_arguments::told_as;
 use super::{emit, emit_json};
 use crate::audit::{diagnosis, the_stage};
@@ -59,7 +59,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         };
         let id = id.to_string();
         let plan = plan.needed_for(at);
-        let task = Task { purpose: Purpose::Diagnose, selection: Selection::default(), quiet: arguments.quiet };
+        let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), quiet: arguments.quiet };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
         DiagnosisSummary::read(&outcome.manifest.run_id, stage, &store)?

@@ -2,7 +2,7 @@
 
 use super::surroundings::open_store;
 use super::{complain, emit, emit_json};
-use crate::audit::{Place, compare_runs};
+use crate::audit::{RunAddress, compare_runs};
 use crate::diff::{self, Detail, DiffOptions, TableDiff};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
@@ -149,10 +149,10 @@ fn code(same: bool, duplicates: u64, arguments: &DiffArguments) -> u8 {
 }
 
 /// `RUN`, `RUN/STAGE`, `RUN/STAGE/PORT`.
-fn place(store: &Store, text: &str) -> Result<Place> {
+fn place(store: &Store, text: &str) -> Result<RunAddress> {
     let mut parts = text.split('/').map(String::from);
     let run = find_run(store, &parts.next().unwrap_or_default())?;
-    let place = Place { run, stage: parts.next(), port: parts.next() };
+    let place = RunAddress { run, stage: parts.next(), port: parts.next() };
     if parts.next().is_some() {
         return Err(Error::spec(text, "expected a Parquet file, RUN, RUN/STAGE or RUN/STAGE/PORT"));
     }
@@ -170,7 +170,7 @@ fn place(store: &Store, text: &str) -> Result<Place> {
 }
 
 /// The table of a place that names one.
-fn output(store: &Store, place: &Place) -> Result<Option<TableRef>> {
+fn output(store: &Store, place: &RunAddress) -> Result<Option<TableRef>> {
     let (Some(stage), Some(port)) = (&place.stage, &place.port) else { return Ok(None) };
     let manifest = Manifest::of(store, &place.run)?;
     let output = manifest.stage(stage).and_then(|stage| stage.outputs.iter().find(|output| &output.port == port));

@@ -1,7 +1,7 @@
 //! `calib effects`: the library of effects, in words.
 
 use super::{emit, emit_json};
-use crate::effect::{About, CAUSES, cause};
+use crate::effect::{CAUSES, CauseDescription, cause};
 use crate::error::{Error, Result};
 use clap::Args;
 use serde_json::json;
@@ -22,12 +22,12 @@ pub(super) struct EffectsArguments {
 }
 
 pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
-    let chosen: Vec<&About> = match &arguments.name {
+    let chosen: Vec<&CauseDescription> = match &arguments.name {
         None => CAUSES.iter().map(|cause| cause.about()).collect(),
         Some(name) => vec![cause(name).ok_or_else(|| unknown(name))?.about()],
     };
     if arguments.json {
-        let one = |about: &&About| {
+        let one = |about: &&CauseDescription| {
             json!({
                 "name": about.name, "place": about.place, "formula": about.formula, "size": about.size,
                 "confounded": about.confounded, "needs": about.needs,
@@ -39,7 +39,7 @@ pub(super) fn main(arguments: &EffectsArguments) -> Result<()> {
     emit(&text.join("\n"))
 }
 
-fn entry(about: &About) -> String {
+fn entry(about: &CauseDescription) -> String {
     format!(
         "{} ({})\n  formula     {}\n  usual size  {}\n  confounded  {}\n  needs       {}\n",
         about.name, about.place, about.formula, about.size, about.confounded, about.needs

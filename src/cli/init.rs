@@ -2,7 +2,7 @@
 
 use super::emit;
 use crate::error::{Error, Fault, Result};
-use crate::init::{KINDS, Request, RobotFileKind, Start, start};
+use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
     }
-    let start = start(&Request { folder, data, robot: *robot, urdf: urdf.as_deref(), tip })?;
+    let start = start(&InitRequest { folder, data, robot: *robot, urdf: urdf.as_deref(), tip })?;
     let refused = |path: &Path| {
         let place = path.display().to_string();
         move |error: std::io::Error| Error::store(place.clone(), format!("cannot be written: {error}"))
@@ -63,7 +63,7 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
     emit(&closing(arguments, &start, &files))
 }
 
-fn closing(arguments: &InitArguments, start: &Start, files: &[PathBuf; 2]) -> String {
+fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {
     let mut text = String::new();
     for (path, account) in arguments.data.iter().zip(&start.accounts) {
         text.push_str(&format!("{}: {account}\n", path.display()));

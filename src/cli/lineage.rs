@@ -2,7 +2,7 @@
 
 use super::surroundings::open_store;
 use super::{emit, emit_json};
-use crate::audit::{Node, lineage};
+use crate::audit::{LineageNode, lineage};
 use crate::diff::table_hash;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::{Manifest, find_run};
@@ -57,7 +57,7 @@ fn hash(store: &Store, table: &str) -> Result<String> {
     }
 }
 
-fn lines(node: &Node, port: &str, depth: usize, text: &mut String) {
+fn lines(node: &LineageNode, port: &str, depth: usize, text: &mut String) {
     let indent = "  ".repeat(depth);
     let port = if port.is_empty() { String::new() } else { format!("{port} <- ") };
     let hash: String = node.table_hash.as_str().chars().take(12).collect();

@@ -2,7 +2,7 @@
 
 use super::surroundings::{cores, open_store, surroundings};
 use crate::error::Result;
-use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::shell::typed;
 use crate::stage::STAGES;
@@ -25,7 +25,7 @@ pub(super) struct Means {
 }
 
 /// What a pipeline is run for, how much of it, and whether progress is shown.
-pub(super) struct Task {
+pub(super) struct CommandTask {
     pub purpose: Purpose,
     pub selection: Selection,
     pub quiet: bool,
@@ -55,8 +55,8 @@ impl Means {
     }
 
     /// Runs the selected stages; with progress unless the task is a quiet one.
-    pub fn run(&self, plan: &Plan, store: &Store, task: Task, command_line: &[OsString]) -> Result<Outcome> {
-        let Task { purpose, selection, quiet } = task;
+    pub fn run(&self, plan: &Plan, store: &Store, task: CommandTask, command_line: &[OsString]) -> Result<CompletedRun> {
+        let CommandTask { purpose, selection, quiet } = task;
         let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
         let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
         let options = RunOptions { selection, jobs: self.jobs(), purpose };

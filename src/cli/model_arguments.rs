@@ -1,8 +1,8 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
-use super::means::{Means, Task};
+use super::means::{CommandTask, Means};
 use crate::error::{Error, Result};
-use crate::identified::{Files, Identified, steps_of};
+use crate::identified::{Files, IdentifiedModel, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
 use crate::raw::ending;
 use crate::store::Store;
@@ -41,7 +41,7 @@ impl ModelArguments {
     }
 
     /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
-    pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<Identified> {
+    pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
         let identified = self.identified(purpose, command_line)?;
         for warning in &identified.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
@@ -49,24 +49,24 @@ impl ModelArguments {
         Ok(identified)
     }
 
-    fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<Identified> {
+    fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
         let ending = ending(&self.model);
         if ending == "parquet" {
             let Some(robot) = self.robot.clone() else {
                 let message = "say which robot the parameters are of: --robot robot.yaml, or the table `robot` of the same run";
                 return Err(Error::spec(self.model.display().to_string(), message));
             };
-            return Identified::of_files(&Files { parameters: self.model.clone(), robot, unchecked: self.unchecked });
+            return IdentifiedModel::of_files(&Files { parameters: self.model.clone(), robot, unchecked: self.unchecked });
         }
         let (store, step) = (self.means.store()?, self.step.as_deref());
         if !matches!(ending.as_str(), "yaml" | "yml") {
-            return Identified::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step);
+            return IdentifiedModel::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step);
         }
         let plan = self.means.plan(&self.model)?;
         let steps = steps_of(&plan)?;
-        let task = Task { purpose, selection: Selection::default(), quiet: self.quiet };
+        let task = CommandTask { purpose, selection: Selection::default(), quiet: self.quiet };
         let outcome = self.means.run(&plan.needed_for_all(&steps), &store, task, command_line)?;
-        Identified::of_run(&store, &outcome.manifest, step)
+        IdentifiedModel::of_run(&store, &outcome.manifest, step)
     }
 
     /// The id of a run by its name.

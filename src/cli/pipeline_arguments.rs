@@ -1,9 +1,9 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::means::{Means, Task};
+use super::means::{CommandTask, Means};
 use crate::error::{Error, Fault, Result};
-use crate::pipeline::{Outcome, Plan, Purpose, Selection};
+use crate::pipeline::{CompletedRun, Plan, Purpose, Selection};
 use crate::store::Store;
 use clap::Args;
 use serde_json::json;
@@ -35,8 +35,8 @@ impl PipelineArguments {
     }
 
     /// Runs the selected stages with progress.
-    pub fn run(&self, plan: &Plan, store: &Store, selection: Selection, command_line: &[OsString]) -> Result<Outcome> {
-        let task = Task { purpose: Purpose::Run, selection, quiet: self.quiet };
+    pub fn run(&self, plan: &Plan, store: &Store, selection: Selection, command_line: &[OsString]) -> Result<CompletedRun> {
+        let task = CommandTask { purpose: Purpose::Run, selection, quiet: self.quiet };
         self.means.run(plan, store, task, command_line)
     }
 

@@ -4,7 +4,7 @@ use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::effect::identified;
 use crate::error::{Error, Fault, Result, nearest};
-use crate::poses::{Answer, Request, RobotFiles, RunStage, apart, fault, is_known, proposal, write};
+use crate::poses::{PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, proposal, write};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
@@ -104,8 +104,8 @@ pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
     }
 }
 
-fn request(arguments: &PosesArguments) -> Request {
-    Request {
+fn request(arguments: &PosesArguments) -> PoseRequest {
+    PoseRequest {
         count: arguments.count as usize,
         candidates: arguments.candidates as usize,
         seed: arguments.seed,
@@ -120,7 +120,7 @@ fn request(arguments: &PosesArguments) -> Request {
     }
 }
 
-fn show(arguments: &PosesArguments, answer: &impl Answer) -> Result<()> {
+fn show(arguments: &PosesArguments, answer: &impl PoseAnswer) -> Result<()> {
     for warning in answer.warnings() {
         let _ = writeln!(std::io::stderr(), "warning: {warning}");
     }

@@ -4,7 +4,7 @@ use super::pipeline_arguments::PipelineArguments;
 use super::{emit, emit_json};
 use crate::error::{Result, counted};
 use crate::identified::standing_of;
-use crate::pipeline::{Forecast, Outcome, Prospect, Selection, StageStatus, preview};
+use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use crate::summary;
 use crate::table::Withdrawn;
@@ -84,7 +84,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     emit(&text)
 }
 
-fn closing(outcome: &Outcome, seconds: f64) -> String {
+fn closing(outcome: &CompletedRun, seconds: f64) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
@@ -114,7 +114,7 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 }
 
 /// The result of a run for other programs.
-fn document(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+fn document(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
     let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
         let compared = |gone: &Withdrawn| {

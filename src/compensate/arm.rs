@@ -1,7 +1,7 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::{Form, LONG_AFTER, Scratch};
+use crate::effect::{Form, LONG_AFTER, PlacementBuffers};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::Measurements;
@@ -31,7 +31,7 @@ impl Circumstance {
 }
 
 /// An identified arm.
-pub struct Arm {
+pub struct IdentifiedArm {
     model: Model,
     base: Pose,
     correction: Option<Correction>,
@@ -39,7 +39,7 @@ pub struct Arm {
     quiet: Vec<usize>,
 }
 
-impl Arm {
+impl IdentifiedArm {
     /// The arm of a model; effects of the measurement itself are taken out.
     pub fn new(mut model: Model, correction: Option<Correction>) -> Self {
         let of_it = |form: &Form| form.is_of_the_measurement();
@@ -92,8 +92,8 @@ impl Arm {
 
 /// One arm being placed.
 pub struct Reach<'a> {
-    arm: &'a Arm,
-    scratch: Scratch,
+    arm: &'a IdentifiedArm,
+    scratch: PlacementBuffers,
     /// A single row: the command and its circumstances.
     data: Measurements,
     velocities: Vec<Twist>,

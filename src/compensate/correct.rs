@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Arm, Chain, Circumstance, Coverage, Found, Nominal, PositionUncertainty, Reach, Uncertainty, Wanted, beyond_limits, inverse,
-    least_change, one_step,
+    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, PositionUncertainty, Reach, Remark, ToolGoal,
+    Uncertainty, beyond_limits, inverse, least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -22,7 +22,7 @@ const STILL: f64 = 1e-9;
 
 /// A target as it was given, SI.
 #[derive(Debug, Clone, Default)]
-pub struct Target {
+pub struct CommandTarget {
     pub q: Option<Vec<f64>>,
     /// Base frame.
     pub point: Option<Vector3<f64>>,
@@ -36,7 +36,7 @@ pub struct Target {
 
 /// How to correct, and what holds where a target does not say.
 #[derive(Debug, Clone)]
-pub struct Manner {
+pub struct CorrectionOptions {
     /// Cartesian columns are the targets though there are joints; these then say near which posture.
     pub cartesian: bool,
     /// Whether joint targets keep the nominal orientation.
@@ -54,7 +54,7 @@ pub struct Manner {
 
 /// A command and what is known of it, SI.
 #[derive(Debug, Clone)]
-pub struct Answer {
+pub struct CorrectedCommand {
     /// None where the target is not reached: no joints are better than wrong ones.
     pub q: Option<Vec<f64>>,
     /// How far the uncorrected command would be off by the model.
@@ -62,25 +62,32 @@ pub struct Answer {
     pub residual: f64,
     pub iterations: usize,
     pub uncertainty: Option<PositionUncertainty>,
-    /// What is wrong with it; empty if nothing.
-    pub remark: String,
+    /// What is wrong with it.
+    pub remarks: Vec<Remark>,
+}
+
+impl CorrectedCommand {
+    /// What is wrong with it, in words; empty if nothing.
+    pub fn remark(&self) -> String {
+        self.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// Corrects targets in their order: what a target does not say follows from the one before.
 pub struct Corrector<'a> {
-    arm: &'a Arm,
+    arm: &'a IdentifiedArm,
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
-    manner: Manner,
+    manner: CorrectionOptions,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
-    pub tally: Tally,
+    pub tally: CorrectionTotals,
 }
 
 /// Results of all targets.
 #[derive(Debug, Clone, Default)]
-pub struct Tally {
+pub struct CorrectionTotals {
     pub targets: u64,
     pub uncorrected_sum: f64,
     pub uncorrected_max: f64,
@@ -92,7 +99,7 @@ pub struct Tally {
     pub beyond_measured: u64,
 }
 
-impl Tally {
+impl CorrectionTotals {
     /// What the correction does, in a line.
     pub fn summary(&self) -> String {
         format!(
@@ -119,15 +126,20 @@ impl Tally {
 
 struct Job {
     /// None: the point that the nominal robot reaches at `home`.
-    wanted: Option<Wanted>,
+    wanted: Option<ToolGoal>,
     home: Vec<f64>,
     circumstance: Circumstance,
 }
 
 impl<'a> Corrector<'a> {
-    pub fn new(arm: &'a Arm, coverage: Option<Coverage>, uncertainty: Option<Uncertainty>, manner: Manner) -> Self {
+    pub fn new(
+        arm: &'a IdentifiedArm,
+        coverage: Option<Coverage>,
+        uncertainty: Option<Uncertainty>,
+        manner: CorrectionOptions,
+    ) -> Self {
         let joints = arm.model().robot.joints();
-        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: Tally::default() }
+        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
     }
 
     pub fn has_uncertainty(&self) -> bool {
@@ -135,10 +147,10 @@ impl<'a> Corrector<'a> {
     }
 
     /// Answers in the order of the targets, which follow those of the batch before.
-    pub fn batch(&mut self, targets: Vec<Target>) -> Vec<Answer> {
+    pub fn batch(&mut self, targets: Vec<CommandTarget>) -> Vec<CorrectedCommand> {
         let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
         let this: &Self = self;
-        let answers: Vec<Answer> = jobs
+        let answers: Vec<CorrectedCommand> = jobs
             .par_iter()
             .map_init(
                 || (this.arm.reach(), Nominal::new(&this.arm.model().robot)),
@@ -151,7 +163,7 @@ impl<'a> Corrector<'a> {
         answers
     }
 
-    fn prepare(&mut self, target: Target) -> Job {
+    fn prepare(&mut self, target: CommandTarget) -> Job {
         let robot: &RobotModel = &self.arm.model().robot;
         let n = robot.joints();
         let (wanted, home) = match (target.q, target.point) {
@@ -160,7 +172,7 @@ impl<'a> Corrector<'a> {
                 let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
                 let oriented = target.rotation.is_some();
                 let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
-                let wanted = Wanted { pose, oriented };
+                let wanted = ToolGoal { pose, oriented };
                 let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
                 (Some(wanted), home)
             }
@@ -184,10 +196,10 @@ impl<'a> Corrector<'a> {
         Job { wanted, home, circumstance }
     }
 
-    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> Answer {
+    fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> CorrectedCommand {
         reach.under(&job.circumstance);
-        let wanted = job.wanted.unwrap_or_else(|| Wanted { pose: nominal.place(&job.home), oriented: self.manner.oriented });
-        let found: Found = if self.manner.one_step {
+        let wanted = job.wanted.unwrap_or_else(|| ToolGoal { pose: nominal.place(&job.home), oriented: self.manner.oriented });
+        let found: CommandSolution = if self.manner.one_step {
             one_step(reach, nominal, &wanted, &job.home)
         } else {
             Self::reached(reach, &wanted, &job.home)
@@ -199,46 +211,48 @@ impl<'a> Corrector<'a> {
         let faces = !turned || found.turn <= TURNED_AWAY;
         let reached = off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
         if !reached {
-            remarks.push(if faces { format!("not reached, {:.3} mm off", found.residual * 1e3) } else { "not reached".into() });
+            remarks.push(Remark::NotReached(faces.then_some(found.residual)));
         }
         if turned {
-            remarks.push(format!("orientation off by {:.4} deg", found.turn.to_degrees()));
+            remarks.push(Remark::Turned(found.turn));
         }
         if reached {
-            remarks.extend(beyond_limits(self.arm.model().robot.description(), &found.q));
-            remarks.extend(self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance)));
+            let limits = beyond_limits(self.arm.model().robot.description(), &found.q);
+            remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
+            let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
+            remarks.extend(unmeasured.map(Remark::BeyondMeasured));
             let share = reach.share();
             if share < 1.0 {
-                remarks.push(format!("learned correction applies by {:.0} %", 100.0 * share));
+                remarks.push(Remark::Faded(share));
             }
         }
-        Answer {
+        CorrectedCommand {
             q: reached.then_some(found.q),
             uncorrected: found.before,
             residual: found.residual,
             iterations: found.iterations,
             uncertainty,
-            remark: remarks.join("; "),
+            remarks,
         }
     }
 }
 
 impl Corrector<'_> {
     /// Where a whole pose cannot be had, as at a stretched wrist, the point goes before the orientation.
-    fn reached(reach: &mut Reach, wanted: &Wanted, home: &[f64]) -> Found {
+    fn reached(reach: &mut Reach, wanted: &ToolGoal, home: &[f64]) -> CommandSolution {
         let found = least_change(reach, wanted, home, home);
         if !wanted.oriented || (found.residual < REACHED && found.turn < REACHED) {
             return found;
         }
-        let point = Wanted { oriented: false, ..*wanted };
-        let Found { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
+        let point = ToolGoal { oriented: false, ..*wanted };
+        let CommandSolution { q, residual, before, iterations, .. } = least_change(reach, &point, home, home);
         let turn = wanted.turn_left(&reach.place(&q));
-        Found { q, residual, turn, before, iterations: iterations + found.iterations }
+        CommandSolution { q, residual, turn, before, iterations: iterations + found.iterations }
     }
 }
 
-impl Tally {
-    fn add(&mut self, answer: &Answer) {
+impl CorrectionTotals {
+    fn add(&mut self, answer: &CorrectedCommand) {
         self.targets += 1;
         self.uncorrected_sum += answer.uncorrected;
         self.uncorrected_max = self.uncorrected_max.max(answer.uncorrected);
@@ -246,9 +260,10 @@ impl Tally {
             self.residual_max = self.residual_max.max(answer.residual);
         }
         self.not_reached += u64::from(answer.q.is_none());
-        self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
-        self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
-        self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
+        let any = |is: fn(&Remark) -> bool| u64::from(answer.remarks.iter().any(is));
+        self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
+        self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
+        self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where the model was measured, and whether a command leaves that or the joint limits.
 
 use super::arm::Circumstance;
+use super::remark::Unmeasured;
 use crate::robot::Measurements;
 use crate::robot::description::RobotDescription;
 
@@ -25,41 +26,33 @@ impl Coverage {
         Self { joints: (0..data.joints).map(joint).collect(), payload: range(data.payload.iter().copied()), temperature }
     }
 
-    /// What of a command was never measured, in words; empty inside.
-    pub fn beyond(&self, q: &[f64], circumstance: &Circumstance) -> Vec<String> {
+    /// What of a command was never measured; empty inside.
+    pub fn beyond(&self, q: &[f64], circumstance: &Circumstance) -> Vec<Unmeasured> {
         let outside = |value: f64, [lower, upper]: [f64; 2], least: f64| {
             let slack = (SLACK * (upper - lower)).max(least);
             value < lower - slack || value > upper + slack
         };
         let mut out = Vec::new();
-        let joints = (1..).zip(q.iter().zip(&self.joints)).filter(|(_, (q, range))| outside(**q, **range, 1e-3));
-        out.extend(listed(joints.map(|(joint, _)| joint), "beyond the measured range"));
+        let joints = (0..).zip(q.iter().zip(&self.joints)).filter(|(_, (q, range))| outside(**q, **range, 1e-3));
+        let joints: Vec<usize> = joints.map(|(joint, _)| joint).collect();
+        out.extend((!joints.is_empty()).then_some(Unmeasured::Joints(joints)));
         if outside(circumstance.payload, self.payload, 0.05 * self.payload[1].abs()) {
-            out.push("payload beyond the measured range".into());
+            out.push(Unmeasured::Payload);
         }
         if let (Some(now), Some(range)) = (circumstance.temperature, self.temperature)
             && outside(now, range, 1.0)
         {
-            out.push("temperature beyond the measured range".into());
+            out.push(Unmeasured::Temperature);
         }
         out
     }
 }
 
-/// The joints that a command takes out of their limits, in words.
-pub(crate) fn beyond_limits(robot: &RobotDescription, q: &[f64]) -> Option<String> {
+/// The joints, from 0, that a command takes out of their limits.
+pub(crate) fn beyond_limits(robot: &RobotDescription, q: &[f64]) -> Vec<usize> {
     let limits = robot.joints.iter().map(|joint| joint.limits);
     let outside = |q: f64, limits: Option<[f64; 2]>| limits.is_some_and(|[lower, upper]| q < lower || q > upper);
-    listed(
-        (1..).zip(q.iter().zip(limits)).filter(|(_, (q, limits))| outside(**q, *limits)).map(|(joint, _)| joint),
-        "beyond its limits",
-    )
-}
-
-/// `joint 3, 5 <what>`; none where there is none.
-fn listed(joints: impl Iterator<Item = usize>, what: &str) -> Option<String> {
-    let joints: Vec<String> = joints.map(|joint| joint.to_string()).collect();
-    (!joints.is_empty()).then(|| format!("joint {} {what}", joints.join(", ")))
+    (0..).zip(q.iter().zip(limits)).filter(|(_, (q, limits))| outside(**q, *limits)).map(|(joint, _)| joint).collect()
 }
 
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {

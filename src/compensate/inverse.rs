@@ -1,6 +1,6 @@
 //! Inverse kinematics of the nominal robot: Newton's method from a given posture, then from others spread over the limits.
 
-use super::solve::{Nominal, Wanted, least_change};
+use super::solve::{Nominal, ToolGoal, least_change};
 use crate::robot::RobotModel;
 use std::f64::consts::{PI, TAU};
 
@@ -12,7 +12,7 @@ const POSTURES: u32 = 60;
 
 /// Joint positions (rad or m) at which the nominal robot is where it is wanted, near to `from`; those that come nearest where it
 /// cannot be. Within the limits where there are such.
-pub fn inverse(robot: &RobotModel, wanted: &Wanted, from: &[f64]) -> Vec<f64> {
+pub fn inverse(robot: &RobotModel, wanted: &ToolGoal, from: &[f64]) -> Vec<f64> {
     let mut best: Option<(f64, Vec<f64>)> = None;
     for number in 0..=POSTURES {
         let start = if number == 0 { from.to_vec() } else { posture(robot, number) };

@@ -2,7 +2,7 @@
 //!
 //! Lengths, twists, zeros and the tool are constants on the chain, so that the screws at the corrected zero pose hold them exactly.
 
-use super::arm::Arm;
+use super::arm::IdentifiedArm;
 use super::solve::Chain;
 use crate::effect::Place;
 use crate::estimate::Model;
@@ -28,7 +28,7 @@ pub struct LeftOut {
 /// The robot with the identified geometry in place of the nominal; base frame as identified.
 pub fn rigid(model: &Model) -> RobotDescription {
     let kept = |effect: &str| RIGID.contains(&effect);
-    let arm = Arm::new(only(model, |effect, _| kept(effect)), None);
+    let arm = IdentifiedArm::new(only(model, |effect, _| kept(effect)), None);
     let nominal = &model.robot;
     let mut reach = arm.reach();
     let tool = reach.place(&vec![0.0; nominal.joints()]);

@@ -56,14 +56,14 @@ impl Chain for Nominal<'_> {
 
 /// Where the tool shall be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wanted {
+pub struct ToolGoal {
     /// Base frame.
     pub pose: Pose,
     /// Whether the orientation counts, or the point alone.
     pub oriented: bool,
 }
 
-impl Wanted {
+impl ToolGoal {
     /// How far (rad) `pose` is turned away.
     pub fn turn_left(&self, pose: &Pose) -> f64 {
         self.error(pose).fixed_rows::<3>(3).norm()
@@ -84,7 +84,7 @@ impl Wanted {
 
 /// A command and how well it does.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct CommandSolution {
     /// rad or m.
     pub q: Vec<f64>,
     /// What is left of the displacement, m, and of the turn, rad.
@@ -96,7 +96,7 @@ pub struct Found {
     pub iterations: usize,
 }
 
-impl Found {
+impl CommandSolution {
     fn of(q: Vec<f64>, before: &Twist, error: &Twist, iterations: usize) -> Self {
         let [before, residual] = [before, error].map(|error| error.fixed_rows::<3>(0).norm());
         Self { q, residual, turn: error.fixed_rows::<3>(3).norm(), before, iterations }
@@ -107,7 +107,7 @@ impl Found {
 ///
 /// Of redundant joints the change from `home` is least in the sum of squares (1 rad counts as 1 m). Steps are damped where the arm
 /// is singular; what cannot be reached is approached, and the residual says so.
-pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home: &[f64]) -> Found {
+pub fn least_change(chain: &mut impl Chain, wanted: &ToolGoal, start: &[f64], home: &[f64]) -> CommandSolution {
     let mut q = start.to_vec();
     let before = wanted.error(&chain.place(&q));
     let mut error = before;
@@ -142,7 +142,7 @@ pub fn least_change(chain: &mut impl Chain, wanted: &Wanted, start: &[f64], home
     if !placed {
         chain.place(&q);
     }
-    Found::of(q, &before, &error, iterations)
+    CommandSolution::of(q, &before, &error, iterations)
 }
 
 fn harder(damping: f64) -> f64 {
@@ -195,7 +195,7 @@ fn step<'a>(
 }
 
 /// The paper's mapping: the predicted error at `home`, taken back once by the nominal Jacobian.
-pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &Wanted, home: &[f64]) -> Found {
+pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &ToolGoal, home: &[f64]) -> CommandSolution {
     let error = wanted.error(&real.place(home));
     nominal.place(home);
     let jacobian = nominal.velocities();
@@ -205,5 +205,5 @@ pub fn one_step(real: &mut impl Chain, nominal: &mut Nominal, wanted: &Wanted, h
         None => home.to_vec(),
     };
     let left = wanted.error(&real.place(&q));
-    Found::of(q, &error, &left, 1)
+    CommandSolution::of(q, &error, &left, 1)
 }

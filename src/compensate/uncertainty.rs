@@ -1,6 +1,6 @@
 //! How certain a compensated position is: the covariance of the parameters, carried to the point.
 
-use super::arm::{Arm, Reach};
+use super::arm::{IdentifiedArm, Reach};
 use crate::estimate::Covariance;
 use crate::statistics::radius_95;
 use nalgebra::{Matrix3, Vector3};
@@ -33,7 +33,7 @@ pub struct Uncertainty {
 
 impl Uncertainty {
     /// Of the parameters of `arm`; what belonged to the measurement alone does not blur the arm.
-    pub fn new(arm: &Arm, covariance: Covariance, scatter: Scatter) -> Self {
+    pub fn new(arm: &IdentifiedArm, covariance: Covariance, scatter: Scatter) -> Self {
         let mut row = vec![None; arm.model().x.len()];
         covariance.parameters().iter().enumerate().for_each(|(k, parameter)| row[*parameter] = Some(k));
         arm.of_the_measurement().iter().for_each(|parameter| row[*parameter] = None);

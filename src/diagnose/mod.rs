@@ -25,7 +25,7 @@ pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
 pub use types::{
     Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question, RivalCause,
-    SpectrumLine, Verdict,
+    SpectrumLine, VerdictKind,
 };
 pub use words::other_means;
 

@@ -28,7 +28,7 @@ pub fn against_simulation(
     let mut out = data.clone();
     for row in 0..data.rows() {
         if there(&row) {
-            let seat = robot.seat(robot.gauging().target(data.target(row)));
+            let seat = robot.seat(robot.setup().target(data.target(row)));
             let rigid = (robot.last_body(data.q(row)) * *seat).translation;
             out.position[row] += base.point(&rigid) - frame.point(&point(row));
         } else {

@@ -3,9 +3,9 @@
 use super::pool::{CachedHypotheses, HypothesisSet};
 use super::round::compliance;
 use super::whitened::WhitenedProblem;
-use crate::effect::{Effect, EffectStack, Form, Hypothesis, Load, Setting, Survey, Unknown, hypotheses, whole};
+use crate::effect::{Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown, hypotheses, whole};
 use crate::estimate::Model;
-use crate::estimate::choose::{Contest, Side};
+use crate::estimate::choose::{Alternative, Contest};
 use crate::robot::Measurements;
 use std::collections::BTreeSet;
 
@@ -22,9 +22,9 @@ pub struct DiagnosedModel<'a> {
     pub free: &'a [usize],
 }
 
-/// The finding of these forms beside the rival `effect` at `place` (`joint 2` or `j2`): of its forms the one that fits
+/// The finding of these forms beside the rival `effect` at `place`: of its forms the one that fits
 /// best in its place, and as it fits there. Fails with a sentence where the recording knows no such rival.
-pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&str, &str)) -> Result<(Contest, Form), String> {
+pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&str, Place)) -> Result<(Contest, Form), String> {
     let DiagnosedModel { model, data, rows, free } = *diagnosed;
     let problem = WhitenedProblem::new(model, data, rows.to_vec());
     let (torque, compliance) = (problem.torques(), compliance(model));
@@ -60,7 +60,7 @@ pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&
     let held = both.stack.effects().find(|(other, _)| other.form() == Some(&rival.form));
     let theirs: Vec<usize> = held.map(|(_, range)| range.collect()).unwrap_or_default();
     let sizes = own.iter().map(|k| model.x[*k]).collect();
-    let sides = [Side { parameters: own, sizes }, Side { parameters: theirs, sizes: fitted }];
+    let sides = [Alternative { parameters: own, sizes }, Alternative { parameters: theirs, sizes: fitted }];
     Ok((Contest { model: both, nuisances, sides }, rival.form.clone()))
 }
 
@@ -76,21 +76,23 @@ fn best(pool: &CachedHypotheses, first: usize) -> Option<(f64, usize)> {
 }
 
 /// All that diagnosis would try under this name at this place.
-fn rivals(survey: &Survey, effect: &str, place: &str, finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
+fn rivals(survey: &Survey, effect: &str, place: Place, finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
     // What is called by its shape alone.
     let named = |form: &Form| form.name() == effect || form.is(&Unknown) && form.called(&[], survey) == effect;
     let all = hypotheses(survey).into_iter().filter(|hypothesis| named(&hypothesis.form));
     let all: Vec<Hypothesis> = all.filter(|hypothesis| finding != std::slice::from_ref(&hypothesis.form)).collect();
-    let here = |form: &Form| form.place().to_string() == place || form.place().tag() == place;
-    let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| here(&hypothesis.form)).cloned().collect();
+    let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| hypothesis.form.place() == place).cloned().collect();
     if !own.is_empty() {
         return Ok(own);
     }
-    let places: BTreeSet<String> = all.iter().map(|hypothesis| hypothesis.form.place().to_string()).collect();
+    let places: BTreeSet<Place> = all.iter().map(|hypothesis| hypothesis.form.place()).collect();
     if places.is_empty() {
         return Err(format!("{effect} cannot be tried on this robot and recording"));
     }
-    Err(format!("{effect} has no place `{place}` here; allowed: {}", places.into_iter().collect::<Vec<_>>().join(", ")))
+    Err(format!(
+        "{effect} has no place `{place}` here; allowed: {}",
+        places.iter().map(Place::to_string).collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// The model with one form more, at zero, where it has it not.
@@ -98,7 +100,7 @@ fn with(model: &Model, form: &Form) -> Model {
     if model.stack.effects().any(|(other, _)| other.form() == Some(form)) {
         return model.clone();
     }
-    let setting = Setting { base: *model.stack.base(), load: Load::GravityTorque };
+    let setting = EffectContext { base: *model.stack.base(), load: Load::GravityTorque };
     let again = |effect: &dyn Effect| -> Option<Box<dyn Effect>> {
         match effect.form() {
             Some(form) => Some(Box::new(form.clone())),

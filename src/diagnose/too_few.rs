@@ -1,7 +1,7 @@
 //! Too few rows to ask what was left out: the nominal robot in its place, and no findings.
 
 use super::misfit::Misfit;
-use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, Verdict};
+use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, VerdictKind};
 use crate::effect::{BasePlacement, Effect, EffectStack};
 use crate::estimate::{FitOptions, Model, align, fit_screened};
 
@@ -13,14 +13,14 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let Question { robot, data, fit, .. } = *question;
     let base = align(robot, data, fit);
     let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
-    let mut model = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
-    let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let (fitted, screening) = fit_screened(&mut model, data, &FitOptions { rows: fit, candidates: &candidates }, question.set);
+    let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
+    let candidates: Vec<usize> = (0..start.x.len()).collect();
+    let (model, fitted, screening) = fit_screened(&start, data, &FitOptions { rows: fit, candidates: &candidates }, question.set);
     let predicted = model.predict(data);
     let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
     let errors = ErrorLengths::of(data, &predicted, &misfit.rows);
     Diagnosis {
-        verdict: Verdict::NotAsked,
+        verdict: VerdictKind::NotAsked,
         noise_floor: misfit.noise_floor,
         before: errors,
         after: errors,

@@ -132,7 +132,7 @@ pub struct Located {
 
 /// What the data say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum VerdictKind {
     Explained,
     NothingMissing,
     Unexplained,
@@ -140,7 +140,7 @@ pub enum Verdict {
     NotAsked,
 }
 
-impl Verdict {
+impl VerdictKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Explained => "explained",
@@ -174,7 +174,7 @@ impl ErrorLengths {
 
 /// The outcome of a diagnosis.
 pub struct Diagnosis {
-    pub verdict: Verdict,
+    pub verdict: VerdictKind,
     /// Length of the noise of a row, rms, m.
     pub noise_floor: f64,
     /// Of held-out rows (of the fitted ones where none are held out), suspects apart.

@@ -9,10 +9,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::columns::Comparison;
+use super::columns::ColumnPair;
 use super::key::{KeyCell, Keys, Pairing};
-use super::measure::{Cell, Value};
-use super::source::{Kind, Source};
+use super::measure::{CellDifference, CellValue};
+use super::source::{CellKind, TableFile};
 use crate::error::{Error, Result};
 
 /// Rows that are gathered before they are written.
@@ -35,15 +35,15 @@ enum KeyBuilder {
 }
 
 impl CellWriter {
-    pub fn create(path: &Path, a: &Source, key: &[String]) -> Result<Self> {
+    pub fn create(path: &Path, a: &TableFile, key: &[String]) -> Result<Self> {
         let refused = |e: &dyn std::fmt::Display| Error::store(path.display().to_string(), format!("cannot write: {e}"));
         let mut fields = Vec::new();
         let mut keys = Vec::new();
         for name in key {
             let kind = a.position(name).map(|at| a.columns[at].kind);
             let (data_type, builder) = match kind {
-                Some(Kind::Float) => (DataType::Float64, KeyBuilder::Float(Float64Builder::new())),
-                Some(Kind::Int | Kind::Flag) => (DataType::Int64, KeyBuilder::Int(Int64Builder::new())),
+                Some(CellKind::Float) => (DataType::Float64, KeyBuilder::Float(Float64Builder::new())),
+                Some(CellKind::Int | CellKind::Flag) => (DataType::Int64, KeyBuilder::Int(Int64Builder::new())),
                 _ => (DataType::Utf8, KeyBuilder::Text(StringBuilder::new())),
             };
             fields.push(Field::new(name, data_type, true));
@@ -75,12 +75,17 @@ impl CellWriter {
         Ok(())
     }
 
-    pub fn cell(&mut self, keys: &Keys, comparison: &Comparison, cell: &Cell) -> Result<()> {
+    pub fn cell(&mut self, keys: &Keys, comparison: &ColumnPair, cell: &CellDifference) -> Result<()> {
         let class = if cell.changed { "changed" } else { "within_tolerance" };
         self.row(keys.cells(cell.row as usize), class, Some((comparison, cell)))
     }
 
-    fn row(&mut self, key: impl Iterator<Item = KeyCell>, class: &str, what: Option<(&Comparison, &Cell)>) -> Result<()> {
+    fn row(
+        &mut self,
+        key: impl Iterator<Item = KeyCell>,
+        class: &str,
+        what: Option<(&ColumnPair, &CellDifference)>,
+    ) -> Result<()> {
         for (builder, cell) in self.keys.iter_mut().zip(key) {
             match (builder, cell) {
                 (KeyBuilder::Int(builder), KeyCell::Int(value)) => builder.append_value(value),
@@ -93,9 +98,10 @@ impl CellWriter {
                 (KeyBuilder::Text(builder), _) => builder.append_null(),
             }
         }
-        let number =
-            |value: &Value| if let Value::Number(number) = value { Some(*number).filter(|x| x.is_finite()) } else { None };
-        let text = |value: &Value| if let Value::Text(text) = value { Some(text.clone()) } else { None };
+        let number = |value: &CellValue| {
+            if let CellValue::Number(number) = value { Some(*number).filter(|x| x.is_finite()) } else { None }
+        };
+        let text = |value: &CellValue| if let CellValue::Text(text) = value { Some(text.clone()) } else { None };
         let cell = what.map(|(_, cell)| cell);
         let texts = [
             Some(class.to_string()),

@@ -2,19 +2,19 @@
 
 use std::collections::BTreeSet;
 
-use super::source::{Column, Kind, Source};
+use super::source::{CellKind, TableColumn, TableFile};
 use super::{DiffOptions, Discrepancy, Tolerances};
 use crate::error::{Error, Result, nearest};
 use crate::units::{Quantity, Unit};
 
 /// Columns of A and of B that hold the same.
 #[derive(Debug, Clone)]
-pub(super) struct Comparison {
+pub(super) struct ColumnPair {
     /// As A calls it.
     pub name: String,
     pub a: Vec<usize>,
     pub b: Vec<usize>,
-    pub how: How,
+    pub how: Comparator,
     /// Of the difference; empty where there is none, `row` where every row has its own.
     pub unit: String,
     /// B's values are multiplied by the first and added to the second, so that they are in A's unit.
@@ -26,7 +26,7 @@ pub(super) struct Comparison {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum How {
+pub(super) enum Comparator {
     Number,
     /// Modulo a turn, which is given in the column's unit.
     Angle(f64),
@@ -39,12 +39,12 @@ pub(super) enum How {
 
 /// Pairs the columns that are no key; what has no partner or another unit becomes a finding.
 pub(super) fn plan(
-    a: &Source,
-    b: &Source,
+    a: &TableFile,
+    b: &TableFile,
     key: &[String],
     options: &DiffOptions,
     findings: &mut Vec<Discrepancy>,
-) -> Result<Vec<Comparison>> {
+) -> Result<Vec<ColumnPair>> {
     known_names(a, b, options)?;
     let ignored = |name: &String| key.contains(name) || options.ignore.contains(name);
     let mut pairs = Pairs { a, b, options, used_a: BTreeSet::new(), used_b: BTreeSet::new(), findings };
@@ -70,8 +70,8 @@ pub(super) fn plan(
 
 /// Columns that have found their partner so far.
 struct Pairs<'p> {
-    a: &'p Source,
-    b: &'p Source,
+    a: &'p TableFile,
+    b: &'p TableFile,
     options: &'p DiffOptions,
     used_a: BTreeSet<usize>,
     used_b: BTreeSet<usize>,
@@ -80,15 +80,15 @@ struct Pairs<'p> {
 
 impl Pairs<'_> {
     /// Columns that are one rotation: a rotation vector, or a quaternion. None where one of the files lacks some of them.
-    fn rotation(&mut self, names: &[String], vector: bool) -> Option<Comparison> {
-        let at = |source: &Source| names.iter().map(|name| source.position(name)).collect::<Option<Vec<usize>>>();
+    fn rotation(&mut self, names: &[String], vector: bool) -> Option<ColumnPair> {
+        let at = |source: &TableFile| names.iter().map(|name| source.position(name)).collect::<Option<Vec<usize>>>();
         let (at_a, at_b) = (at(self.a)?, at(self.b)?);
         self.used_a.extend(&at_a);
         self.used_b.extend(&at_b);
         let factor = angle_unit(self.a, at_a[0]).map_or(1.0, |unit| unit.to_si(1.0));
-        let how = if vector { How::RotationVector(factor) } else { How::Quaternion };
+        let how = if vector { Comparator::RotationVector(factor) } else { Comparator::Quaternion };
         let (atol, rtol) = tolerance(self.a, &names[0], self.options, Unit::Radian);
-        Some(Comparison {
+        Some(ColumnPair {
             name: names.join(","),
             a: at_a,
             b: at_b,
@@ -102,7 +102,7 @@ impl Pairs<'_> {
     }
 
     /// A column of A with its counterpart in B. None where there is none, or one of another quantity.
-    fn column(&mut self, at_a: usize) -> Option<Comparison> {
+    fn column(&mut self, at_a: usize) -> Option<ColumnPair> {
         let (a, b) = (self.a, self.b);
         let column = &a.columns[at_a];
         let Some(at_b) = counterpart(a, b, at_a, &self.used_b) else {
@@ -114,18 +114,18 @@ impl Pairs<'_> {
         self.kinds_apart(column, theirs);
         let unit_a = unit(a, at_a);
         let conversion = self.conversion((column, unit_a), (theirs, unit(b, at_b)))?;
-        let text = column.kind == Kind::Text || theirs.kind == Kind::Text;
+        let text = column.kind == CellKind::Text || theirs.kind == CellKind::Text;
         let how = match (text, turn(a, at_a)) {
-            (true, _) => How::Text,
-            (false, Some(turn)) => How::Angle(turn),
-            (false, None) => How::Number,
+            (true, _) => Comparator::Text,
+            (false, Some(turn)) => Comparator::Angle(turn),
+            (false, None) => Comparator::Number,
         };
         let (atol, mut rtol) = tolerance(a, &column.name, self.options, unit_a.unwrap_or(Unit::One));
         if conversion != (1.0, 0.0) {
             rtol = rtol.max(CONVERTED);
         }
         let symbol = column.unit.clone().or_else(|| unit_a.map(|unit| unit.symbol().to_string())).unwrap_or_default();
-        Some(Comparison {
+        Some(ColumnPair {
             name: column.name.clone(),
             a: vec![at_a],
             b: vec![at_b],
@@ -139,7 +139,7 @@ impl Pairs<'_> {
     }
 
     /// Says where two columns are stored, or meant, differently.
-    fn kinds_apart(&mut self, ours: &Column, theirs: &Column) {
+    fn kinds_apart(&mut self, ours: &TableColumn, theirs: &TableColumn) {
         if ours.stored != theirs.stored {
             let text = format!("{} in A, {} in B", shown(&ours.stored), shown(&theirs.stored));
             self.findings.push(Discrepancy::new("type", &ours.name, text));
@@ -154,8 +154,8 @@ impl Pairs<'_> {
     /// What makes B's values A's: factor and summand. None where they are of different quantities.
     fn conversion(
         &mut self,
-        (column, ours): (&Column, Option<Unit>),
-        (other, theirs): (&Column, Option<Unit>),
+        (column, ours): (&TableColumn, Option<Unit>),
+        (other, theirs): (&TableColumn, Option<Unit>),
     ) -> Option<(f64, f64)> {
         let mut say = |what: &str, text: String| self.findings.push(Discrepancy::new(what, &column.name, text));
         match (ours, theirs) {
@@ -186,7 +186,7 @@ fn shown(stored: &str) -> &str {
 }
 
 /// Names in the options must be columns.
-fn known_names(a: &Source, b: &Source, options: &DiffOptions) -> Result<()> {
+fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()> {
     let columns: Vec<&str> = a.columns.iter().chain(&b.columns).map(|column| column.name.as_str()).collect();
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {
@@ -205,7 +205,7 @@ fn known_names(a: &Source, b: &Source, options: &DiffOptions) -> Result<()> {
 }
 
 /// Columns that are one rotation together: declared, asked for, or by their names; true for a rotation vector.
-fn groups(a: &Source, options: &DiffOptions) -> Vec<(Vec<String>, bool)> {
+fn groups(a: &TableFile, options: &DiffOptions) -> Vec<(Vec<String>, bool)> {
     let mut groups: Vec<(Vec<String>, bool)> = options.quaternions.iter().map(|names| (names.clone(), false)).collect();
     let declared = |semantic: &str, size: usize, groups: &mut Vec<(Vec<String>, bool)>| {
         let named = a.columns.iter().filter(|column| column.semantic.as_deref() == Some(semantic));
@@ -226,9 +226,9 @@ fn groups(a: &Source, options: &DiffOptions) -> Vec<(Vec<String>, bool)> {
 }
 
 /// The unit of a column: as the file says, or as the end of its name does.
-fn unit(source: &Source, column: usize) -> Option<Unit> {
+fn unit(source: &TableFile, column: usize) -> Option<Unit> {
     let column = &source.columns[column];
-    if !matches!(column.kind, Kind::Float | Kind::Int) {
+    if !matches!(column.kind, CellKind::Float | CellKind::Int) {
         return None;
     }
     match &column.unit {
@@ -243,7 +243,7 @@ fn split(name: &str) -> Option<(&str, &str)> {
 }
 
 /// The column of B of the same name, or of the same name but for the unit at its end.
-fn counterpart(a: &Source, b: &Source, at_a: usize, used: &BTreeSet<usize>) -> Option<usize> {
+fn counterpart(a: &TableFile, b: &TableFile, at_a: usize, used: &BTreeSet<usize>) -> Option<usize> {
     let name = &a.columns[at_a].name;
     if let Some(same) = b.position(name) {
         return Some(same);
@@ -260,33 +260,33 @@ fn counterpart(a: &Source, b: &Source, at_a: usize, used: &BTreeSet<usize>) -> O
     })
 }
 
-fn angle_unit(source: &Source, column: usize) -> Option<Unit> {
+fn angle_unit(source: &TableFile, column: usize) -> Option<Unit> {
     unit(source, column).filter(|unit| unit.quantity() == Quantity::Angle)
 }
 
 /// A full turn in the column's unit, where values compare modulo a turn: as a known schema says; in a foreign file, all angles.
-fn turn(source: &Source, column: usize) -> Option<f64> {
+fn turn(source: &TableFile, column: usize) -> Option<f64> {
     let unit = angle_unit(source, column)?;
     let known = source.schema().is_some_and(|schema| schema.field_of(&source.columns[column].name).is_some());
     let declared = source.columns[column].semantic.as_deref() == Some("angle");
     (declared || !known).then(|| unit.from_si(std::f64::consts::TAU))
 }
 
-fn tolerance(a: &Source, name: &str, options: &DiffOptions, unit: Unit) -> (f64, f64) {
+fn tolerance(a: &TableFile, name: &str, options: &DiffOptions, unit: Unit) -> (f64, f64) {
     let field = a.schema().and_then(|schema| schema.field_of(name)).map(|(field, _)| &field.diff);
     let of = |wish: &Tolerances, schema: Option<f64>| wish.of(name, unit).unwrap_or(schema.unwrap_or(0.0));
     (of(&options.atol, field.map(|field| field.atol)), of(&options.rtol, field.map(|field| field.rtol)))
 }
 
 /// The column with one standard deviation of `name`: as the schema says, or by its name.
-fn sigma(a: &Source, b: &Source, name: &str) -> Option<(usize, usize)> {
+fn sigma(a: &TableFile, b: &TableFile, name: &str) -> Option<(usize, usize)> {
     let named = a.schema().and_then(|schema| schema.field_of(name)).and_then(|(field, _)| field.diff.sigma.clone());
     let (stem, end) = split(name).map_or((name, String::new()), |(stem, end)| (stem, format!("_{end}")));
     let by_name = ["_std", "_sigma"].into_iter().flat_map(|word| [format!("{name}{word}"), format!("{stem}{word}{end}")]);
     let candidates = named.into_iter().chain(by_name).chain([format!("sigma_{name}")]);
     candidates.into_iter().find_map(|candidate| {
         let (at_a, at_b) = (a.position(&candidate)?, b.position(&candidate)?);
-        let numbers = a.columns[at_a].kind == Kind::Float && b.columns[at_b].kind == Kind::Float;
+        let numbers = a.columns[at_a].kind == CellKind::Float && b.columns[at_b].kind == CellKind::Float;
         (numbers && candidate != name).then_some((at_a, at_b))
     })
 }

@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::bytes::same_bytes;
 use super::cells::CellWriter;
-use super::columns::{self, Comparison};
+use super::columns::{self, ColumnPair};
 use super::key::{self, Keys, Pairing};
-use super::measure::{self, Beside, CHANGED, Cell, SAME, Value, WITHIN};
-use super::source::Source;
-use super::{ColumnDiff, DiffOptions, Discrepancy, Equal, Examples, Rows, Side, TableDiff, WorstCell, WorstRow};
+use super::measure::{self, CHANGED, CellDifference, CellValue, ComparedTables, SAME, WITHIN};
+use super::source::TableFile;
+use super::{ColumnDiff, DiffOptions, DiffedTable, Discrepancy, Equal, Examples, RowCounts, TableDiff, WorstCell, WorstRow};
 use crate::error::{Error, Result};
 
 /// Keys shown of rows without a partner.
@@ -19,7 +19,7 @@ const EXAMPLES: usize = 5;
 
 /// Compares the Parquet files `a` and `b`.
 pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
-    let (a, b) = (Source::open(a)?, Source::open(b)?);
+    let (a, b) = (TableFile::open(a)?, TableFile::open(b)?);
     if let Some(out) = options.out.as_deref()
         && [&a, &b].iter().any(|source| same_file(&source.path, out))
     {
@@ -31,7 +31,7 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
         key: Vec::new(),
         equal: None,
         findings: schema_findings(&a, &b, options)?,
-        rows: Rows::default(),
+        rows: RowCounts::default(),
         columns: Vec::new(),
         worst: Vec::new(),
         examples: Examples::default(),
@@ -56,16 +56,16 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     let only_b: Vec<Vec<key::KeyCell>> = if options.out.is_some() { only_b.collect() } else { Vec::new() };
     drop(keys_b);
     let rows: Vec<AtomicU8> = (0..a.rows).map(|_| AtomicU8::new(SAME)).collect();
-    let files = Beside { a: &a, b: &b, pairing: &pairing, rows: &rows };
+    let files = ComparedTables { a: &a, b: &b, pairing: &pairing, rows: &rows };
     let measured = match &options.out {
         None => {
-            let one = |comparison: &Comparison| judge(files, comparison, options, None);
+            let one = |comparison: &ColumnPair| judge(files, comparison, options, None);
             comparisons.par_iter().map(one).collect::<Result<Vec<_>>>()?
         }
         Some(path) => {
             let mut writer = CellWriter::create(path, &a, &diff.key)?;
             writer.unpaired(&keys, &pairing, &only_b)?;
-            let one = |comparison: &Comparison| judge(files, comparison, options, Some((&mut writer, &keys)));
+            let one = |comparison: &ColumnPair| judge(files, comparison, options, Some((&mut writer, &keys)));
             let measured = comparisons.iter().map(one).collect::<Result<Vec<_>>>()?;
             writer.close()?;
             measured
@@ -73,7 +73,7 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
     };
     diff.rows = count(&rows, &pairing);
     drop(rows);
-    let mut cells: Vec<(usize, Cell)> = Vec::new();
+    let mut cells: Vec<(usize, CellDifference)> = Vec::new();
     for (at, (column, worst)) in measured.into_iter().enumerate() {
         let worst_key = column.worst_row.map(|row| keys.text(row as usize));
         diff.columns.push(ColumnDiff { worst_key, ..column });
@@ -85,11 +85,11 @@ pub fn compare(a: &Path, b: &Path, options: &DiffOptions) -> Result<TableDiff> {
 
 /// The content hash that a file carries.
 pub fn table_hash(path: &Path) -> Result<Option<String>> {
-    Ok(Source::open(path)?.table_hash)
+    Ok(TableFile::open(path)?.table_hash)
 }
 
-fn side(source: &Source) -> Side {
-    Side {
+fn side(source: &TableFile) -> DiffedTable {
+    DiffedTable {
         path: source.path.display().to_string(),
         schema: source.table.as_ref().map(|(kind, version)| format!("{kind}/{version}")),
         table_hash: source.table_hash.clone(),
@@ -98,7 +98,7 @@ fn side(source: &Source) -> Side {
 }
 
 /// Whether the tables are the same without a look at their rows.
-fn equal(a: &Source, b: &Source) -> Option<Equal> {
+fn equal(a: &TableFile, b: &TableFile) -> Option<Equal> {
     if a.table_hash.is_some() && a.table_hash == b.table_hash {
         return Some(Equal::Hash);
     }
@@ -114,7 +114,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     found(a).is_some() && found(a) == found(b)
 }
 
-fn schema_findings(a: &Source, b: &Source, options: &DiffOptions) -> Result<Vec<Discrepancy>> {
+fn schema_findings(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<Vec<Discrepancy>> {
     let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else { return Ok(Vec::new()) };
     if kind_a != kind_b && options.key.is_empty() {
         let message =
@@ -135,7 +135,7 @@ fn schema_findings(a: &Source, b: &Source, options: &DiffOptions) -> Result<Vec<
     Ok(vec![Discrepancy::new("schema", "", format!("{kind_a} {version_a} in A, {version_b} in B ({step})"))])
 }
 
-fn key_columns(a: &Source, b: &Source, options: &DiffOptions, findings: &mut Vec<Discrepancy>) -> Result<Vec<String>> {
+fn key_columns(a: &TableFile, b: &TableFile, options: &DiffOptions, findings: &mut Vec<Discrepancy>) -> Result<Vec<String>> {
     if !options.key.is_empty() {
         options.key.iter().try_for_each(|name| a.key_column(name).and(b.key_column(name)).map(|_| ()))?;
         return Ok(options.key.clone());
@@ -176,13 +176,13 @@ fn examples(a: &Keys, b: &Keys, pairing: &Pairing) -> Examples {
 
 /// Measures a column and keeps its worst cells.
 fn judge(
-    files: Beside,
-    comparison: &Comparison,
+    files: ComparedTables,
+    comparison: &ColumnPair,
     options: &DiffOptions,
     mut out: Option<(&mut CellWriter, &Keys)>,
-) -> Result<(ColumnDiff, Vec<Cell>)> {
-    let mut worst: Vec<Cell> = Vec::new();
-    let mut sees = |cell: &Cell| -> Result<()> {
+) -> Result<(ColumnDiff, Vec<CellDifference>)> {
+    let mut worst: Vec<CellDifference> = Vec::new();
+    let mut sees = |cell: &CellDifference| -> Result<()> {
         if let Some((writer, keys)) = &mut out {
             writer.cell(keys, comparison, cell)?;
         }
@@ -197,10 +197,10 @@ fn judge(
     Ok((column, worst))
 }
 
-fn count(rows: &[AtomicU8], pairing: &Pairing) -> Rows {
+fn count(rows: &[AtomicU8], pairing: &Pairing) -> RowCounts {
     let of = |class: u8| rows.iter().filter(|row| row.load(Ordering::Relaxed) == class).count() as u64;
     let (within, changed) = (of(WITHIN), of(CHANGED));
-    Rows {
+    RowCounts {
         same: pairing.paired as u64 - within - changed,
         within_tolerance: within,
         changed,
@@ -214,10 +214,10 @@ fn count(rows: &[AtomicU8], pairing: &Pairing) -> Rows {
 
 /// The rows with the worst cells; of equal ones the earlier row first.
 fn worst_rows(
-    a: &Source,
+    a: &TableFile,
     keys: &Keys,
-    comparisons: &[Comparison],
-    mut cells: Vec<(usize, Cell)>,
+    comparisons: &[ColumnPair],
+    mut cells: Vec<(usize, CellDifference)>,
     limit: usize,
 ) -> Result<Vec<WorstRow>> {
     cells.sort_by(|(column, l), (other, r)| r.score.total_cmp(&l.score).then(l.row.cmp(&r.row)).then(column.cmp(other)));
@@ -249,16 +249,16 @@ fn worst_rows(
     Ok(rows.collect())
 }
 
-fn json(value: &Value) -> serde_json::Value {
+fn json(value: &CellValue) -> serde_json::Value {
     match value {
-        Value::Null => serde_json::Value::Null,
-        Value::Number(number) => (*number).into(),
-        Value::Text(text) => text.clone().into(),
+        CellValue::Null => serde_json::Value::Null,
+        CellValue::Number(number) => (*number).into(),
+        CellValue::Text(text) => text.clone().into(),
     }
 }
 
 /// The units that the given rows name in the table's column of units.
-fn row_units(a: &Source, comparisons: &[Comparison], rows: &[u32]) -> Result<BTreeMap<u32, String>> {
+fn row_units(a: &TableFile, comparisons: &[ColumnPair], rows: &[u32]) -> Result<BTreeMap<u32, String>> {
     let mut units = BTreeMap::new();
     let column = a.columns.iter().position(|column| column.semantic.as_deref() == Some("unit"));
     let Some(column) = column.filter(|_| comparisons.iter().any(|comparison| comparison.unit == "row")) else { return Ok(units) };

@@ -22,7 +22,7 @@ pub fn html(title: &str, notes: &[String], tables: &[(String, TableDiff)]) -> Re
                 .iter()
                 .filter(|column| column.changed + column.within > 0)
                 .map(|column| {
-                    let of = |pick: fn(&super::Statistics) -> f64| column.statistics.as_ref().map(|found| short(pick(found)));
+                    let of = |pick: fn(&super::DifferenceStatistics) -> f64| column.statistics.as_ref().map(|found| short(pick(found)));
                     context! {
                         name => column.name.clone(), unit => column.unit.clone(), changed => column.changed, within => column.within,
                         max => of(|found| found.max), rms => of(|found| found.rms), bias => of(|found| found.bias),

@@ -9,8 +9,8 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::order::{Codes, InOrder, pack};
-use super::source::{Kind, Source};
+use super::order::{Codes, SortedRows, pack};
+use super::source::{CellKind, TableFile};
 use crate::error::{Error, Result};
 
 /// No partner.
@@ -100,21 +100,21 @@ impl Keys {
 }
 
 /// Reads the key columns of both files.
-pub(super) fn read(a: &Source, b: &Source, names: &[String]) -> Result<(Keys, Keys)> {
+pub(super) fn read(a: &TableFile, b: &TableFile, names: &[String]) -> Result<(Keys, Keys)> {
     let mut columns: (Vec<KeyColumn>, Vec<KeyColumn>) = (Vec::new(), Vec::new());
     let mut all: (Vec<Vec<u64>>, Vec<Vec<u64>>) = (Vec::new(), Vec::new());
     for name in names {
         let (at_a, at_b) = (a.key_column(name)?, b.key_column(name)?);
         let (kind_a, kind_b) = (a.columns[at_a].kind, b.columns[at_b].kind);
-        if (kind_a == Kind::Text) != (kind_b == Kind::Text) {
+        if (kind_a == CellKind::Text) != (kind_b == CellKind::Text) {
             let message = format!("is {} in A and {} in B", a.columns[at_a].stored, b.columns[at_b].stored);
             return Err(Error::spec(format!("key column {name}"), message));
         }
-        let (left, right) = if kind_a == Kind::Text {
+        let (left, right) = if kind_a == CellKind::Text {
             let (left, right) = rayon::join(|| texts(a, at_a), || texts(b, at_b));
             unite(left?, right?)
         } else {
-            let real = kind_a == Kind::Float || kind_b == Kind::Float;
+            let real = kind_a == CellKind::Float || kind_b == CellKind::Float;
             let (left, right) = rayon::join(|| codes(a, at_a, real), || codes(b, at_b, real));
             let meaning = if real { Meaning::Float } else { Meaning::Int };
             ((left?, meaning.clone()), (right?, meaning))
@@ -128,7 +128,7 @@ pub(super) fn read(a: &Source, b: &Source, names: &[String]) -> Result<(Keys, Ke
     Ok((Keys { columns: columns.0, codes: left }, Keys { columns: columns.1, codes: right }))
 }
 
-fn no_null(source: &Source, column: usize, array: &ArrayRef) -> Result<()> {
+fn no_null(source: &TableFile, column: usize, array: &ArrayRef) -> Result<()> {
     if array.null_count() == 0 {
         return Ok(());
     }
@@ -137,7 +137,7 @@ fn no_null(source: &Source, column: usize, array: &ArrayRef) -> Result<()> {
 }
 
 /// Numbers as codes that ascend as they do.
-fn codes(source: &Source, column: usize, real: bool) -> Result<Vec<u64>> {
+fn codes(source: &TableFile, column: usize, real: bool) -> Result<Vec<u64>> {
     let mut codes = Vec::with_capacity(source.rows);
     let of_float = |value: f64| {
         let bits = (value + 0.0).to_bits(); // -0 is 0
@@ -147,12 +147,12 @@ fn codes(source: &Source, column: usize, real: bool) -> Result<Vec<u64>> {
         let array = &batch?[0];
         no_null(source, column, array)?;
         match source.columns[column].kind {
-            Kind::Float => codes.extend(array.as_primitive::<Float64Type>().values().iter().map(|&value| of_float(value))),
-            Kind::Int if real => {
+            CellKind::Float => codes.extend(array.as_primitive::<Float64Type>().values().iter().map(|&value| of_float(value))),
+            CellKind::Int if real => {
                 codes.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| of_float(value as f64)))
             }
-            Kind::Int => codes.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| value as u64 ^ SIGN)),
-            Kind::Flag if real => {
+            CellKind::Int => codes.extend(array.as_primitive::<Int64Type>().values().iter().map(|&value| value as u64 ^ SIGN)),
+            CellKind::Flag if real => {
                 codes.extend(array.as_boolean().values().iter().map(|flag| of_float(f64::from(u8::from(flag)))))
             }
             _ => codes.extend(array.as_boolean().values().iter().map(|flag| u64::from(flag) ^ SIGN)),
@@ -162,7 +162,7 @@ fn codes(source: &Source, column: usize, real: bool) -> Result<Vec<u64>> {
 }
 
 /// Texts as places in a list of those that occur, by first occurrence.
-fn texts(source: &Source, column: usize) -> Result<(Vec<u64>, Vec<Box<str>>)> {
+fn texts(source: &TableFile, column: usize) -> Result<(Vec<u64>, Vec<Box<str>>)> {
     let mut codes: Vec<u64> = Vec::with_capacity(source.rows);
     let mut list: Vec<Box<str>> = Vec::new();
     let mut known: HashMap<Box<str>, u64> = HashMap::new();
@@ -208,7 +208,7 @@ fn unite(mut a: (Vec<u64>, Vec<Box<str>>), mut b: (Vec<u64>, Vec<Box<str>>)) -> 
 
 /// Pairs rows by key. Where `occurrence` is set the first of equal keys is paired with the first, the second with the second.
 pub(super) fn pair(a: &Keys, b: &Keys, occurrence: bool) -> Pairing {
-    let (a, b) = rayon::join(|| InOrder::of(&a.codes), || InOrder::of(&b.codes));
+    let (a, b) = rayon::join(|| SortedRows::of(&a.codes), || SortedRows::of(&b.codes));
     let mut pairing = Pairing {
         partner: Vec::new(),
         paired: 0,

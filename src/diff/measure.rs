@@ -4,10 +4,10 @@ use arrow::array::{Array, ArrayRef, AsArray};
 use arrow::datatypes::Int64Type;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::columns::{Comparison, How};
+use super::columns::{ColumnPair, Comparator};
 use super::key::{NONE, Pairing};
-use super::source::{Kind, Source, push_numbers};
-use super::{ColumnDiff, Statistics};
+use super::source::{CellKind, TableFile, push_numbers};
+use super::{ColumnDiff, DifferenceStatistics};
 use crate::error::Result;
 
 /// Class of a row of A; the greatest of its cells counts.
@@ -17,12 +17,12 @@ pub(super) const CHANGED: u8 = 2;
 
 /// A pair of cells that are not the same.
 #[derive(Debug, Clone)]
-pub(super) struct Cell {
+pub(super) struct CellDifference {
     /// Of A.
     pub row: u32,
     pub changed: bool,
-    pub a: Value,
-    pub b: Value,
+    pub a: CellValue,
+    pub b: CellValue,
     /// B minus A in A's unit; null where one of them has no finite number.
     pub difference: Option<f64>,
     pub sigmas: Option<f64>,
@@ -31,7 +31,7 @@ pub(super) struct Cell {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value {
+pub(super) enum CellValue {
     Null,
     Number(f64),
     Text(String),
@@ -39,17 +39,17 @@ pub(super) enum Value {
 
 /// Two files side by side: which rows are paired, and the class of every row of A.
 #[derive(Clone, Copy)]
-pub(super) struct Beside<'d> {
-    pub a: &'d Source,
-    pub b: &'d Source,
+pub(super) struct ComparedTables<'d> {
+    pub a: &'d TableFile,
+    pub b: &'d TableFile,
     pub pairing: &'d Pairing,
     pub rows: &'d [AtomicU8],
 }
 
 /// Judges a comparison; `sees` is told of every pair of cells that are not the same, in the order of A.
-pub(super) fn measure(files: Beside, comparison: &Comparison, sees: &mut Seer) -> Result<ColumnDiff> {
-    let mut tally = Tally::new(comparison);
-    if comparison.how == How::Text {
+pub(super) fn measure(files: ComparedTables, comparison: &ColumnPair, sees: &mut Seer) -> Result<ColumnDiff> {
+    let mut tally = DifferenceSums::new(comparison);
+    if comparison.how == Comparator::Text {
         texts(files, comparison, &mut tally, sees)?;
     } else {
         numbers(files, comparison, &mut tally, sees)?;
@@ -57,10 +57,10 @@ pub(super) fn measure(files: Beside, comparison: &Comparison, sees: &mut Seer) -
     Ok(tally.finish(comparison))
 }
 
-type Seer<'s> = dyn FnMut(&Cell) -> Result<()> + 's;
+type Seer<'s> = dyn FnMut(&CellDifference) -> Result<()> + 's;
 
-fn numbers(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut Seer) -> Result<()> {
-    let Beside { a, b, pairing, rows } = files;
+fn numbers(files: ComparedTables, comparison: &ColumnPair, tally: &mut DifferenceSums, sees: &mut Seer) -> Result<()> {
+    let ComparedTables { a, b, pairing, rows } = files;
     let size = comparison.a.len();
     let theirs = Theirs::read(a, b, comparison)?;
     let mut wanted = comparison.a.clone();
@@ -125,22 +125,22 @@ fn is_null(nulls: &[bool], row: usize) -> bool {
 }
 
 impl Theirs {
-    fn read(a: &Source, b: &Source, comparison: &Comparison) -> Result<Self> {
+    fn read(a: &TableFile, b: &TableFile, comparison: &ColumnPair) -> Result<Self> {
         let mut columns = comparison.b.iter().map(|&column| b.numbers(column)).collect::<Result<Vec<_>>>()?;
         let (scale, shift) = comparison.conversion;
         if comparison.conversion != (1.0, 0.0) {
             columns.iter_mut().flat_map(|(values, _)| values).for_each(|value| *value = *value * scale + shift);
         }
         let whole = comparison.a.len() == 1
-            && a.columns[comparison.a[0]].kind == Kind::Int
-            && b.columns[comparison.b[0]].kind == Kind::Int;
+            && a.columns[comparison.a[0]].kind == CellKind::Int
+            && b.columns[comparison.b[0]].kind == CellKind::Int;
         let integers = whole.then(|| b.integers(comparison.b[0])).transpose()?;
         let sigma = comparison.sigma.map(|(_, column)| b.numbers(column)).transpose()?;
         Ok(Self { columns, integers, sigma })
     }
 
     /// What a pair shows; none where both are the same.
-    fn cell(&self, comparison: &Comparison, pair: &Pair, row: usize, tally: &mut Tally) -> Option<Cell> {
+    fn cell(&self, comparison: &ColumnPair, pair: &Pair, row: usize, tally: &mut DifferenceSums) -> Option<CellDifference> {
         let size = comparison.a.len();
         let null_a = pair.batch[..size].iter().any(|array| array.is_null(pair.at));
         let null_b = self.columns.iter().any(|(_, nulls)| is_null(nulls, pair.partner));
@@ -153,12 +153,12 @@ impl Theirs {
             _ => f64::NAN,
         };
         let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
-        let value = |null: bool, value: f64| if null { Value::Null } else { Value::Number(value) };
+        let value = |null: bool, value: f64| if null { CellValue::Null } else { CellValue::Number(value) };
         let largest = if size == 1 { left.abs().max(right.abs()) } else { 0.0 };
         let allowed = comparison.atol + comparison.rtol * largest;
         let finite = difference.is_finite();
         let sigmas = self.sigma(size, pair).filter(|_| finite).map(|sigma| difference.abs() / sigma);
-        Some(Cell {
+        Some(CellDifference {
             row: row as u32,
             changed: !(finite && difference.abs() <= allowed),
             a: value(null_a, left),
@@ -170,7 +170,7 @@ impl Theirs {
     }
 
     /// Theirs minus ours; none where both are the same, as rotations are whose quaternions differ in sign.
-    fn difference(&self, comparison: &Comparison, pair: &Pair) -> Option<f64> {
+    fn difference(&self, comparison: &ColumnPair, pair: &Pair) -> Option<f64> {
         let difference = if comparison.a.len() == 1 {
             let (left, right) = (pair.ours[0][pair.at], pair.beside[0][pair.at]);
             let whole = self.integers.as_ref().map(|theirs| apart(&pair.batch[0], pair.at, theirs[pair.partner]));
@@ -214,17 +214,17 @@ fn apart(ours: &ArrayRef, at: usize, theirs: i64) -> f64 {
     (i128::from(theirs) - i128::from(ours.as_primitive::<Int64Type>().value(at))) as f64
 }
 
-fn one(how: How, difference: f64) -> f64 {
+fn one(how: Comparator, difference: f64) -> f64 {
     match how {
-        How::Angle(turn) => difference - turn * (difference / turn).round(),
+        Comparator::Angle(turn) => difference - turn * (difference / turn).round(),
         _ => difference,
     }
 }
 
 /// The angle of the rotation from `left` to `right`, rad.
-fn rotation(how: How, left: &[f64], right: &[f64]) -> f64 {
+fn rotation(how: Comparator, left: &[f64], right: &[f64]) -> f64 {
     let quaternion = |cells: &[f64]| match how {
-        How::RotationVector(factor) => {
+        Comparator::RotationVector(factor) => {
             let v = [cells[0] * factor, cells[1] * factor, cells[2] * factor];
             let angle = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
             // sin(x/2)/x is 1/2 within f64 below this.
@@ -245,8 +245,8 @@ fn rotation(how: How, left: &[f64], right: &[f64]) -> f64 {
     if sine == 0.0 && dot == 0.0 { f64::NAN } else { 2.0 * sine.atan2(dot.abs()) }
 }
 
-fn texts(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut Seer) -> Result<()> {
-    let Beside { a, b, pairing, rows } = files;
+fn texts(files: ComparedTables, comparison: &ColumnPair, tally: &mut DifferenceSums, sees: &mut Seer) -> Result<()> {
+    let ComparedTables { a, b, pairing, rows } = files;
     let (column_a, column_b) = (comparison.a[0], comparison.b[0]);
     let mut bytes = String::new();
     let mut ends: Vec<(usize, bool)> = Vec::with_capacity(b.rows);
@@ -274,8 +274,8 @@ fn texts(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut S
             if left.as_deref() == right {
                 continue;
             }
-            let value = |text: Option<&str>| text.map_or(Value::Null, |text| Value::Text(text.into()));
-            let cell = Cell {
+            let value = |text: Option<&str>| text.map_or(CellValue::Null, |text| CellValue::Text(text.into()));
+            let cell = CellDifference {
                 row: (start + at) as u32,
                 changed: true,
                 a: value(left.as_deref()),
@@ -293,11 +293,11 @@ fn texts(files: Beside, comparison: &Comparison, tally: &mut Tally, sees: &mut S
     Ok(())
 }
 
-fn text(array: &ArrayRef, kind: Kind, row: usize) -> Option<std::borrow::Cow<'_, str>> {
+fn text(array: &ArrayRef, kind: CellKind, row: usize) -> Option<std::borrow::Cow<'_, str>> {
     if array.is_null(row) {
         return None;
     }
-    if kind == Kind::Text {
+    if kind == CellKind::Text {
         return Some(array.as_string::<i32>().value(row).into());
     }
     let mut numbers = Vec::with_capacity(1);
@@ -305,13 +305,13 @@ fn text(array: &ArrayRef, kind: Kind, row: usize) -> Option<std::borrow::Cow<'_,
     Some(numbers.first().map(f64::to_string).unwrap_or_default().into())
 }
 
-fn judge(cell: &Cell, rows: &[AtomicU8], tally: &mut Tally) {
+fn judge(cell: &CellDifference, rows: &[AtomicU8], tally: &mut DifferenceSums) {
     rows[cell.row as usize].fetch_max(if cell.changed { CHANGED } else { WITHIN }, Ordering::Relaxed);
     tally.add(cell);
 }
 
 /// Sums over the pairs of a column.
-struct Tally {
+struct DifferenceSums {
     pairs: u64,
     within: u64,
     changed: u64,
@@ -326,8 +326,8 @@ struct Tally {
     mixed: bool,
 }
 
-impl Tally {
-    fn new(comparison: &Comparison) -> Self {
+impl DifferenceSums {
+    fn new(comparison: &ColumnPair) -> Self {
         Self {
             pairs: 0,
             within: 0,
@@ -343,7 +343,7 @@ impl Tally {
         }
     }
 
-    fn add(&mut self, cell: &Cell) {
+    fn add(&mut self, cell: &CellDifference) {
         *(if cell.changed { &mut self.changed } else { &mut self.within }) += 1;
         if let Some(sigmas) = cell.sigmas {
             self.sigma_squares += sigmas * sigmas;
@@ -360,9 +360,9 @@ impl Tally {
         }
     }
 
-    fn finish(mut self, comparison: &Comparison) -> ColumnDiff {
+    fn finish(mut self, comparison: &ColumnPair) -> ColumnDiff {
         let pairs = self.pairs as f64;
-        let statistics = (self.pairs > 0 && comparison.how != How::Text && !self.mixed).then(|| Statistics {
+        let statistics = (self.pairs > 0 && comparison.how != Comparator::Text && !self.mixed).then(|| DifferenceStatistics {
             max: self.sizes.iter().copied().fold(0.0, f64::max),
             rms: (self.squares / pairs).sqrt(),
             bias: self.sum / pairs,

@@ -90,14 +90,14 @@ impl Tolerances {
 /// Two tables compared.
 #[derive(Debug, Clone, Serialize)]
 pub struct TableDiff {
-    pub a: Side,
-    pub b: Side,
+    pub a: DiffedTable,
+    pub b: DiffedTable,
     pub key: Vec<String>,
     /// Equal without a look at any row: by the hash of their content, or byte by byte.
     pub equal: Option<Equal>,
     /// What differs beside the values: columns, units, types, the schema's version.
     pub findings: Vec<Discrepancy>,
-    pub rows: Rows,
+    pub rows: RowCounts,
     /// Compared columns, in the order of A.
     pub columns: Vec<ColumnDiff>,
     /// The worst first.
@@ -129,7 +129,7 @@ impl Equal {
 }
 
 #[derive(Debug, Clone, Serialize)]
-pub struct Side {
+pub struct DiffedTable {
     pub path: String,
     /// `prediction/1.0.0`.
     pub schema: Option<String>,
@@ -154,7 +154,7 @@ impl Discrepancy {
 
 /// How many rows of each class.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Rows {
+pub struct RowCounts {
     pub same: u64,
     pub within_tolerance: u64,
     pub changed: u64,
@@ -178,7 +178,7 @@ pub struct ColumnDiff {
     pub atol: f64,
     pub rtol: f64,
     /// Of B minus A over all pairs; null for texts and where rows have units of their own.
-    pub statistics: Option<Statistics>,
+    pub statistics: Option<DifferenceStatistics>,
     pub max_sigmas: Option<f64>,
     pub rms_sigmas: Option<f64>,
     #[serde(skip)]
@@ -188,7 +188,7 @@ pub struct ColumnDiff {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Statistics {
+pub struct DifferenceStatistics {
     pub max: f64,
     pub rms: f64,
     pub bias: f64,

@@ -7,13 +7,13 @@ use std::cmp::Ordering;
 /// The codes of the key columns of one file.
 pub(super) enum Codes {
     /// All columns in one number, the first in the highest bits.
-    Packed { rows: Vec<u64>, fields: Vec<Field> },
+    Packed { rows: Vec<u64>, fields: Vec<BitField> },
     /// Key columns whose ranges do not fit together into 64 bits.
     Columns(Vec<Vec<u64>>),
 }
 
 #[derive(Clone)]
-pub(super) struct Field {
+pub(super) struct BitField {
     least: u64,
     shift: u32,
     bits: u32,
@@ -24,9 +24,9 @@ pub(super) fn pack(a: Vec<Vec<u64>>, b: Vec<Vec<u64>>) -> (Codes, Codes) {
     let range = |(left, right): (&Vec<u64>, &Vec<u64>)| {
         let all = || left.par_iter().chain(right.par_iter()).copied();
         let (least, most) = all().map(|code| (code, code)).reduce(|| (u64::MAX, 0), |x, y| (x.0.min(y.0), x.1.max(y.1)));
-        Field { least, shift: 0, bits: u64::BITS - most.saturating_sub(least).leading_zeros() }
+        BitField { least, shift: 0, bits: u64::BITS - most.saturating_sub(least).leading_zeros() }
     };
-    let mut fields: Vec<Field> = a.iter().zip(&b).map(range).collect();
+    let mut fields: Vec<BitField> = a.iter().zip(&b).map(range).collect();
     let mut shift = 0;
     for field in fields.iter_mut().rev() {
         field.shift = shift;
@@ -56,7 +56,7 @@ impl Codes {
     pub fn code(&self, row: usize, column: usize) -> u64 {
         match self {
             Self::Packed { rows, fields } => {
-                let Field { least, shift, bits } = fields[column];
+                let BitField { least, shift, bits } = fields[column];
                 let mask = u64::MAX.checked_shr(u64::BITS - bits).unwrap_or(0);
                 least + (rows[row].checked_shr(shift).unwrap_or(0) & mask)
             }
@@ -84,7 +84,7 @@ impl Codes {
 }
 
 /// The rows of a file in the order of their keys, equal keys in the order of the rows.
-pub(super) struct InOrder<'c> {
+pub(super) struct SortedRows<'c> {
     codes: &'c Codes,
     order: Order,
 }
@@ -96,7 +96,7 @@ enum Order {
     Rows(Vec<u32>),
 }
 
-impl<'c> InOrder<'c> {
+impl<'c> SortedRows<'c> {
     pub fn of(codes: &'c Codes) -> Self {
         let rows = codes.rows();
         let order = if (1..rows).all(|row| codes.compare(row - 1, codes, row).is_le()) {
@@ -172,7 +172,7 @@ mod tests {
                 let wanted = (a[0][left], a[1][left]).cmp(&(b[0][right], b[1][right]));
                 assert_eq!(packed_a.compare(left, &packed_b, right), wanted, "case {case}");
             }
-            let order = InOrder::of(&packed_a);
+            let order = SortedRows::of(&packed_a);
             assert!((1..50).all(|at| order.compare(at - 1, &order, at).is_le()));
             let mut rows: Vec<usize> = (0..50).map(|at| order.row(at)).collect();
             rows.sort_unstable();

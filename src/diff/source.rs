@@ -19,7 +19,7 @@ const BATCH_ROWS: usize = 1 << 16;
 
 /// What the cells of a column are to a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum CellKind {
     Float,
     Int,
     Flag,
@@ -27,9 +27,9 @@ pub(super) enum Kind {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Column {
+pub(super) struct TableColumn {
     pub name: String,
-    pub kind: Kind,
+    pub kind: CellKind,
     /// As the file has it, for findings.
     pub stored: String,
     pub unit: Option<String>,
@@ -37,10 +37,10 @@ pub(super) struct Column {
 }
 
 /// A Parquet file, by its footer.
-pub(super) struct Source {
+pub(super) struct TableFile {
     pub path: PathBuf,
     pub rows: usize,
-    pub columns: Vec<Column>,
+    pub columns: Vec<TableColumn>,
     /// Kind and version, where the file says so.
     pub table: Option<(String, Version)>,
     pub table_hash: Option<String>,
@@ -49,7 +49,7 @@ pub(super) struct Source {
     metadata: ArrowReaderMetadata,
 }
 
-impl Source {
+impl TableFile {
     pub fn open(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let unreadable = |e: ParquetError| Error::spec(&place, format!("not a readable Parquet file: {e}"));
@@ -76,9 +76,9 @@ impl Source {
         let rich = rich.map_err(|e| unreadable(ParquetError::General(e)))?.ok();
         let columns = metadata.schema().fields().iter().map(|field| {
             let about = |key: &str| metadata_of(rich.as_ref(), field.name(), key);
-            Column {
+            TableColumn {
                 name: field.name().clone(),
-                kind: kind(field.data_type()).unwrap_or(Kind::Text),
+                kind: kind(field.data_type()).unwrap_or(CellKind::Text),
                 stored: if kind(field.data_type()).is_some() { field.data_type().to_string() } else { String::new() },
                 unit: about("unit").or_else(|| units.get(field.name()).cloned()),
                 semantic: about("semantic"),
@@ -134,7 +134,7 @@ impl Source {
         let mut ascending: Vec<usize> = columns.to_vec();
         ascending.sort_unstable();
         ascending.dedup();
-        let wanted: Vec<(usize, Kind)> = columns
+        let wanted: Vec<(usize, CellKind)> = columns
             .iter()
             .map(|column| (ascending.binary_search(column).unwrap_or_default(), self.columns[*column].kind))
             .collect();
@@ -192,28 +192,28 @@ fn metadata_of(schema: Option<&Schema>, column: &str, key: &str) -> Option<Strin
     schema?.field_with_name(column).ok()?.metadata().get(key).cloned()
 }
 
-fn kind(data_type: &DataType) -> Option<Kind> {
+fn kind(data_type: &DataType) -> Option<CellKind> {
     use DataType as T;
     match data_type {
         T::Float16 | T::Float32 | T::Float64 | T::Decimal32(..) | T::Decimal64(..) | T::Decimal128(..) | T::Decimal256(..) => {
-            Some(Kind::Float)
+            Some(CellKind::Float)
         }
-        T::Int8 | T::Int16 | T::Int32 | T::Int64 | T::UInt8 | T::UInt16 | T::UInt32 => Some(Kind::Int),
-        T::Boolean => Some(Kind::Flag),
+        T::Int8 | T::Int16 | T::Int32 | T::Int64 | T::UInt8 | T::UInt16 | T::UInt32 => Some(CellKind::Int),
+        T::Boolean => Some(CellKind::Flag),
         T::Utf8 | T::LargeUtf8 | T::Utf8View | T::UInt64 | T::Date32 | T::Date64 | T::Time32(_) | T::Time64(_) => {
-            Some(Kind::Text)
+            Some(CellKind::Text)
         }
-        T::Timestamp(..) | T::Duration(_) => Some(Kind::Text),
+        T::Timestamp(..) | T::Duration(_) => Some(CellKind::Text),
         _ => None,
     }
 }
 
-fn plain(array: &ArrayRef, kind: Kind) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
+fn plain(array: &ArrayRef, kind: CellKind) -> std::result::Result<ArrayRef, arrow::error::ArrowError> {
     let wanted = match kind {
-        Kind::Float => DataType::Float64,
-        Kind::Int => DataType::Int64,
-        Kind::Flag => DataType::Boolean,
-        Kind::Text => DataType::Utf8,
+        CellKind::Float => DataType::Float64,
+        CellKind::Int => DataType::Int64,
+        CellKind::Flag => DataType::Boolean,
+        CellKind::Text => DataType::Utf8,
     };
     if array.data_type() == &wanted { Ok(array.clone()) } else { cast(array, &wanted) }
 }

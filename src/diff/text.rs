@@ -99,8 +99,9 @@ fn columns(columns: &[ColumnDiff]) -> String {
         "column", "unit", "changed", "within", "max", "rms", "bias", "p95", "max sigma"
     );
     for column in differing {
-        let of =
-            |pick: fn(&super::Statistics) -> f64| column.statistics.as_ref().map_or_else(String::new, |found| short(pick(found)));
+        let of = |pick: fn(&super::DifferenceStatistics) -> f64| {
+            column.statistics.as_ref().map_or_else(String::new, |found| short(pick(found)))
+        };
         text.push_str(&format!(
             "{:name$}  {:>6}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {:>9}  {}\n",
             column.name,

@@ -1,16 +1,16 @@
 //! `anchor`: the far end of a draw-wire or ballbar is elsewhere; three parameters each, tracker axes. It moves no point.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use nalgebra::Vector3;
 
 #[derive(Debug, Clone, Copy)]
-pub struct Anchor;
+pub struct AnchorShift;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-impl Anchor {
+impl AnchorShift {
     pub const NAME: &'static str = "anchor";
 
     /// What the names of an anchor's parameters begin with, dot included.
@@ -19,9 +19,9 @@ impl Anchor {
     }
 }
 
-impl Cause for Anchor {
-    fn about(&self) -> &'static About {
-        &About {
+impl Cause for AnchorShift {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "anchor",
             place: "anchor",
             formula: "the far end of a draw-wire or ballbar is elsewhere; it moves no point",
@@ -31,18 +31,18 @@ impl Cause for Anchor {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }
 
-impl Effect for Anchor {
+impl Effect for AnchorShift {
     fn name(&self) -> &'static str {
         Self::NAME
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let anchors = robot.gauging().anchors.iter();
+        let anchors = robot.setup().anchors.iter();
         let all = anchors.flat_map(|anchor| {
             AXES.iter().map(move |axis| ParameterSpec {
                 name: format!("{}{axis}", Self::prefix(&anchor.name)),

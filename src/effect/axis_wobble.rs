@@ -1,7 +1,7 @@
 //! `axis_wobble`: the axis of a joint tilts as the joint turns; sines and cosines of an order in one plane or two, which stand in the
 //! link before the joint (an outer ring that is not round) or turn with the joint (an inner one).
 
-use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -15,8 +15,8 @@ impl AxisWobble {
 }
 
 impl Cause for AxisWobble {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "the axis tilts by sin(n q), cos(n q), n = 1, 2",

@@ -1,7 +1,9 @@
 //! `backlash`: lost motion; half a gap to the side that friction or gravity leaves the joint on (hysteresis included).
 
 use super::basis::around;
-use super::{About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -29,8 +31,8 @@ impl Backlash {
 }
 
 impl Cause for Backlash {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = g s, or g sign(t), or the one at small and the other at large loads",

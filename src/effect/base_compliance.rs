@@ -2,7 +2,8 @@
 
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -27,8 +28,8 @@ const STEP: f64 = 0.3;
 const DEEPEST: f64 = 3.0;
 
 impl Cause for BaseCompliance {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "base_compliance",
             place: "base",
             formula: "the base tilts about its origin, or a point below, by the moment on it",

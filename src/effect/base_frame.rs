@@ -1,6 +1,6 @@
 //! `base_frame`: where the robot's base stands in the tracker's frame; six parameters about the base origin, tracker axes.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
@@ -43,8 +43,8 @@ impl BasePlacement {
 }
 
 impl Cause for BaseFrame {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "base_frame",
             place: "base",
             formula: "a rigid motion of the base",
@@ -54,7 +54,7 @@ impl Cause for BaseFrame {
         }
     }
 
-    fn whole(&self, setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(BasePlacement { start: setting.base }))
     }
 }

@@ -1,13 +1,13 @@
 //! `base_shift`: the mounting of the base steps at some time, displaced, or displaced and turned.
 
-use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
+use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct BaseShift;
 
 impl Cause for BaseShift {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "base_shift",
             place: "base",
             formula: "the base moves at some time",
@@ -39,5 +39,9 @@ impl Cause for BaseShift {
 
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

@@ -3,13 +3,13 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{About, Cause, Form, Hypothesis, Measure, Place, Summary, Survey, Unknown};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, Unknown};
 
 pub struct CableDrag;
 
 impl Cause for CableDrag {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "cable_drag",
             place: "joint",
             formula: "t by the angles of the joint and its neighbour",

@@ -4,7 +4,7 @@ use super::*;
 
 /// What a cause is, in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct About {
+pub struct CauseDescription {
     /// Canonical name.
     pub name: &'static str,
     /// Where it sits.
@@ -31,14 +31,14 @@ pub type NumberSpec = (String, Unit, f64);
 
 /// A cause of error.
 pub trait Cause: Sync {
-    fn about(&self) -> &'static About;
+    fn about(&self) -> &'static CauseDescription;
 
     fn name(&self) -> &'static str {
         self.about().name
     }
 
     /// The effect of the whole arm, for causes that are identified, not searched for.
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         None
     }
 
@@ -55,6 +55,16 @@ pub trait Cause: Sync {
     /// Whether it belongs to one measurement and not to the arm.
     fn is_of_the_measurement(&self) -> bool {
         false
+    }
+
+    /// Whether it is how a joint yields to its load torque: errors of the torque model move nothing without.
+    fn yields_to_torque(&self) -> bool {
+        false
+    }
+
+    /// Whether more poses may separate it from other causes: steps and drifts have had their time, faults of rows have none.
+    fn is_separable_by_poses(&self) -> bool {
+        true
     }
 
     /// Whether its forms describe something that is in no list.
@@ -105,7 +115,7 @@ pub trait Cause: Sync {
 
 /// Every cause, in the order in which a model is built up. Where two parameters do the same, the one whose cause comes first is kept.
 pub const CAUSES: &[&dyn Cause] = &[
-    &anchor::Anchor,
+    &anchor::AnchorShift,
     &base_frame::BaseFrame,
     &tool_offset::ToolOffset,
     &joint_offset::JointOffset,
@@ -145,13 +155,13 @@ pub fn cause(name: &str) -> Option<&'static dyn Cause> {
 }
 
 /// The effect of the whole arm of a name, if there is one.
-pub fn whole(name: &str, setting: &Setting) -> Option<Box<dyn Effect>> {
+pub fn whole(name: &str, setting: &EffectContext) -> Option<Box<dyn Effect>> {
     cause(name)?.whole(setting)
 }
 
 /// Causes that are effects of the whole arm, which are identified; all others are searched for.
 pub fn identified() -> impl Iterator<Item = &'static dyn Cause> {
-    let setting = Setting { base: Pose::identity(), load: Load::GravityTorque };
+    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     CAUSES.iter().copied().filter(move |cause| cause.whole(&setting).is_some())
 }
 

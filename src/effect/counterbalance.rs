@@ -3,13 +3,13 @@
 //! Balancers sit on joints 2 and 3; a torque by the angle of any other joint is that of a hose or cable.
 
 use super::spring::{FINER, MEASURE, Spring};
-use super::{About, Cause, Form, Hypothesis, Measure, Place, Summary, Survey};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey};
 
 pub struct Counterbalance;
 
 impl Cause for Counterbalance {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "counterbalance",
             place: "joint 2 or 3",
             formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",

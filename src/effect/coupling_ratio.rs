@@ -3,8 +3,8 @@
 //! One parameter for each coupling that the robot file declares; of others a term for each pair.
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Hypothesis, Law, Motion, NumberSpec, ParameterSpec, Place, Setting, Summary,
-    Survey, Term, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Hypothesis, Law, Motion, NumberSpec, ParameterSpec,
+    Place, Summary, Survey, Term, Variable, figure,
 };
 use crate::robot::{Measurements, RobotModel};
 use crate::units::Unit;
@@ -15,8 +15,8 @@ pub struct CouplingRatio;
 const DISTANT: f64 = 6.0;
 
 impl Cause for CouplingRatio {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "coupling_ratio",
             place: "joint A->B",
             formula: "d of B = c q of A",
@@ -26,7 +26,7 @@ impl Cause for CouplingRatio {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(DeclaredCouplings))
     }
 

@@ -3,7 +3,8 @@
 use super::joint_table::{JointTable, strongest_orders};
 use super::summary::amplitude;
 use super::{
-    About, Basis, Cause, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term, Variable,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -29,8 +30,8 @@ impl GearCyclic {
 }
 
 impl Cause for GearCyclic {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = a sin(n q) + b cos(n q), n = 1 .. 48",
@@ -67,9 +68,8 @@ impl Cause for GearCyclic {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let mut orders: Vec<String> =
-            summary.terms(Self::NAME).map(|term| order(term, &self.variant(term), summary.parameters)).collect();
-        orders.extend(summary.terms(JointTable::NAME).map(|table| strongest_orders(table, summary.parameters)));
+        let mut orders: Vec<String> = summary.estimates(Self::NAME).map(|(term, numbers)| order(term, &numbers)).collect();
+        orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
     }
 
@@ -84,10 +84,9 @@ impl Cause for GearCyclic {
 }
 
 /// An order and its amplitude in words.
-fn order(term: &Term, variant: &str, numbers: &[ParameterEstimate]) -> String {
+fn order(term: &Term, numbers: &[&ParameterEstimate]) -> String {
     let Basis::Wave { order, .. } = term.basis() else { return String::new() };
-    let tag = format!("{variant}.");
-    let own: Vec<ParameterEstimate> = numbers.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
-    let overtone = own.get(2..4).map(|pair| format!(" and {} times by {}", 2 * order, amplitude(Some(pair))));
-    format!("{order} times a turn by {}{}", amplitude(own.get(0..2)), overtone.unwrap_or_default())
+    let overtone =
+        numbers.get(2..).filter(|pair| pair.len() >= 2).map(|pair| format!(" and {} times by {}", 2 * order, amplitude(pair)));
+    format!("{order} times a turn by {}{}", amplitude(numbers), overtone.unwrap_or_default())
 }

@@ -1,9 +1,7 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
 use super::summary::amplitude;
-use super::{
-    About, Basis, Cause, Hypothesis, Law, Measure, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
-};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -22,8 +20,8 @@ impl GearFlank {
 }
 
 impl Cause for GearFlank {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "gear_flank",
             place: "joint",
             formula: "d = s (a sin(n q) + b cos(n q)), n = 1 .. 24",
@@ -51,13 +49,8 @@ impl Cause for GearFlank {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let amplitude_of = |term: &Term| {
-            let tag = format!("{}.", self.variant(term));
-            let own: Vec<ParameterEstimate> = summary.parameters.iter().filter(|n| n.name.contains(&tag)).cloned().collect();
-            amplitude(own.get(0..2))
-        };
-        let orders = summary.terms(self.name()).filter_map(|term| match term.basis() {
-            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude_of(term))),
+        let orders = summary.estimates(self.name()).filter_map(|(term, numbers)| match term.basis() {
+            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude(&numbers))),
             _ => None,
         });
         let orders: Vec<String> = orders.collect();

@@ -1,7 +1,7 @@
 //! `gear_motor_cyclic`: error periodic in the motor angle (joint angle times reduction ratio), e.g. of the input stage.
 
 use super::summary::amplitude;
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -11,8 +11,8 @@ pub struct GearMotorCyclic;
 const ORDERS: u32 = 2;
 
 impl Cause for GearMotorCyclic {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "gear_motor_cyclic",
             place: "joint",
             formula: "d = a sin(n i q) + b cos(n i q), i the reduction ratio, n = 1, 2",
@@ -39,7 +39,7 @@ impl Cause for GearMotorCyclic {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let amplitude = amplitude(summary.parameters.get(0..2));
+        let amplitude = amplitude(&summary.parameters.iter().collect::<Vec<_>>());
         format!("{} errs periodically with its motor's angle, amplitude {amplitude}", summary.place)
     }
 }

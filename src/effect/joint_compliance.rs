@@ -3,11 +3,10 @@
 //! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
 
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Load, ParameterSpec, Place, Placed, Setting, Summary, Survey,
-    Variable,
+    ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, ParameterSpec, Place, Placed,
+    Summary, Survey, Variable,
 };
 use crate::robot::{Measurements, RobotModel};
-use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
 pub struct JointCompliance;
@@ -17,8 +16,8 @@ impl JointCompliance {
 }
 
 impl Cause for JointCompliance {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_compliance",
             place: "joint",
             formula: "d = c t",
@@ -28,7 +27,7 @@ impl Cause for JointCompliance {
         }
     }
 
-    fn whole(&self, setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Windup::new(setting.load)))
     }
 
@@ -53,6 +52,10 @@ impl Cause for JointCompliance {
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Windup::deserialize(body).map(Form::from))
+    }
+
+    fn yields_to_torque(&self) -> bool {
+        true
     }
 }
 
@@ -86,9 +89,10 @@ impl Effect for Windup {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let (unit, prior_sigma) = match self.load {
-            Load::GravityTorque => (Unit::RadianPerNewtonMetre, 1e-3),
-            Load::MotorCurrent => (Unit::RadianPerAmpere, 1e-2),
+        let unit = self.load.unit_of_compliance();
+        let prior_sigma = match self.load {
+            Load::GravityTorque => 1e-3,
+            Load::MotorCurrent => 1e-2,
         };
         self.joints(robot)
             .map(|j| ParameterSpec { name: format!("joint_compliance.j{}", j + 1), place: Place::Joint(j), unit, prior_sigma })

@@ -3,8 +3,8 @@
 use super::basis::cosines;
 use super::form::parameters;
 use super::{
-    About, ArmState, Backlash, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
-    Survey, Variable, figure,
+    ArmState, Backlash, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed,
+    Summary, Survey, Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -19,7 +19,7 @@ impl JointHardening {
 /// What is added to the proportional part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Law {
+pub enum HardeningLaw {
     /// tau / (1 + |tau| / at): a gear that stiffens.
     Saturating { at_nm: f64 },
     /// at tanh(tau / at): a soft zone around no load.
@@ -35,7 +35,7 @@ pub enum Law {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BentWindup {
     joint: usize,
-    law: Law,
+    law: HardeningLaw,
 }
 
 /// Cosines of a free curve.
@@ -49,8 +49,8 @@ const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
 
 impl Cause for JointHardening {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_hardening",
             place: "joint",
             formula: "d = a t + b f(t): stiffer, softer, two slopes, a power, a free curve",
@@ -66,12 +66,12 @@ impl Cause for JointHardening {
         for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
             let most = survey.load(joint);
             let (low, high) = survey.torques(joint).fold((0.0_f64, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
-            let laws = [0.05, 0.15, 0.5, 1.5].map(|share| Law::Saturating { at_nm: share * most }).into_iter();
-            let laws = laws.chain([Law::SoftZone { at_nm: 0.2 * most }]);
-            let laws = laws.chain([0.1, 0.3, 0.6].map(|share| Law::Knee { at_nm: share * most }));
-            let laws = laws.chain([2.0, 3.0].map(|exponent| Law::Power { exponent, at_nm: most }));
+            let laws = [0.05, 0.15, 0.5, 1.5].map(|share| HardeningLaw::Saturating { at_nm: share * most }).into_iter();
+            let laws = laws.chain([HardeningLaw::SoftZone { at_nm: 0.2 * most }]);
+            let laws = laws.chain([0.1, 0.3, 0.6].map(|share| HardeningLaw::Knee { at_nm: share * most }));
+            let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
             out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).penalised(4.0)));
-            let curve = BentWindup { joint, law: Law::Curve { low_nm: low, high_nm: high } };
+            let curve = BentWindup { joint, law: HardeningLaw::Curve { low_nm: low, high_nm: high } };
             out.push(Hypothesis::new(curve, 1).penalised(4.0));
         }
         out
@@ -79,10 +79,10 @@ impl Cause for JointHardening {
 
     fn sentence(&self, summary: &Summary) -> String {
         let shape = match summary.form::<BentWindup>().map(|windup| windup.law) {
-            Some(Law::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
-            Some(Law::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
-            Some(Law::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
-            Some(Law::Power { exponent, .. }) => format!("it grows by the load to the power of {}", figure(exponent, 1)),
+            Some(HardeningLaw::Saturating { at_nm }) => format!("it stiffens above about {} Nm", figure(at_nm, 0)),
+            Some(HardeningLaw::SoftZone { at_nm }) => format!("it is soft below about {} Nm", figure(at_nm, 0)),
+            Some(HardeningLaw::Knee { at_nm }) => format!("it has two stiffnesses, with the knee at {} Nm", figure(at_nm, 0)),
+            Some(HardeningLaw::Power { exponent, .. }) => format!("it grows by the load to the power of {}", figure(exponent, 1)),
             _ => "its shape is a free curve of the load".to_string(),
         };
         format!("{} winds up under its load, but not in proportion: {shape}", summary.place)
@@ -105,6 +105,10 @@ impl Cause for JointHardening {
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(BentWindup::deserialize(body).map(Form::from))
     }
+
+    fn yields_to_torque(&self) -> bool {
+        true
+    }
 }
 
 impl BentWindup {
@@ -112,9 +116,10 @@ impl BentWindup {
     /// load. `most` is the largest torque, Nm.
     fn is_lost_motion(&self, p: &[f64], most: f64) -> bool {
         match (self.law, p) {
-            (Law::Saturating { at_nm } | Law::SoftZone { at_nm } | Law::Knee { at_nm }, [linear, bend]) => {
-                at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs()
-            }
+            (
+                HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm },
+                [linear, bend],
+            ) => at_nm < SHARP * most && linear.abs() * most < FLAT * (bend * self.bend(most).0).abs(),
             _ => false,
         }
     }
@@ -122,20 +127,20 @@ impl BentWindup {
     /// f and its slope.
     fn bend(&self, torque: f64) -> (f64, f64) {
         match self.law {
-            Law::Saturating { at_nm } => {
+            HardeningLaw::Saturating { at_nm } => {
                 let rest = 1.0 + torque.abs() / at_nm;
                 (torque / rest, 1.0 / (rest * rest))
             }
-            Law::SoftZone { at_nm } => {
+            HardeningLaw::SoftZone { at_nm } => {
                 let t = libm::tanh(torque / at_nm);
                 (at_nm * t, 1.0 - t * t)
             }
-            Law::Knee { at_nm } => (torque.clamp(-at_nm, at_nm), f64::from(torque.abs() < at_nm)),
-            Law::Power { exponent, at_nm } => {
+            HardeningLaw::Knee { at_nm } => (torque.clamp(-at_nm, at_nm), f64::from(torque.abs() < at_nm)),
+            HardeningLaw::Power { exponent, at_nm } => {
                 let share = torque.abs() / at_nm;
                 (at_nm * libm::pow(share, exponent) * torque.signum(), exponent * libm::pow(share, exponent - 1.0))
             }
-            Law::Curve { .. } => (0.0, 0.0),
+            HardeningLaw::Curve { .. } => (0.0, 0.0),
         }
     }
 }
@@ -148,7 +153,7 @@ impl Effect for BentWindup {
     fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
         let linear = ("linear", Unit::RadianPerNewtonMetre, 1e-3);
         match self.law {
-            Law::Curve { .. } => {
+            HardeningLaw::Curve { .. } => {
                 let names: Vec<String> = (1..=CURVE).map(|k| format!("cos{k}")).collect();
                 let curve = names.iter().map(|name| (name.as_str(), Unit::Radian, 0.01));
                 parameters(self, std::iter::once(linear).chain(curve))
@@ -160,7 +165,7 @@ impl Effect for BentWindup {
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let torque = state.torque()[self.joint];
         out.turn(0, p, self.joint, torque);
-        if let Law::Curve { low_nm, high_nm } = self.law {
+        if let HardeningLaw::Curve { low_nm, high_nm } = self.law {
             for (k, value) in cosines(torque, [low_nm, high_nm], CURVE).enumerate() {
                 out.turn(k + 1, p, self.joint, value);
             }
@@ -207,11 +212,13 @@ impl Placed for BentWindup {
         let most = survey.load(self.joint);
         let within = |at_nm: f64, largest: f64| at_nm.clamp(BENDS[0] * most, largest * most);
         let scaled = |factor: f64| match self.law {
-            Law::Saturating { at_nm } => Some(Law::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
-            Law::SoftZone { at_nm } => Some(Law::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
-            Law::Knee { at_nm } => Some(Law::Knee { at_nm: within(at_nm * factor, LAST_KNEE) }),
-            Law::Power { exponent, at_nm } => Some(Law::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm }),
-            Law::Curve { .. } => None,
+            HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
+            HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
+            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee { at_nm: within(at_nm * factor, LAST_KNEE) }),
+            HardeningLaw::Power { exponent, at_nm } => {
+                Some(HardeningLaw::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm })
+            }
+            HardeningLaw::Curve { .. } => None,
         };
         let laws = [step, 1.0 / step].into_iter().filter_map(scaled).filter(|law| *law != self.law);
         laws.map(|law| Self { joint: self.joint, law }.into()).collect()

@@ -3,7 +3,8 @@
 
 use super::form::parameters;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -38,8 +39,8 @@ pub struct Lag {
 const LARGEST: f64 = 0.3;
 
 impl Cause for JointLogLag {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_log_lag",
             place: "recording",
             formula: "joints were logged a share of the last move too early; of a moving arm d = c dq/dt of every joint, its clock and the tracker's c apart",
@@ -73,8 +74,8 @@ impl Cause for JointLogLag {
                 figure(n.value * 100.0, 2)
             ),
             Some(_) => {
-                let shares = summary.parameters.iter().filter(|n| n.name.contains("share"));
-                let most = shares.map(|n| n.value * 100.0).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+                let shares = summary.parameters.iter().map(|n| n.value * 100.0);
+                let most = shares.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
                 format!(
                     "joints were logged before the arm had settled, each by a share of its own: up to {} % of the last move was \
                      still to come",
@@ -91,6 +92,10 @@ impl Cause for JointLogLag {
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
         Some(Lag::deserialize(body).map(Form::from))
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }
 

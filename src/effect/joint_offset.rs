@@ -1,6 +1,6 @@
 //! `joint_offset`: zero error of joint N, theta_i0 of Eq. 14; one parameter a joint.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -8,8 +8,8 @@ use crate::units::Unit;
 pub struct JointOffset;
 
 impl Cause for JointOffset {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "joint_offset",
             place: "joint",
             formula: "d = c",
@@ -19,7 +19,7 @@ impl Cause for JointOffset {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

@@ -1,6 +1,8 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use std::f64::consts::PI;
@@ -23,8 +25,8 @@ impl JointTable {
 }
 
 impl Cause for JointTable {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = a smooth curve of q over the measured range",
@@ -70,11 +72,9 @@ impl Cause for JointTable {
 }
 
 /// The strongest orders per joint turn of a table, in words.
-pub(super) fn strongest_orders(table: &Term, numbers: &[ParameterEstimate]) -> String {
+pub(super) fn strongest_orders(table: &Term, numbers: &[&ParameterEstimate]) -> String {
     let Basis::Fading { low, high, .. } = table.basis() else { return String::new() };
-    let wave =
-        |n: &ParameterEstimate| n.name.rsplit("cos").next().and_then(|k| k.parse::<f64>().ok()).map(|k| (k, n.value.abs()));
-    let mut waves: Vec<(f64, f64)> = numbers.iter().filter(|n| n.name.contains("cos")).filter_map(wave).collect();
+    let mut waves: Vec<(f64, f64)> = (1..).zip(numbers).map(|(k, n)| (f64::from(k), n.value.abs())).collect();
     waves.sort_by(|a, b| b.1.total_cmp(&a.1));
     // A cosine of k half periods over the range makes k pi / range periods a turn.
     let orders = waves.iter().take(4).map(|(k, _)| format!("{:.0}", k * PI / (high - low)));

@@ -3,7 +3,8 @@
 use super::form::parameters;
 use super::motion::{SHORT, extent};
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
+    Variable,
 };
 use crate::robot::RobotModel;
 use crate::spatial::screw;
@@ -43,8 +44,8 @@ const UNLIKELY: f64 = 10.0;
 const RARER: f64 = 4.0;
 
 impl Cause for LinkCompliance {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "link_compliance",
             place: "link",
             formula: "the link bends about its far joint, by the moment there",

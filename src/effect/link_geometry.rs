@@ -3,7 +3,7 @@
 //! Two displacements and two tilts perpendicular to the axis of joint N+1, about its point; together with `base_frame`,
 //! `joint_offset` and `tool_offset` this is complete (rank 4R + 2P + 3) and free of the singularity of parallel axes.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -19,8 +19,8 @@ fn directions(robot: &RobotModel, link: usize) -> impl Iterator<Item = (usize, b
 }
 
 impl Cause for LinkGeometry {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "link_geometry",
             place: "link",
             formula: "lengths and tilts between two axes",
@@ -30,7 +30,7 @@ impl Cause for LinkGeometry {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

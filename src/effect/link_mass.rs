@@ -3,8 +3,8 @@
 use super::form::parameters;
 use super::spring::{MEASURE, Spring};
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
+    Survey, Variable,
 };
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -22,8 +22,8 @@ pub struct WrongLinkMass {
 }
 
 impl Cause for LinkMass {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "link_mass",
             place: "link",
             formula: "mass and first moments of a link in the torque model",

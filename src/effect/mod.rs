@@ -52,13 +52,13 @@ mod words;
 mod wrong_point;
 mod zero_shift;
 
-pub use anchor::Anchor;
+pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
 pub use basis::Basis;
 pub use cable_drag::CableDrag;
-pub use cause::{About, CAUSES, Cause, Measure, NumberSpec, cause, hypotheses, identified, whole};
+pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
@@ -71,7 +71,7 @@ pub use law::{Factor, Law};
 pub use link_compliance::LinkCompliance;
 pub use motion::{Axes, Motion};
 pub use place::Place;
-pub use placed_row::{PlacedRow, Scratch};
+pub use placed_row::{PlacedRow, PlacementBuffers};
 pub use reduction_ratio::ReductionRatio;
 pub use stack::{EffectStack, PointMotion};
 pub use summary::{ParameterEstimate, Summary, people};
@@ -127,12 +127,12 @@ impl<'a> ArmState<'a> {
 
     /// The number of the target that the row measured; none where the robot knows no such target.
     pub fn target(&self, robot: &RobotModel) -> Option<usize> {
-        robot.gauging().target(self.data.target(self.row))
+        robot.setup().target(self.data.target(self.row))
     }
 
     /// The number of the anchor that the row measured from.
     pub fn anchor(&self, robot: &RobotModel) -> Option<usize> {
-        robot.gauging().anchor(self.data.anchor(self.row)?)
+        robot.setup().anchor(self.data.anchor(self.row)?)
     }
 
     /// Motor currents, A, where recorded.
@@ -210,9 +210,24 @@ pub enum Load {
     MotorCurrent,
 }
 
+impl Load {
+    /// The unit of a joint's compliance to this load.
+    pub fn unit_of_compliance(self) -> Unit {
+        match self {
+            Self::GravityTorque => Unit::RadianPerNewtonMetre,
+            Self::MotorCurrent => Unit::RadianPerAmpere,
+        }
+    }
+
+    /// The load to which a compliance of this unit belongs.
+    pub fn of_compliance(unit: Unit) -> Option<Self> {
+        [Self::GravityTorque, Self::MotorCurrent].into_iter().find(|load| load.unit_of_compliance() == unit)
+    }
+}
+
 /// What an effect needs to be made.
 #[derive(Debug, Clone, Copy)]
-pub struct Setting {
+pub struct EffectContext {
     /// Where the base stands in the tracker's frame before any correction.
     pub base: Pose,
     pub load: Load,

@@ -3,8 +3,8 @@
 use super::form::parameters;
 use super::spring::MEASURE;
 use super::{
-    About, ArmState, Cause, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable, figure,
+    ArmState, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed, Summary,
+    Survey, Variable, figure,
 };
 use crate::robot::{LoadCorrection, RobotModel};
 use crate::units::Unit;
@@ -20,8 +20,8 @@ pub struct WrongPayload {
 }
 
 impl Cause for PayloadError {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "payload_error",
             place: "tool",
             formula: "mass and centre of the payload in the torque model",

@@ -1,6 +1,6 @@
 //! A row whose arm was placed: where its target is, and how that moves with every parameter of the stack.
 //!
-//! The buffers of an evaluation are in [`Scratch`]; what follows from them is asked of [`PlacedRow`], which holds them.
+//! The buffers of an evaluation are in [`PlacementBuffers`]; what follows from them is asked of [`PlacedRow`], which holds them.
 
 use super::{Deflection, Direction};
 use crate::robot::{LoadCorrection, Posture, RobotModel, Travel};
@@ -8,7 +8,7 @@ use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 
 /// Buffers of one evaluation, made once per thread.
-pub struct Scratch {
+pub struct PlacementBuffers {
     pub(super) deflection: Deflection,
     /// Commanded travel of each joint.
     pub(super) commanded: Vec<Travel>,
@@ -29,7 +29,7 @@ pub struct Scratch {
     pub(super) constant: Option<(Vec<f64>, Vec<Twist>)>,
 }
 
-impl Scratch {
+impl PlacementBuffers {
     pub(super) fn new(joints: usize) -> Self {
         Self {
             deflection: Deflection::new(joints),
@@ -80,7 +80,7 @@ impl Station {
 /// add up. Torques are treated as constant: their change with the parameters is of second order.
 pub struct PlacedRow<'a> {
     pub(super) robot: &'a RobotModel,
-    pub(super) scratch: &'a mut Scratch,
+    pub(super) scratch: &'a mut PlacementBuffers,
     /// The target's point, m.
     pub point: Vector3<f64>,
 }
@@ -93,8 +93,8 @@ impl PlacedRow<'_> {
 
     /// From where an anchor is to the point, m. `None` where the robot knows no such anchor.
     pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
-        let gauging = self.robot.gauging();
-        let anchor = gauging.anchors.get(gauging.anchor(anchor)?)?;
+        let setup = self.robot.setup();
+        let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
         Some(self.point - anchor.place - self.scratch.deflection.anchor)
     }
 
@@ -111,7 +111,7 @@ impl PlacedRow<'_> {
     /// Derivatives of the point, m.
     pub fn partials(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
-        let Scratch { deflection, by_station, by_joint, .. } = &*self.scratch;
+        let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
             emit(*parameter, along(direction, by_joint, by_station, &deflection.compliance));
         }
@@ -119,7 +119,7 @@ impl PlacedRow<'_> {
 
     /// Derivatives of the orientation as small rotations about the tracker's axes, rad.
     pub fn rotations(&self, mut emit: impl FnMut(usize, Vector3<f64>)) {
-        let Scratch { deflection, posture, stations, before, .. } = &*self.scratch;
+        let PlacementBuffers { deflection, posture, stations, before, .. } = &*self.scratch;
         let joint = |joint: usize| {
             if self.robot.is_revolute(joint) { posture.behind[joint].rotation * self.robot.axis(joint) } else { Vector3::zeros() }
         };
@@ -137,7 +137,7 @@ impl PlacedRow<'_> {
     /// Derivatives of the vector from the row's anchor to the point, m.
     pub fn partials_from_anchor(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
-        let Scratch { deflection, by_station, by_joint, .. } = &*self.scratch;
+        let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
             let velocity = match direction {
                 Direction::Anchor(rate) => -rate,
@@ -148,7 +148,7 @@ impl PlacedRow<'_> {
     }
 }
 
-impl Scratch {
+impl PlacementBuffers {
     /// How the point moves with every joint and station.
     pub(super) fn velocities(&mut self, robot: &RobotModel, point: &Vector3<f64>) {
         let Self { posture: Posture { behind, .. }, stations, before, by_station, by_joint, .. } = self;

@@ -3,7 +3,7 @@
 //! Eq. 14 with the erratum: d theta_i = (k_i - 1)(theta_i - sum_j c_ij theta_j) + sum_j c_ij (k_j - 1) theta_j, c the nominal
 //! coupling that the controller already corrects for.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -15,8 +15,8 @@ impl ReductionRatio {
 }
 
 impl Cause for ReductionRatio {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "reduction_ratio",
             place: "joint",
             formula: "d = c q",
@@ -26,7 +26,7 @@ impl Cause for ReductionRatio {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }

@@ -22,11 +22,11 @@ pub(super) const FINER: &[&str] = &["gear_cyclic", "unknown", "joint_table", "ba
 #[derive(Clone)]
 pub(super) struct Spring {
     cause: &'static dyn Cause,
-    shape: Shape,
+    shape: SpringShape,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Shape {
+struct SpringShape {
     joint: usize,
     #[serde(default = "first")]
     orders: u32,
@@ -49,7 +49,8 @@ impl Spring {
     /// At every joint that yields in the present model, of those for which `here` holds.
     pub fn propose(cause: &'static dyn Cause, survey: &Survey, here: fn(usize) -> bool) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| here(*joint) && survey.compliance[*joint] > 0.0);
-        let springs = joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: Shape { joint, orders } }));
+        let springs =
+            joints.flat_map(|joint| (1..=ORDERS).map(move |orders| Self { cause, shape: SpringShape { joint, orders } }));
         springs.map(|spring| Hypothesis::new(spring, ORDERS as usize).penalised(2.0)).collect()
     }
 
@@ -60,7 +61,7 @@ impl Spring {
 
     /// Reads the body of a form.
     pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> serde_json::Result<Form> {
-        Ok(Self { cause, shape: Shape::deserialize(body)? }.into())
+        Ok(Self { cause, shape: SpringShape::deserialize(body)? }.into())
     }
 
     /// The torque of a link about its own joint is of first order in that joint's angle.

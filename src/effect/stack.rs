@@ -2,7 +2,7 @@
 //!
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
-use super::placed_row::{PlacedRow, Scratch, Station, along};
+use super::placed_row::{PlacedRow, PlacementBuffers, Station, along};
 use super::{ArmState, Deflection, Effect, ParameterSpec};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
@@ -45,13 +45,18 @@ impl EffectStack {
         self.effects.iter().map(|(effect, range)| (effect.as_ref(), range.clone()))
     }
 
-    pub fn scratch(&self, robot: &RobotModel) -> Scratch {
-        Scratch::new(robot.joints())
+    /// Positions of the parameters of an effect by its canonical name, at all of its places.
+    pub fn parameters_of(&self, name: &str) -> impl Iterator<Item = usize> {
+        self.effects().filter(move |(effect, _)| effect.name() == name).flat_map(|(_, range)| range)
+    }
+
+    pub fn scratch(&self, robot: &RobotModel) -> PlacementBuffers {
+        PlacementBuffers::new(robot.joints())
     }
 
     /// Prepares for rows of which only the points are wanted, all under the same `x`: there are no partials, and what is the same at
     /// every row is summed once.
-    pub(crate) fn only_points(&self, robot: &RobotModel, data: &Measurements, x: &[f64], scratch: &mut Scratch) {
+    pub(crate) fn only_points(&self, robot: &RobotModel, data: &Measurements, x: &[f64], scratch: &mut PlacementBuffers) {
         scratch.deflection.clear();
         scratch.deflection.bare = true;
         scratch.constant = None;
@@ -72,7 +77,7 @@ impl EffectStack {
         data: &Measurements,
         row: usize,
         x: &[f64],
-        scratch: &'a mut Scratch,
+        scratch: &'a mut PlacementBuffers,
     ) -> PlacedRow<'a> {
         for (travel, q) in scratch.commanded.iter_mut().zip(data.q(row)) {
             *travel = if scratch.near { travel.moved(q - travel.value()) } else { Travel::new(*q) };
@@ -82,7 +87,7 @@ impl EffectStack {
             scratch.deflection.joint.copy_from_slice(joint);
             scratch.deflection.station.copy_from_slice(station);
         }
-        scratch.target = robot.gauging().target(data.target(row));
+        scratch.target = robot.setup().target(data.target(row));
         self.deflect(Needs::Nothing, robot, data, row, x, scratch);
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
@@ -102,7 +107,14 @@ impl EffectStack {
     }
 
     /// The measured point (m, tracker frame) of a row under parameters `x`.
-    pub fn point(&self, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) -> Vector3<f64> {
+    pub fn point(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &mut PlacementBuffers,
+    ) -> Vector3<f64> {
         self.place(robot, data, row, x, scratch).point
     }
 
@@ -113,7 +125,7 @@ impl EffectStack {
         data: &Measurements,
         row: usize,
         x: &[f64],
-        scratch: &mut Scratch,
+        scratch: &mut PlacementBuffers,
         emit: impl FnMut(usize, Vector3<f64>),
     ) -> Vector3<f64> {
         let mut placed = self.place(robot, data, row, x, scratch);
@@ -128,7 +140,7 @@ impl EffectStack {
         data: &Measurements,
         row: usize,
         x: &[f64],
-        scratch: &mut Scratch,
+        scratch: &mut PlacementBuffers,
     ) -> PointMotion {
         let point = self.point(robot, data, row, x, scratch);
         if !self.needs_torque {
@@ -146,7 +158,15 @@ impl EffectStack {
     }
 
     /// Adds the motions of the effects with the given need.
-    fn deflect(&self, needs: Needs, robot: &RobotModel, data: &Measurements, row: usize, x: &[f64], scratch: &mut Scratch) {
+    fn deflect(
+        &self,
+        needs: Needs,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &mut PlacementBuffers,
+    ) {
         let state = ArmState::new(data, row, &scratch.posture);
         let summed = scratch.constant.is_some();
         let due = |effect: &dyn Effect| effect.needs_torque() == (needs == Needs::Torque) && !(summed && effect.is_constant());
@@ -156,7 +176,7 @@ impl EffectStack {
         }
     }
 
-    fn chain(&self, robot: &RobotModel, scratch: &mut Scratch) -> Vector3<f64> {
+    fn chain(&self, robot: &RobotModel, scratch: &mut PlacementBuffers) -> Vector3<f64> {
         let n = robot.joints();
         let mut frame = self.base;
         for (k, (twist, station)) in scratch.deflection.station.iter().zip(&mut scratch.stations).enumerate() {

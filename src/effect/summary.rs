@@ -7,6 +7,8 @@ use crate::units::Unit;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterEstimate {
     pub name: String,
+    /// Its form, by position among those of its finding.
+    pub form: usize,
     pub value: f64,
     pub unit: &'static str,
     pub sigma: Option<f64>,
@@ -45,7 +47,14 @@ impl<'a> Summary<'a> {
 
     /// The terms under a cause's name.
     pub(super) fn terms(&self, name: &'static str) -> impl Iterator<Item = &'a Term> {
-        self.forms.iter().filter(move |form| form.cause().name() == name).filter_map(|form| form.term())
+        self.estimates(name).map(|(term, _)| term)
+    }
+
+    /// The terms under a cause's name, each with its fitted numbers.
+    pub(super) fn estimates(&self, name: &'static str) -> impl Iterator<Item = (&'a Term, Vec<&'a ParameterEstimate>)> {
+        let own = move |form: usize| self.parameters.iter().filter(|n| n.form == form).collect();
+        let forms = self.forms.iter().enumerate().filter(move |(_, form)| form.cause().name() == name);
+        forms.filter_map(move |(number, form)| Some((form.term()?, own(number))))
     }
 
     /// The first number with its unit.
@@ -68,10 +77,10 @@ impl<'a> Summary<'a> {
     }
 }
 
-/// The amplitude of a sine and a cosine.
-pub(super) fn amplitude(pair: Option<&[ParameterEstimate]>) -> String {
-    match pair {
-        Some([a, b]) => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
+/// The amplitude of a sine and a cosine, the first two of some numbers.
+pub(super) fn amplitude(numbers: &[&ParameterEstimate]) -> String {
+    match numbers {
+        [a, b, ..] => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
         _ => String::new(),
     }
 }

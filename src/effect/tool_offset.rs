@@ -2,7 +2,7 @@
 //!
 //! Where its orientation is measured too, three more turn a target about its seat.
 
-use super::{About, ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Setting};
+use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
 use crate::robot::{RobotModel, Target};
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -28,8 +28,8 @@ impl ToolOffset {
 }
 
 impl Cause for ToolOffset {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "tool_offset",
             place: "tool",
             formula: "a displacement of the measured point",
@@ -39,7 +39,7 @@ impl Cause for ToolOffset {
         }
     }
 
-    fn whole(&self, _setting: &Setting) -> Option<Box<dyn Effect>> {
+    fn whole(&self, _setting: &EffectContext) -> Option<Box<dyn Effect>> {
         Some(Box::new(Self))
     }
 }
@@ -50,7 +50,7 @@ impl Effect for ToolOffset {
     }
 
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
-        let targets: Vec<(&str, usize)> = match robot.gauging().targets.as_slice() {
+        let targets: Vec<(&str, usize)> = match robot.setup().targets.as_slice() {
             [] => vec![("", 3)],
             targets => targets.iter().map(|target| (target.name.as_str(), width(target))).collect(),
         };
@@ -66,7 +66,7 @@ impl Effect for ToolOffset {
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        let targets = &robot.gauging().targets;
+        let targets = &robot.setup().targets;
         let number = state.target(robot);
         if number.is_none() && !targets.is_empty() {
             return;

@@ -1,13 +1,13 @@
 //! `tool_shift`: the mounting of the measured target steps at some time.
 
-use super::{About, Axes, Cause, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
+use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct ToolShift;
 
 impl Cause for ToolShift {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "tool_shift",
             place: "tool",
             formula: "the target moves at some time",
@@ -35,5 +35,9 @@ impl Cause for ToolShift {
 
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

@@ -2,7 +2,8 @@
 
 use super::basis::around;
 use super::{
-    About, Axes, Basis, Cause, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, warmth,
+    Axes, Basis, Cause, CauseDescription, Clock, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable,
+    warmth,
 };
 use crate::robot::RobotModel;
 
@@ -14,8 +15,8 @@ const POWERS: [f64; 2] = [0.25, 3.0];
 const SLOW: usize = 3;
 
 impl Cause for TrackerDrift {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "tracker_drift",
             place: "tracker",
             formula: "the tracker's frame moves steadily, with the warm-up, or slowly",
@@ -80,5 +81,9 @@ impl Cause for TrackerDrift {
 
     fn measure(&self) -> Option<Measure> {
         Some(super::thermal_growth::MEASURE)
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

@@ -1,12 +1,12 @@
 //! `tracker_scale`: all distances are longer by a share; link lengths absorb it, so that no points of the arm ever show it.
 
-use super::{About, Cause};
+use super::{Cause, CauseDescription};
 
 pub struct TrackerScale;
 
 impl Cause for TrackerScale {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "tracker_scale",
             place: "tracker",
             formula: "all distances are longer by a share",

@@ -3,7 +3,8 @@
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
 use super::{
-    About, Axes, Basis, Cause, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term, Variable, warmth,
+    Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term,
+    Variable, warmth,
 };
 use crate::robot::RobotModel;
 
@@ -89,8 +90,8 @@ impl Unknown {
 }
 
 impl Cause for Unknown {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint, base or tool",
             formula: "a form-free function of joints, time or payload",

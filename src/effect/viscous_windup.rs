@@ -2,7 +2,7 @@
 //!
 //! c is the friction's coefficient over the gear's stiffness (s, or arcsec per deg/s). Standing targets know nothing of it.
 
-use super::{About, Basis, Cause, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable, figure};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -16,8 +16,8 @@ impl ViscousWindup {
 }
 
 impl Cause for ViscousWindup {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: Self::NAME,
             place: "joint",
             formula: "d = -c dq/dt: the joint trails in proportion to its speed",

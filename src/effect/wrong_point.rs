@@ -1,24 +1,35 @@
 //! `outlier` and `mislabelled_point`: single wrong points, and points under each other's name; the screening of the fit finds them.
 
-use super::{About, Cause};
+use super::{Cause, CauseDescription};
 
 pub struct Outlier;
 
 impl Cause for Outlier {
-    fn about(&self) -> &'static About {
-        &About { name: "outlier", place: "recording", formula: "single wrong points", size: "any", confounded: "-", needs: "-" }
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
+            name: "outlier",
+            place: "recording",
+            formula: "single wrong points",
+            size: "any",
+            confounded: "-",
+            needs: "-",
+        }
     }
 
     fn is_of_the_measurement(&self) -> bool {
         true
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }
 
 pub struct MislabelledPoint;
 
 impl Cause for MislabelledPoint {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "mislabelled_point",
             place: "recording",
             formula: "points that carry each other's name",
@@ -30,5 +41,9 @@ impl Cause for MislabelledPoint {
 
     fn is_of_the_measurement(&self) -> bool {
         true
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

@@ -1,13 +1,13 @@
 //! `zero_shift`: the zero of a joint steps at some time: a collision, a slipped belt or coupling, a new mastering.
 
-use super::{About, Cause, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
 pub struct ZeroShift;
 
 impl Cause for ZeroShift {
-    fn about(&self) -> &'static About {
-        &About {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
             name: "zero_shift",
             place: "joint",
             formula: "d = c after some time",
@@ -40,5 +40,9 @@ impl Cause for ZeroShift {
 
     fn measure(&self) -> Option<Measure> {
         Some(change::MEASURE)
+    }
+
+    fn is_separable_by_poses(&self) -> bool {
+        false
     }
 }

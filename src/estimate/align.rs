@@ -20,7 +20,7 @@ pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
     if rows.len() < 3 {
         return Pose::identity();
     }
-    let seat = |row: usize| robot.seat(robot.gauging().target(data.target(row)));
+    let seat = |row: usize| robot.seat(robot.setup().target(data.target(row)));
     let model: Vec<Vector3<f64>> = rows.iter().map(|row| (robot.last_body(data.q(*row)) * *seat(*row)).translation).collect();
     let measured: Vec<Vector3<f64>> = rows.iter().map(|row| data.position[*row]).collect();
     align_points(&model, &measured)

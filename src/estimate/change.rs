@@ -4,25 +4,18 @@
 //! All is linear about the robust fits. With what both recordings share eliminated by QR, the steps are judged one by one and
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::fit::Fitted;
 use super::model::Model;
 use super::problem::Problem;
+use super::session::Session;
 use crate::effect::BaseFrame;
 use crate::robot::Measurements;
 use faer::Mat;
 
-/// A recording with the model fitted to it; both models of a comparison have the same parameters.
-pub struct Session<'a> {
-    pub data: &'a Measurements,
-    pub rows: &'a [usize],
-    pub model: &'a Model,
-    pub fitted: &'a Fitted,
-}
-
 /// A parameter's step from one recording to the other, SI.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct ParameterChange {
     /// Position in the stack.
     pub parameter: usize,
     pub step: f64,
@@ -42,11 +35,10 @@ const DISTINCT: f64 = 1e-6;
 /// Steps nearly as good as the best: an earlier one in the list is the better known cause.
 const TIE: f64 = 0.99;
 
-/// Tests every parameter but the base's, in order of precedence.
-pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<Change> {
+/// Tests every parameter but the base's, in order of precedence; both models have the same parameters.
+pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<ParameterChange> {
     let stack = &before.model.stack;
-    let base: Vec<usize> =
-        stack.effects().filter(|(effect, _)| effect.name() == BaseFrame::NAME).flat_map(|(_, range)| range).collect();
+    let base: Vec<usize> = stack.parameters_of(BaseFrame::NAME).collect();
     let shared: Vec<usize> = (0..stack.specs().len()).filter(|k| !base.contains(k)).collect();
     let mut reduced = Reduced::of(before, after, &shared, &base);
     let wide = |j: usize| stack.specs()[shared[j]].prior_sigma;
@@ -71,7 +63,7 @@ pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> 
         let others = ranks.iter().enumerate().filter(|(i, rank)| *i != j && rank.is_some()).map(|(i, _)| i);
         let alone = if ranks[j].is_some() { reduced.fresh_without(others) } else { reduced.clone() };
         let (step, sigma) = (alone.step(j), alone.sigma(j)?);
-        (sigma < wide(j)).then(|| Change {
+        (sigma < wide(j)).then(|| ParameterChange {
             parameter: shared[j],
             step,
             sigma,
@@ -131,7 +123,7 @@ impl Reduced {
             rows[(2 * height + j, j)] = 1.0 / sigma;
             rows[(2 * height + j, width - 1)] = -before.model.x[*k] / sigma;
         }
-        let whole = Factor::of(&rows);
+        let whole = TriangularFactor::of(&rows);
         let start = s + 2 * b;
         let columns: Vec<Vec<f64>> = (0..s).map(|j| (0..s).map(|i| whole.entry(start + i, start + j)).collect()).collect();
         let right: Vec<f64> = (0..s).map(|i| whole.entry(start + i, width - 1)).collect();

@@ -2,7 +2,7 @@
 //!
 //! A' A with one row R^-1 R^-T J' (1 - H)^-1/2 e per pose (Bell and McCaffrey, 2002: unbiased where the stated noise is right).
 
-use super::factor::Tall;
+use super::factor::StackedRows;
 use super::model::Model;
 use super::problem::Problem;
 use super::term::ObservationTerm;
@@ -78,7 +78,7 @@ fn upwards(inverse: &Triangle, vector: impl Fn(usize) -> f64) -> Vec<f64> {
 
 /// The upper triangular root of A' A: columns are factored last first, and the factor turned over.
 fn triangle(p: usize, lines: impl Iterator<Item = Vec<f64>>) -> Triangle {
-    let mut tall = Tall::new(p + 1, CHUNK);
+    let mut tall = StackedRows::new(p + 1, CHUNK);
     let lines: Vec<Vec<f64>> = lines.collect();
     for some in lines.chunks(CHUNK) {
         let mut chunk = tall.chunk(some.len());

@@ -1,6 +1,6 @@
 //! A model's step with what is known beforehand: priors as rows of the factor, bounds by an active set.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::known::Known;
 use super::model::Model;
 use faer::Mat;
@@ -22,7 +22,7 @@ impl Model {
     }
 
     /// The factor with a row for every prior of the `free` parameters, and what the priors add to the cost.
-    pub(crate) fn with_priors(&self, free: &[usize], factor: Factor) -> (Factor, f64) {
+    pub(crate) fn with_priors(&self, free: &[usize], factor: TriangularFactor) -> (TriangularFactor, f64) {
         let priors: Vec<(usize, f64, f64)> = free
             .iter()
             .enumerate()
@@ -37,14 +37,14 @@ impl Model {
             rows[(i, free.len())] = *off;
         }
         let cost = priors.iter().map(|(_, _, off)| 0.5 * off * off).sum();
-        (factor.stack(&Factor::of(&rows)), cost)
+        (factor.stack(&TriangularFactor::of(&rows)), cost)
     }
 
-    /// The step of [`Factor::solve`] that stays within the bounds of the `free` parameters. `None` if singular.
+    /// The step of [`TriangularFactor::solve`] that stays within the bounds of the `free` parameters. `None` if singular.
     ///
     /// An active set: who stands on a bound and is pulled outwards stays; who would go beyond is put on the bound, and the others
     /// take their best step beside.
-    pub(crate) fn step_within_bounds(&self, free: &[usize], factor: &Factor, damping: f64) -> Option<Vec<f64>> {
+    pub(crate) fn step_within_bounds(&self, free: &[usize], factor: &TriangularFactor, damping: f64) -> Option<Vec<f64>> {
         if self.known.values().all(|known| known.bounds.is_none()) {
             return factor.solve(damping);
         }
@@ -73,7 +73,7 @@ impl Model {
     }
 
     /// Which of the `free` parameters stand on a bound and would have to go beyond to lower the cost.
-    pub(crate) fn pinned(&self, free: &[usize], factor: &Factor) -> Vec<bool> {
+    pub(crate) fn pinned(&self, free: &[usize], factor: &TriangularFactor) -> Vec<bool> {
         // The factor's J^T r points downhill: residuals are measured - predicted.
         let downhill = factor.gradient();
         let stands = |(k, down): (&usize, f64)| {

@@ -1,6 +1,6 @@
 //! The uncertainty of a fit: of parameters, of pairs of them, and of the positions that they predict.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::model::Model;
 use super::triangle::{Triangle, dot};
 use crate::robot::Measurements;
@@ -19,7 +19,7 @@ pub struct Covariance {
 
 impl Covariance {
     /// From the whitened factor. `None` if singular.
-    pub(crate) fn of(factor: &Factor, free: &[usize]) -> Option<Self> {
+    pub(crate) fn of(factor: &TriangularFactor, free: &[usize]) -> Option<Self> {
         Some(Self { free: free.to_vec(), root: factor.inverse()? })
     }
 

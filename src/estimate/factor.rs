@@ -7,13 +7,13 @@ use faer::{Mat, Par};
 
 /// Upper triangular factor R of the rows `[J | r]`: its last column is Q^T r, so R alone states the least-squares problem.
 #[derive(Debug, Clone)]
-pub struct Factor {
+pub struct TriangularFactor {
     /// (p + 1) x (p + 1).
     r: Triangle,
 }
 
 /// Rows `[J | r]` on their way into a factor: chunks are written below the factor of those before them.
-pub(crate) struct Tall {
+pub(crate) struct StackedRows {
     /// Column-major; the first `top` rows hold the factor so far.
     rows: Mat<f64>,
     top: usize,
@@ -21,7 +21,7 @@ pub(crate) struct Tall {
     memory: MemBuffer,
 }
 
-impl Tall {
+impl StackedRows {
     /// Room for chunks of `chunk` rows with `columns` = p + 1 columns.
     pub fn new(columns: usize, chunk: usize) -> Self {
         let height = columns + chunk;
@@ -55,15 +55,17 @@ impl Tall {
     }
 
     /// The factor of all chunks.
-    pub fn factor(&self) -> Factor {
-        Factor { r: Triangle::from_fn(self.rows.ncols(), |i, j| if i < self.top { self.rows.col_as_slice(j)[i] } else { 0.0 }) }
+    pub fn factor(&self) -> TriangularFactor {
+        TriangularFactor {
+            r: Triangle::from_fn(self.rows.ncols(), |i, j| if i < self.top { self.rows.col_as_slice(j)[i] } else { 0.0 }),
+        }
     }
 }
 
-impl Factor {
+impl TriangularFactor {
     /// The factor of rows `[J | r]` (m x (p + 1)).
     pub fn of(rows: &Mat<f64>) -> Self {
-        let mut tall = Tall::new(rows.ncols(), rows.nrows());
+        let mut tall = StackedRows::new(rows.ncols(), rows.nrows());
         for (j, column) in tall.chunk(rows.nrows()).into_iter().enumerate() {
             column.copy_from_slice(rows.col_as_slice(j));
         }
@@ -73,7 +75,7 @@ impl Factor {
 
     /// The factor of rows made of some of this one's columns above each other's.
     fn of_columns<'a>(height: usize, columns: impl ExactSizeIterator<Item = [&'a [f64]; 2]>) -> Self {
-        let mut tall = Tall::new(columns.len(), 2 * height);
+        let mut tall = StackedRows::new(columns.len(), 2 * height);
         for (to, [above, below]) in tall.chunk(2 * height).into_iter().zip(columns) {
             to[..above.len()].copy_from_slice(above);
             to[height..height + below.len()].copy_from_slice(below);
@@ -83,7 +85,7 @@ impl Factor {
     }
 
     /// The factor of both sets of rows together.
-    pub fn stack(&self, other: &Factor) -> Self {
+    pub fn stack(&self, other: &TriangularFactor) -> Self {
         let columns = self.r.size();
         Self::of_columns(columns, (0..columns).map(|j| [self.r.column(j), other.r.column(j)]))
     }
@@ -193,9 +195,9 @@ mod tests {
     fn chunks_give_the_same_solution_as_one_piece() {
         let value = |i: usize, j: usize| ((i * 7 + j * 13) % 11) as f64 - 5.0 + ((i * i + j) as f64).sin();
         let rows = Mat::from_fn(40, 5, value);
-        let whole = Factor::of(&rows);
-        let top = Factor::of(&Mat::from_fn(3, 5, value));
-        let bottom = Factor::of(&Mat::from_fn(37, 5, |i, j| value(i + 3, j)));
+        let whole = TriangularFactor::of(&rows);
+        let top = TriangularFactor::of(&Mat::from_fn(3, 5, value));
+        let bottom = TriangularFactor::of(&Mat::from_fn(37, 5, |i, j| value(i + 3, j)));
         let both = top.stack(&bottom);
         let (a, b) = (whole.solve(0.0).unwrap(), both.solve(0.0).unwrap());
         for (a, b) in a.iter().zip(&b) {

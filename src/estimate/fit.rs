@@ -3,7 +3,7 @@
 use super::autocorrelation::autocorrelation_time;
 use super::cluster::clustered;
 use super::covariance::Covariance;
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::known::PriorCheck;
 use super::levenberg::{Iteration, Stop, minimise};
 use super::model::Model;
@@ -39,7 +39,7 @@ pub enum ParameterStatus {
     Unseen,
 }
 
-/// The outcome of [`fit`]; the values are in the model.
+/// What [`fit`] says of the model that it returns.
 #[derive(Clone)]
 pub struct Fitted {
     pub statuses: Vec<ParameterStatus>,
@@ -90,31 +90,37 @@ const REPEATING: usize = 4;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
 
-/// Fits the candidates that the data can see, into `model.x`.
-pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitted {
-    let specs = model.stack.specs().to_vec();
-    let prior = |set: &[usize]| set.iter().map(|k| specs[*k].prior_sigma).collect::<Vec<_>>();
+/// The model with those of the candidates fitted that the data can see, from its values on.
+pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, Fitted) {
+    let mut model = start.clone();
     let mut problem = Problem { data, rows: options.rows, excess: ExcessSigma::default() };
     for k in options.candidates {
         model.x[*k] = model.within(*k, model.x[*k]);
     }
     // The start may be far off: judge visibility with the instrument's noise, weight with what is left at the start.
-    let sight = problem.evaluate(model, options.candidates);
+    let sight = problem.evaluate(&model, options.candidates);
     problem.excess = excess_sigma(&problem, &sight, 0);
-    let mut search = Search {
-        statuses: vec![ParameterStatus::Kept; specs.len()],
+    let mut search = Minimisation {
+        statuses: vec![ParameterStatus::Kept; model.x.len()],
         course: Vec::new(),
         stop: Stop::NothingFree,
         free: Vec::new(),
     };
-    search.settle(&mut problem, model, options.candidates, sight, true);
-    let mut all = problem.observe(model, options.candidates);
-    if search.reconsider(&mut problem, model, options.candidates, &all) {
-        all = problem.observe(model, options.candidates);
+    search.settle(&mut problem, &mut model, options.candidates, sight, true);
+    let mut all = problem.observe(&model, options.candidates);
+    if search.reconsider(&mut problem, &mut model, options.candidates, &all) {
+        all = problem.observe(&model, options.candidates);
     }
-    let Search { mut statuses, course, stop, free } = search;
+    let fitted = stated(&problem, &model, options.candidates, search, all);
+    (model, fitted)
+}
+
+/// What the data (`all`: in all candidates, at the minimum) say of a fitted model.
+fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimisation, all: Evaluation) -> Fitted {
+    let prior = |set: &[usize]| set.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect::<Vec<_>>();
+    let Minimisation { mut statuses, course, stop, free } = search;
     let errors = problem.errors(&all.residuals);
-    let place = |k: &usize| options.candidates.iter().position(|other| other == k).expect("free ones are candidates");
+    let place = |k: &usize| candidates.iter().position(|other| other == k).expect("free ones are candidates");
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     let (factor, _) = model.with_priors(&free, data);
     let pinned = model.pinned(&free, &factor);
@@ -122,16 +128,16 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     let free: Vec<usize> = free.into_iter().zip(pinned).filter(|(_, pinned)| !pinned).map(|(k, _)| k).collect();
     let data = all.factor.select(&free.iter().map(place).collect::<Vec<_>>());
     // The noise is known up to a factor, what was known beforehand is not.
-    let scale = reduced(&errors, free.len()).sqrt() * lasting(&problem, &all.residuals).sqrt();
+    let scale = reduced(&errors, free.len()).sqrt() * lasting(problem, &all.residuals).sqrt();
     let weight = if scale > 0.0 { 1.0 / scale } else { 1.0 };
-    let poses = Poses::of(problem.data, options.rows);
-    let clusters = clusters(&poses, options.rows.len(), free.len());
+    let poses = Poses::of(problem.data, problem.rows);
+    let clusters = clusters(&poses, problem.rows.len(), free.len());
     let covariance = match clusters {
         Some(poses) => model
             .with_priors(&free, data.clone())
             .0
             .inverse()
-            .map(|inverse| Covariance::of_root(clustered(&problem, model, &free, &inverse, poses), &free)),
+            .map(|inverse| Covariance::of_root(clustered(problem, model, &free, &inverse, poses), &free)),
         None => Covariance::of(&model.with_priors(&free, data.clone().weighted(weight)).0, &free),
     };
     let mut prior_checks = BTreeMap::new();
@@ -146,9 +152,9 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
     }
     let has_angles = all.residuals.iter().any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
-    let (everything, _) = model.with_priors(options.candidates, all.factor);
+    let (everything, _) = model.with_priors(candidates, all.factor);
     let singular = factor.singular_values(&prior(&free));
-    let singular_all = everything.singular_values(&prior(options.candidates));
+    let singular_all = everything.singular_values(&prior(candidates));
     Fitted {
         statuses,
         course,
@@ -161,14 +167,14 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         repeated: poses.against(problem.data, whole_points(&all.residuals), free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
-        indices: indices(&singular, options.rows.len()),
+        indices: indices(&singular, problem.rows.len()),
         singular,
         singular_all,
     }
 }
 
 /// The way to a minimum in what the data see.
-struct Search {
+struct Minimisation {
     statuses: Vec<ParameterStatus>,
     course: Vec<Iteration>,
     stop: Stop,
@@ -176,7 +182,7 @@ struct Search {
     free: Vec<usize>,
 }
 
-impl Search {
+impl Minimisation {
     /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
     /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
     fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: &Evaluation) -> bool {
@@ -275,7 +281,7 @@ fn clusters(poses: &Poses, rows: usize, parameters: usize) -> Option<&[Vec<usize
 }
 
 /// Names those of the free parameters that a bound stops, with where the data would have each if it alone were let go.
-fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &Factor, statuses: &mut [ParameterStatus]) {
+fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &TriangularFactor, statuses: &mut [ParameterStatus]) {
     for (j, k) in free.iter().enumerate().filter(|(j, _)| pinned[*j]) {
         let fixed: Vec<Option<f64>> = pinned.iter().enumerate().map(|(i, pinned)| (*pinned && i != j).then_some(0.0)).collect();
         let among = fixed.iter().take(j).filter(|fixed| fixed.is_none()).count();

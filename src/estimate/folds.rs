@@ -4,12 +4,13 @@
 //! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
 //! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
-use super::miss::miss;
 use super::model::Model;
 use super::problem::Problem;
 use super::repeats::Poses;
+use super::row_error::row_error;
+use super::session::Session;
 use super::term::ObservationTerm;
 use crate::observation::KINDS;
 use crate::robot::Measurements;
@@ -40,16 +41,9 @@ pub struct Folds {
 /// Takes `2 * count` parts of its rows off a fit, each in turn. `None` where the poses are too few for it.
 ///
 /// What the whole fit saw is estimated; which rows were set aside is taken over.
-pub fn cross_validate(
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-    count: usize,
-    seed: u64,
-) -> Option<Folds> {
+pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds> {
+    let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
-    let whole = Whole { model, data, rows, fitted };
     let order = whole.divisible(&parts, count)?;
     let blocks = deal(&order, rows.len(), count);
     let random = at_random(order, rows.len(), count, seed);
@@ -69,16 +63,9 @@ pub(crate) enum FoldKind {
 }
 
 /// One kind of [`Folds`] alone.
-pub(crate) fn folds_of(
-    kind: FoldKind,
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-    count: usize,
-) -> Option<Vec<f64>> {
+pub(crate) fn folds_of(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<f64>> {
+    let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
-    let whole = Whole { model, data, rows, fitted };
     let order = whole.divisible(&parts, count)?;
     let folds = match kind {
         FoldKind::Random(seed) => at_random(order, rows.len(), count, seed),
@@ -94,15 +81,7 @@ fn at_random(mut order: Vec<&Vec<usize>>, rows: usize, count: usize, seed: u64) 
     deal(&order, rows, count)
 }
 
-/// A fit to all of its rows.
-struct Whole<'a> {
-    model: &'a Model,
-    data: &'a Measurements,
-    rows: &'a [usize],
-    fitted: &'a Fitted,
-}
-
-impl Whole<'_> {
+impl Session<'_> {
     fn candidates(&self) -> Vec<usize> {
         let estimated = |k: &usize| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
         (0..self.fitted.statuses.len()).filter(estimated).collect()
@@ -158,7 +137,7 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
 /// The problem at the whole fit's solution.
 struct Near {
     free: Vec<usize>,
-    factor: Factor,
+    factor: TriangularFactor,
     inverse: Mat<f64>,
 }
 
@@ -209,7 +188,7 @@ impl Near {
         if bend > STRAIGHT * STRAIGHT * whole {
             return None;
         }
-        Some(part.iter().map(|row| miss(&other, problem.data, *row, &mut scratch).length).collect())
+        Some(part.iter().map(|row| row_error(&other, problem.data, *row, &mut scratch).length).collect())
     }
 
     /// Whitened derivatives and errors of the terms of some rows, three lines each, and the root of each one's Huber weight.
@@ -250,10 +229,9 @@ impl Near {
 /// Errors of the rows `part` under a fit to the others.
 fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usize], part: &[usize]) -> Vec<f64> {
     let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
-    let mut other = model.clone();
-    fit(&mut other, data, &FitOptions { rows: &kept, candidates });
+    let (other, _) = fit(model, data, &FitOptions { rows: &kept, candidates });
     let mut scratch = other.stack.scratch(&other.robot);
-    part.iter().map(|row| miss(&other, data, *row, &mut scratch).length).collect()
+    part.iter().map(|row| row_error(&other, data, *row, &mut scratch).length).collect()
 }
 
 fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use super::align::align;
 use crate::observation::{KINDS, kinds};
-use crate::robot::{Gauging, Measurements, RobotModel, Target};
+use crate::robot::{MeasurementSetup, Measurements, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::statistics::nearest;
 use nalgebra::{Matrix3, Vector3};
@@ -31,28 +31,28 @@ pub fn gauge(
         let offset = stated.get(name).copied().unwrap_or_else(Vector3::zeros);
         Target { name: name.clone(), seat: Pose::new(home.rotation, home.point(&offset)), oriented: false }
     };
-    let mut robot = robot.measured_by(Gauging { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
+    let mut robot = robot.measured_by(MeasurementSetup { targets: names.iter().map(seat).collect(), anchors: Vec::new() });
     let open = |target: &Target| !target.name.is_empty() && !stated.contains_key(&target.name);
     let mut base = align(&robot, data, rows);
     for _ in 0..ROUNDS {
-        if !robot.gauging().targets.iter().any(open) {
+        if !robot.setup().targets.iter().any(open) {
             break;
         }
         let place = |target: &Target| match seen_at(&robot, data, rows, &base, target).filter(|_| open(target)) {
             Some(point) => Target { seat: Pose::new(target.seat.rotation, point), ..target.clone() },
             None => target.clone(),
         };
-        let targets = robot.gauging().targets.iter().map(place).collect();
-        robot = robot.measured_by(Gauging { targets, anchors: Vec::new() });
+        let targets = robot.setup().targets.iter().map(place).collect();
+        robot = robot.measured_by(MeasurementSetup { targets, anchors: Vec::new() });
         base = align(&robot, data, rows);
     }
     let turned = |target: &Target| match rotation_of(&robot, data, rows, &base, target) {
         Some(rotation) => Target { seat: Pose::new(rotation, target.seat.translation), oriented: true, ..target.clone() },
         None => target.clone(),
     };
-    let targets = robot.gauging().targets.iter().map(turned).collect();
+    let targets = robot.setup().targets.iter().map(turned).collect();
     let anchors = KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
-    Ok((robot.measured_by(Gauging { targets, anchors }), base))
+    Ok((robot.measured_by(MeasurementSetup { targets, anchors }), base))
 }
 
 /// Whole points of a target, zero pose, base frame: their median by axis.

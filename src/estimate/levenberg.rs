@@ -1,6 +1,6 @@
 //! Levenberg-Marquardt on triangular factors: every way to stop is named, not converging is data.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::model::Model;
 use super::problem::{Evaluation, Problem};
 use super::triangle::{axpy, dot};
@@ -122,7 +122,7 @@ fn raise(damping: f64) -> f64 {
 }
 
 /// |J dx|: how far a step moves the whitened predictions.
-fn step_norm(factor: &Factor, step: &[f64]) -> f64 {
+fn step_norm(factor: &TriangularFactor, step: &[f64]) -> f64 {
     let p = step.len();
     let mut moved = vec![0.0; p];
     for (j, change) in step.iter().enumerate() {
@@ -132,7 +132,7 @@ fn step_norm(factor: &Factor, step: &[f64]) -> f64 {
 }
 
 /// Largest cosine between the residual and a column of J that no bound stops; zero at the minimum.
-fn cosine(factor: &Factor, cost: f64, pinned: &[bool]) -> f64 {
+fn cosine(factor: &TriangularFactor, cost: f64, pinned: &[bool]) -> f64 {
     let residual = (2.0 * cost).sqrt();
     let gradient = factor.gradient();
     let largest = gradient

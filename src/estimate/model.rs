@@ -1,7 +1,7 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
 use super::known::Known;
-use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, Scratch};
+use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, PlacementBuffers};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -36,7 +36,7 @@ impl Model {
     }
 
     /// Places the arm of a row.
-    pub(crate) fn place<'a>(&'a self, data: &Measurements, row: usize, scratch: &'a mut Scratch) -> PlacedRow<'a> {
+    pub(crate) fn place<'a>(&'a self, data: &Measurements, row: usize, scratch: &'a mut PlacementBuffers) -> PlacedRow<'a> {
         self.stack.place(&self.robot, data, row, &self.x, scratch)
     }
 

@@ -3,7 +3,7 @@
 //! Parameters are taken in order of precedence; one whose effect lies in the span of those before it stays at its nominal
 //! value and says with whom it is redundant. Indices after Sun and Hollerbach, ICRA 2008.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::triangle::{axpy, dot};
 
 /// How a candidate parameter was classed.
@@ -20,7 +20,7 @@ pub enum Visibility {
 const RANK_TOLERANCE: f64 = 1e-8;
 
 /// Decides for the candidates (columns of `factor`, whitened; in order of precedence) which are seen.
-pub(crate) fn visibility(factor: &Factor, prior_sigma: &[f64]) -> Vec<Visibility> {
+pub(crate) fn visibility(factor: &TriangularFactor, prior_sigma: &[f64]) -> Vec<Visibility> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut kept: Vec<usize> = Vec::new();
     // Upper triangular coefficients of the kept columns in the basis.
@@ -62,7 +62,7 @@ pub(crate) fn visibility(factor: &Factor, prior_sigma: &[f64]) -> Vec<Visibility
 }
 
 /// Which kept columns make up a redundant one: those with at least a tenth of its norm.
-fn combination(triangle: &[Vec<f64>], kept: &[usize], shares: &[f64], factor: &Factor, norm: f64) -> Vec<(usize, f64)> {
+fn combination(triangle: &[Vec<f64>], kept: &[usize], shares: &[f64], factor: &TriangularFactor, norm: f64) -> Vec<(usize, f64)> {
     let n = shares.len();
     let mut coefficients = vec![0.0; n];
     for i in (0..n).rev() {

@@ -1,6 +1,6 @@
 //! The calibration problem: weighted residuals of some rows under some free parameters.
 
-use super::factor::{Factor, Tall};
+use super::factor::{StackedRows, TriangularFactor};
 use super::model::Model;
 use super::term::{ObservationTerm, huber};
 use crate::effect::PlacedRow;
@@ -32,7 +32,7 @@ pub(crate) struct Evaluation {
     pub cost: f64,
     /// Root mean square of the residual length of points, or of another length where no point was measured, m.
     pub rms: f64,
-    pub factor: Factor,
+    pub factor: TriangularFactor,
 }
 
 impl Problem<'_> {
@@ -57,13 +57,13 @@ impl Problem<'_> {
         }
         let spans: Vec<Span> = self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
-        let mut sum: Option<Factor> = None;
+        let mut sum: Option<TriangularFactor> = None;
         for Span { residuals: some, factor } in spans {
             residuals.extend(some);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
         let cost = self.errors(&residuals).into_iter().map(|(error, axes)| huber(error, axes)).sum();
-        let factor = sum.unwrap_or_else(|| Factor::of(&Mat::zeros(1, free.len() + 1)));
+        let factor = sum.unwrap_or_else(|| TriangularFactor::of(&Mat::zeros(1, free.len() + 1)));
         Evaluation { cost, rms: rms(&residuals), residuals, factor }
     }
 
@@ -73,7 +73,7 @@ impl Problem<'_> {
         let kinds = kinds(self.data);
         // Three lines for each kind, whatever a row has of it.
         let lines_of_row = 3 * kinds.len();
-        let mut tall = Tall::new(p + 1, lines_of_row * rows.len().min(CHUNK));
+        let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
         for chunk in rows.chunks(CHUNK) {
             let height = lines_of_row * chunk.len();
@@ -123,5 +123,5 @@ fn add(to: &mut [f64], value: &Vector3<f64>) {
 /// What a thread makes of its rows.
 struct Span {
     residuals: Vec<Residual>,
-    factor: Factor,
+    factor: TriangularFactor,
 }

@@ -3,11 +3,12 @@
 //! To the factor of the recording come poses all over the joints' ranges, the same with another payload, or with a second target
 //! beside the last axis whose place on the tool is unknown too. What is estimated stays first in precedence.
 
-use super::factor::Factor;
+use super::factor::TriangularFactor;
 use super::fit::{Fitted, ParameterStatus};
 use super::model::Model;
 use super::observe::{Visibility, visibility};
 use super::problem::Problem;
+use crate::effect::ToolOffset;
 use crate::robot::{Measurements, RobotModel};
 use faer::Mat;
 use nalgebra::Vector3;
@@ -61,7 +62,8 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
     let loaded = (declared > 0.0).then(|| at(model, &poses(model, data, rows, &[0.0, declared])));
     let target = at(&beside(model), &poses(model, data, rows, &[usual]));
     let specs = model.stack.specs();
-    let tool: Vec<bool> = candidates.iter().map(|k| specs[*k].name.starts_with("tool_offset.")).collect();
+    let of_tool: Vec<usize> = model.stack.parameters_of(ToolOffset::NAME).collect();
+    let tool: Vec<bool> = candidates.iter().map(|k| of_tool.contains(k)).collect();
     let prior: Vec<f64> = candidates.iter().map(|k| specs[*k].prior_sigma).collect();
     let none = vec![false; candidates.len()];
     let tried = [
@@ -78,7 +80,7 @@ pub fn remedies(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fit
 }
 
 /// Which of the candidates behind the first `known` are seen with `more` rows, in which the columns `apart` are new unknowns.
-fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
+fn shown(own: &TriangularFactor, more: &TriangularFactor, apart: &[bool], prior: &[f64], known: usize) -> Vec<bool> {
     let p = prior.len();
     let new: Vec<usize> = (0..p).filter(|j| apart[*j]).collect();
     // Estimated ones, new ones, then those in question.
@@ -93,7 +95,7 @@ fn shown(own: &Factor, more: &Factor, apart: &[bool], prior: &[f64], known: usiz
     for (j, prior) in prior.iter().enumerate() {
         sigma[place(j)] = prior / CLEARLY;
     }
-    let seen = visibility(&Factor::of(&rows), &sigma);
+    let seen = visibility(&TriangularFactor::of(&rows), &sigma);
     seen[known + new.len()..].iter().map(|verdict| *verdict == Visibility::Seen).collect()
 }
 

@@ -5,7 +5,7 @@
 
 use super::fisher::tail;
 use super::model::Model;
-use crate::effect::{EffectStack, Load, Setting, whole};
+use crate::effect::{EffectContext, EffectStack, Load, whole};
 use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
@@ -89,12 +89,12 @@ impl Poses {
     /// One standard deviation (rad) by which revolute joints miss a pose that they return to. `None` where no pose was left and
     /// returned to, or where the tracker's noise explains the scatter.
     pub fn joint_repeatability(&self, model: &Model, data: &Measurements) -> Option<f64> {
-        let groups: Vec<Group> = self.repeated().filter_map(|pose| Group::of(model, data, pose)).collect();
+        let groups: Vec<PoseGroup> = self.repeated().filter_map(|pose| PoseGroup::of(model, data, pose)).collect();
         // A pose that scatters far more than the others saw a mistake or an event.
         let mut scatters: Vec<f64> = groups.iter().map(|group| group.scatter).collect();
         scatters.sort_unstable_by(f64::total_cmp);
         let limit = STRANGE * scatters.get(scatters.len() / 2)?;
-        let groups: Vec<Group> = groups.into_iter().filter(|group| group.scatter <= limit).collect();
+        let groups: Vec<PoseGroup> = groups.into_iter().filter(|group| group.scatter <= limit).collect();
         let deviance = |log: f64| groups.iter().map(|group| group.deviance(log.exp())).sum::<f64>();
         let silent: f64 = groups.iter().map(|group| group.deviance(0.0)).sum();
         let grid = (0..=60).map(|k| FINEST.ln() + (COARSEST / FINEST).ln() * f64::from(k) / 60.0);
@@ -135,7 +135,7 @@ pub(crate) fn visits<'a>(data: &Measurements, point: &'a [usize]) -> Vec<&'a [us
 }
 
 /// A pose that was left and returned to.
-struct Group {
+struct PoseGroup {
     /// Mean point of each visit (m) and the covariance of its noise.
     visits: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// J J' of the revolute joints, m2 per rad2.
@@ -144,7 +144,7 @@ struct Group {
     scatter: f64,
 }
 
-impl Group {
+impl PoseGroup {
     fn of(model: &Model, data: &Measurements, pose: &[usize]) -> Option<Self> {
         let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(data, pose)
             .into_iter()
@@ -183,7 +183,7 @@ impl Group {
 
 /// J J' (m2 per rad2, tracker frame) of the revolute joints at every row.
 fn levers(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> Vec<Matrix3<f64>> {
-    let setting = Setting { base: model.base(), load: Load::GravityTorque };
+    let setting = EffectContext { base: model.base(), load: Load::GravityTorque };
     let zeros = whole("joint_offset", &setting);
     let joints = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, zeros.into_iter().collect()));
     let mut scratch = joints.stack.scratch(&joints.robot);

@@ -1,7 +1,7 @@
 //! Parameters as people know them: where base, targets and anchors stand, and of all others the change from nominal.
 
 use super::model::Model;
-use crate::effect::{Anchor, BaseFrame, ToolOffset};
+use crate::effect::{AnchorShift, BaseFrame, ToolOffset};
 use crate::robot::Target;
 use crate::spatial::{Pose, Twist};
 use nalgebra::Vector3;
@@ -15,7 +15,7 @@ impl Model {
         let number = parameter - range.start;
         match effect.name() {
             BaseFrame::NAME => (component(self.stack.base(), number), component(&self.base(), number)),
-            Anchor::NAME => match self.robot.gauging().anchors.get(number / 3) {
+            AnchorShift::NAME => match self.robot.setup().anchors.get(number / 3) {
                 Some(anchor) => (anchor.place[number % 3], anchor.place[number % 3] + change.1),
                 None => change,
             },
@@ -27,7 +27,7 @@ impl Model {
     /// The `number`-th parameter of targets with corrections `x`; none where the tool point is what is measured.
     fn seat(&self, number: usize, x: &[f64]) -> Option<(f64, f64)> {
         let mut first = 0;
-        for target in &self.robot.gauging().targets {
+        for target in &self.robot.setup().targets {
             let width = if target.oriented { 6 } else { 3 };
             if number < first + width {
                 let corrected = corrected(target, x.get(first..first + width)?);

@@ -1,7 +1,7 @@
 //! A term of the problem: what one row measured of one kind, in standard deviations, with Huber's loss.
 
 use crate::effect::PlacedRow;
-use crate::observation::{ExcessSigma, Kind, Residual, Sensitivity};
+use crate::observation::{ExcessSigma, MeasurementKind, Residual, Sensitivity};
 use crate::robot::Measurements;
 use crate::statistics::MEDIAN_CHI2;
 use nalgebra::Vector3;
@@ -21,7 +21,7 @@ pub(crate) struct ObservationTerm {
 impl ObservationTerm {
     /// With `excess` beside the measurement's own noise. `None` where the row measured none.
     pub fn of(
-        kind: &'static dyn Kind,
+        kind: &'static dyn MeasurementKind,
         data: &Measurements,
         row: usize,
         placed: &PlacedRow,

@@ -4,8 +4,8 @@ use super::{Export, Format};
 use crate::error::{Result, one_line};
 use crate::estimate::choose::spread;
 use crate::robot::description::JointKind;
-use crate::robot::import::{Text, read_calib};
-use crate::robot::{RobotModel, Row, Rows};
+use crate::robot::import::{RobotFileText, read_calib};
+use crate::robot::{DhRow, DhTable, RobotModel};
 use crate::yaml::quoted;
 use nalgebra::{Rotation3, UnitQuaternion};
 
@@ -49,7 +49,7 @@ impl Format for Mdh {
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
     let body = body(export, modified);
-    let back = read_calib(Text { label: "exported table", text: &body }, None)?.robot;
+    let back = read_calib(RobotFileText { label: "exported table", text: &body }, None)?.robot;
     let (now, then) = (RobotModel::new(back), RobotModel::new(export.corrected.clone()));
     let poses = spread(&then, POSES);
     let apart =
@@ -63,7 +63,7 @@ fn text(export: &Export, modified: bool) -> Result<String> {
 
 fn body(export: &Export, modified: bool) -> String {
     let robot = &export.corrected;
-    let rows = Rows::of(&RobotModel::new(robot.clone()));
+    let rows = DhTable::of(&RobotModel::new(robot.clone()));
     let mut out = String::new();
     if let Some((joint, angle)) = rows.flattest().filter(|(_, angle)| angle.to_degrees() * 3600.0 < FLAT_ARCSEC) {
         out.push_str(&format!(
@@ -79,7 +79,7 @@ fn body(export: &Export, modified: bool) -> String {
     out.push_str(&format!("kinematics:\n  {}:\n", if modified { "mdh" } else { "dh" }));
     let kind = |joint: usize| if robot.joints[joint].kind == JointKind::Prismatic { ", kind: prismatic" } else { "" };
     if modified {
-        let Row { theta, d, .. } = rows.base;
+        let DhRow { theta, d, .. } = rows.base;
         out.push_str(&line(&[("alpha", 0.0), ("a", 0.0), ("theta", deg(theta)), ("d", mm(d))], ", kind: fixed"));
         let mut before = rows.base;
         for (joint, row) in rows.joints.iter().enumerate() {
@@ -88,7 +88,7 @@ fn body(export: &Export, modified: bool) -> String {
             before = *row;
         }
     } else {
-        let numbers = |row: &Row| [("theta", deg(row.theta)), ("d", mm(row.d)), ("a", mm(row.a)), ("alpha", deg(row.alpha))];
+        let numbers = |row: &DhRow| [("theta", deg(row.theta)), ("d", mm(row.d)), ("a", mm(row.a)), ("alpha", deg(row.alpha))];
         out.push_str(&line(&numbers(&rows.base), ", kind: fixed"));
         for (joint, row) in rows.joints.iter().enumerate() {
             out.push_str(&line(&numbers(row), kind(joint)));

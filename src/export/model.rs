@@ -3,7 +3,7 @@
 use crate::compensate::{LeftOut, distance, left_out, rigid};
 use crate::error::one_line;
 use crate::estimate::choose::spread;
-use crate::identified::Identified;
+use crate::identified::IdentifiedModel;
 use crate::robot::description::RobotDescription;
 
 /// Poses over which geometry and model are compared where no recording is at hand.
@@ -11,7 +11,7 @@ const POSES: usize = 500;
 
 /// The model that is exported.
 pub struct Export {
-    pub(super) identified: Identified,
+    pub(super) identified: IdentifiedModel,
     pub(super) corrected: RobotDescription,
     pub(super) left_out: Vec<LeftOut>,
     /// Rms and maximum distance of the corrected description from the model, m, and over how many poses.
@@ -22,7 +22,7 @@ pub struct Export {
 }
 
 impl Export {
-    pub fn of(identified: Identified) -> Self {
+    pub fn of(identified: IdentifiedModel) -> Self {
         let recording = identified.data.as_ref().filter(|data| data.rows() > 0);
         let recorded = recording.is_some();
         let data = recording.cloned().unwrap_or_else(|| spread(&identified.model.robot, POSES));

@@ -12,7 +12,7 @@ const ARRAY: usize = 1000;
 
 /// What a cluster is asked for.
 #[derive(Debug, Clone)]
-pub struct Wishes {
+pub struct ClusterOptions {
     /// The `calib` that the nodes run.
     pub program: PathBuf,
     /// Absolute, on storage that all nodes share.
@@ -34,7 +34,7 @@ pub struct Script {
     pub tasks: usize,
 }
 
-impl Wishes {
+impl ClusterOptions {
     /// Everything that goes into a directive is a plain word: sbatch has no quoting that all its versions share.
     fn check(&self) -> Result<()> {
         let plain = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_./-+=,:@".contains(c));
@@ -60,7 +60,7 @@ pub fn logs(store: &Path, fleet: &str) -> PathBuf {
 }
 
 /// The scripts of a run for `sbatch`, one an array.
-pub fn slurm(note: &RunNote, wishes: &Wishes) -> Result<Vec<Script>> {
+pub fn slurm(note: &RunNote, wishes: &ClusterOptions) -> Result<Vec<Script>> {
     wishes.check()?;
     let count = note.tasks.len();
     let scripts = (0..count).step_by(ARRAY).map(|first| {
@@ -94,7 +94,7 @@ pub fn slurm(note: &RunNote, wishes: &Wishes) -> Result<Vec<Script>> {
 }
 
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
-pub fn kubernetes(note: &RunNote, wishes: &Wishes, image: &str, claim: &str) -> String {
+pub fn kubernetes(note: &RunNote, wishes: &ClusterOptions, image: &str, claim: &str) -> String {
     let yaml = crate::yaml::quoted;
     let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
     let limit =

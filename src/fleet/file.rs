@@ -31,7 +31,7 @@ pub struct FleetFile {
     #[serde(default)]
     pub groups: Groups,
     /// Where the robots come from.
-    pub robots: Vec<Source>,
+    pub robots: Vec<RobotSource>,
     /// Robots that differ from the others; later entries win.
     #[serde(default)]
     pub overrides: Vec<Exception>,
@@ -73,7 +73,7 @@ impl Groups {
 /// Robots: exactly one of `folders`, `list` and `recording`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct RobotSource {
     /// One folder a robot, as a pattern relative to this file: `recordings/*`. The folder's name is the robot's.
     #[serde(default)]
     pub folders: Option<String>,

@@ -4,7 +4,7 @@
 //! `runs/<id>.json` is the roster of a run, for the tasks of a cluster and for later campaigns; `cancelled.json` names a run.
 
 use super::file::Groups;
-use super::robot::Robot;
+use super::robot::FleetRobot;
 use crate::error::Result;
 use crate::store::{Store, TableRef};
 use crate::table::Table;
@@ -40,7 +40,7 @@ impl Ending {
 
 /// A table of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Made {
+pub struct RobotTable {
     pub stage: String,
     pub port: String,
     pub kind: String,
@@ -50,7 +50,7 @@ pub struct Made {
 
 /// Result of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct RobotRecord {
     pub record_format: u32,
     pub robot: String,
     /// Hash of the robot's name, settings and data.
@@ -69,13 +69,13 @@ pub struct Record {
     pub log: Option<String>,
     pub ended: String,
     pub wall_seconds: f64,
-    pub tables: Vec<Made>,
+    pub tables: Vec<RobotTable>,
     /// Name of the robot's folder among the documents.
     pub handle: String,
     pub documents: Vec<String>,
 }
 
-impl Record {
+impl RobotRecord {
     /// The last table of a kind.
     pub fn last(&self, kind: &str) -> Option<&TableRef> {
         self.tables.iter().rfind(|made| made.kind == kind).map(|made| &made.table)
@@ -84,7 +84,7 @@ impl Record {
     pub fn of_stage(&self, stage: &str, kind: &str) -> Option<&TableRef> {
         self.tables.iter().rfind(|made| made.stage == stage && made.kind == kind).map(|made| &made.table)
     }
-    pub(super) fn blank(robot: &Robot, key: String, worker: &str) -> Self {
+    pub(super) fn blank(robot: &FleetRobot, key: String, worker: &str) -> Self {
         Self {
             record_format: RECORD_FORMAT,
             robot: robot.name.clone(),
@@ -163,11 +163,11 @@ impl<'a> Ledger<'a> {
     }
 
     /// The record of a key; one that is torn, or whose tables are gone, is none.
-    pub fn find(&self, key: &str) -> Result<Option<Record>> {
+    pub fn find(&self, key: &str) -> Result<Option<RobotRecord>> {
         let note = self.store.note(&self.records(key), &format!("{key}.json"))?;
-        let record = note.and_then(|note| serde_json::from_value::<Record>(note).ok());
-        let whole = |record: &Record| {
-            let there = |made: &Made| {
+        let record = note.and_then(|note| serde_json::from_value::<RobotRecord>(note).ok());
+        let whole = |record: &RobotRecord| {
+            let there = |made: &RobotTable| {
                 fs::metadata(self.store.object_path(&made.table)).is_ok_and(|metadata| metadata.len() == made.table.bytes)
             };
             record.record_format == RECORD_FORMAT && record.tables.iter().all(there)
@@ -176,7 +176,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Records a robot's result; the record that stands is handed back, be it another's.
-    pub fn put(&self, record: Record) -> Result<Record> {
+    pub fn put(&self, record: RobotRecord) -> Result<RobotRecord> {
         let (place, name) = (self.records(&record.key), format!("{}.json", record.key));
         if self.store.put_note_once(&place, &name, &record)? {
             return Ok(record);

@@ -1,6 +1,6 @@
 //! Robots from a list: CSV or Parquet, one row a robot.
 
-use super::robot::Robot;
+use super::robot::FleetRobot;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::pipeline::Override;
 use crate::raw;
@@ -15,7 +15,7 @@ const COLUMNS: [&str; 5] = ["robot", "folder", "model", "plant", "campaign"];
 const BATCH: usize = 1 << 10;
 
 /// Reads a list; `variable` takes the folder. Fails with every fault of its columns and rows.
-pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<Robot>> {
+pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<FleetRobot>> {
     let (columns, rows) = if is_parquet(path) { parquet(path)? } else { csv(path)? };
     let shown = path.display();
     let mut faults = Vec::new();
@@ -33,7 +33,7 @@ pub(super) fn read(path: &Path, variable: &str) -> Result<Vec<Robot>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut robots = Vec::new();
     for (index, row) in rows.iter().enumerate() {
-        let mut robot = Robot::new(String::new());
+        let mut robot = FleetRobot::new(String::new());
         for (column, cell) in columns.iter().zip(row).filter(|(_, cell)| !cell.is_empty()) {
             let below = || folder.join(cell).to_string_lossy().into_owned();
             match column.as_str() {

@@ -1,6 +1,6 @@
 //! The local engine: threads of this process, each with one robot in hand, so that memory is bounded by their number.
 
-use super::ledger::{Ending, Record};
+use super::ledger::{Ending, RobotRecord};
 use super::work::{Visit, Watcher, Workshop};
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -22,16 +22,16 @@ pub struct WorkerOptions<'a> {
 }
 
 /// What came of it, in the order of the roster; nothing where the work was stopped before.
-pub struct Worked {
-    pub records: Vec<Option<Record>>,
+pub struct FleetResults {
+    pub records: Vec<Option<RobotRecord>>,
     /// Robots computed now.
     pub computed: usize,
 }
 
 /// Works through robots of the roster, by position. Fails where the store does; then all workers stop.
-pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watcher: &dyn Watcher) -> Result<Worked> {
+pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watcher: &dyn Watcher) -> Result<FleetResults> {
     let roster = &workshop.fleet.roster.0;
-    let slots: Vec<Mutex<Option<Record>>> = roster.iter().map(|_| Mutex::new(None)).collect();
+    let slots: Vec<Mutex<Option<RobotRecord>>> = roster.iter().map(|_| Mutex::new(None)).collect();
     let (next, computed) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let halted = AtomicBool::new(false);
     let failure: Mutex<Option<Error>> = Mutex::new(None);
@@ -87,7 +87,7 @@ pub fn work(workshop: &Workshop, robots: &[usize], options: &WorkerOptions, watc
         return Err(error);
     }
     let records = slots.into_iter().map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
-    Ok(Worked { records, computed: computed.into_inner() })
+    Ok(FleetResults { records, computed: computed.into_inner() })
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {

@@ -18,8 +18,8 @@ pub mod tables;
 mod work;
 
 pub use file::{FleetFile, Groups};
-pub use ledger::{Ending, Ledger, Record};
-pub use robot::Robot;
+pub use ledger::{Ending, Ledger, RobotRecord};
+pub use robot::FleetRobot;
 pub use roster::Roster;
 pub use work::{Visit, Watcher, Workshop};
 

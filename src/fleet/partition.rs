@@ -1,7 +1,7 @@
 //! One big recording table, parted by robot into files below the store; a table that was parted before is not parted again.
 
 use super::list::{csv_reader, is_parquet};
-use super::robot::Robot;
+use super::robot::FleetRobot;
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::store::{FileHash, Store};
@@ -16,7 +16,7 @@ use std::path::Path;
 const BATCH: usize = 1 << 10;
 
 /// Parts the table at `path` by its column `by`; `variable` takes the file of a robot.
-pub(super) fn read(path: &Path, by: &str, variable: &str, fleet: &str, store: &Store) -> Result<Vec<Robot>> {
+pub(super) fn read(path: &Path, by: &str, variable: &str, fleet: &str, store: &Store) -> Result<Vec<FleetRobot>> {
     let fault = |error: String| Error::spec("recording", format!("`{}`: {error}", path.display()));
     let hash = raw::open(path).and_then(FileHash::of_reader).map_err(|error| fault(error.to_string()))?;
     let source = blake3::hash(format!("{hash} {by}").as_bytes()).to_hex()[..16].to_string();
@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path, by: &str, variable: &str, fleet: &str, store: &S
     let folder = place.iter().fold(store.root().to_path_buf(), |folder, part| folder.join(part));
     let robot = |name: String| {
         let file = folder.join(file_name(&name, path)).to_string_lossy().into_owned();
-        let mut robot = Robot::new(name);
+        let mut robot = FleetRobot::new(name);
         robot.set_text(variable, &file);
         robot
     };

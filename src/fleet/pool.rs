@@ -13,7 +13,7 @@ use crate::table::{Parameters, Table};
 use std::collections::BTreeMap;
 
 /// Mean and standard deviation, in the unit of the table `parameters`.
-type Prior = (f64, f64);
+type PooledPrior = (f64, f64);
 
 /// Robots that a pool needs beside the one that it serves.
 const FEWEST: usize = 3;
@@ -38,7 +38,7 @@ impl Fleet {
         }
         if let Some(wanted) = self.file.prior.clone() {
             let earlier = Earlier::named(&wanted.fleet, "prior.fleet", ledger)?;
-            let known = Known::read(&earlier, &wanted, ledger)?;
+            let known = EarlierChanges::read(&earlier, &wanted, ledger)?;
             for robot in &mut self.roster.0 {
                 let priors = match wanted.by {
                     PriorBy::Robot => known.own(&robot.name),
@@ -57,11 +57,11 @@ impl Fleet {
 }
 
 /// Changes from nominal that the earlier fleet estimated.
-struct Known {
-    robots: BTreeMap<String, (Groups, BTreeMap<String, Prior>)>,
+struct EarlierChanges {
+    robots: BTreeMap<String, (Groups, BTreeMap<String, PooledPrior>)>,
 }
 
-impl Known {
+impl EarlierChanges {
     fn read(earlier: &Earlier, wanted: &PriorFrom, ledger: &Ledger) -> Result<Self> {
         let mut robots = BTreeMap::new();
         for member in earlier.members() {
@@ -75,13 +75,13 @@ impl Known {
         Ok(Self { robots })
     }
 
-    fn own(&self, robot: &str) -> BTreeMap<String, Prior> {
+    fn own(&self, robot: &str) -> BTreeMap<String, PooledPrior> {
         self.robots.get(robot).map(|(_, values)| values.clone()).unwrap_or_default()
     }
 
-    fn pooled(&self, robot: &str, groups: &Groups) -> BTreeMap<String, Prior> {
+    fn pooled(&self, robot: &str, groups: &Groups) -> BTreeMap<String, PooledPrior> {
         let kin = self.robots.iter().filter(|(name, (other, _))| *name != robot && other.model == groups.model);
-        let mut values: BTreeMap<&str, Vec<Prior>> = BTreeMap::new();
+        let mut values: BTreeMap<&str, Vec<PooledPrior>> = BTreeMap::new();
         for (name, value) in kin.flat_map(|(_, (_, values))| values) {
             values.entry(name).or_default().push(*value);
         }
@@ -90,7 +90,7 @@ impl Known {
 }
 
 /// Mean and spread to expect of one robot more.
-fn pool(values: &[Prior]) -> Option<Prior> {
+fn pool(values: &[PooledPrior]) -> Option<PooledPrior> {
     if values.len() < FEWEST {
         return None;
     }

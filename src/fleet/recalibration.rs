@@ -1,19 +1,19 @@
 //! One campaign after another: limits for changes over all robots and parameters, and why a person should look at a robot.
 
 use super::Fleet;
-use super::ledger::{Ledger, Member, Record, RunNote};
+use super::ledger::{Ledger, Member, RobotRecord, RunNote};
 use crate::error::{Error, Result};
 use crate::statistics::normal_quantile;
 use crate::table::{Changes, Findings, FleetChangeRow, FleetChanges, Table};
 
 /// How rare a change by chance may be.
-pub(super) struct Limits {
+pub(super) struct FalseAlarmRate {
     /// In the whole fleet.
     pub alpha: f64,
 }
 
 /// Changes of all robots with their control limits: alpha shared by every robot and parameter that was tested (Bonferroni).
-pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &Limits) -> FleetChanges {
+pub(super) fn with_limits(robots: &[(&str, &Changes)], limits: &FalseAlarmRate) -> FleetChanges {
     let tests = robots.iter().map(|(_, changes)| changes.0.len()).sum::<usize>().max(1);
     let each = limits.alpha / tests as f64;
     // A normal variable is farther from its mean, either way, with this chance.
@@ -64,7 +64,7 @@ impl Earlier {
     }
 
     /// The record of a robot, where it has one there.
-    pub fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<Record>> {
+    pub fn record(&self, ledger: &Ledger, robot: &str) -> Result<Option<RobotRecord>> {
         let member = self.note.robots.iter().find(|member| member.name == robot);
         let Some(key) = member.and_then(|member| member.key.as_deref()) else { return Ok(None) };
         Ledger::new(ledger.store, &self.fleet).find(key)

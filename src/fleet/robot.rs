@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// One robot. Its name is data from outside: never a path, never a command.
 #[derive(Debug, Clone)]
-pub struct Robot {
+pub struct FleetRobot {
     pub name: String,
     pub groups: Groups,
     /// Later ones win.
@@ -16,7 +16,7 @@ pub struct Robot {
     pub unreadable: Option<String>,
 }
 
-impl Robot {
+impl FleetRobot {
     pub(super) fn new(name: String) -> Self {
         Self { name, groups: Groups::default(), sets: Vec::new(), unreadable: None }
     }

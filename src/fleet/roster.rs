@@ -1,7 +1,7 @@
 //! The robots of a fleet, each with its name, its groups and what it sets in the pipeline.
 
-use super::file::{FleetFile, Source, faulty};
-use super::robot::Robot;
+use super::file::{FleetFile, RobotSource, faulty};
+use super::robot::FleetRobot;
 use super::{list, partition};
 use crate::error::{Error, Result};
 use crate::store::Store;
@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// All robots, in the order of the file, those of a source by name.
 #[derive(Debug, Clone, Default)]
-pub struct Roster(pub Vec<Robot>);
+pub struct Roster(pub Vec<FleetRobot>);
 
 /// The variable that takes a robot's folder, where the file does not say.
 const FOLDER: &str = "case";
@@ -20,7 +20,7 @@ impl Roster {
     /// Finds the robots of all sources; every fault at once.
     pub(super) fn gather(path: &Path, file: &FleetFile, tree: &Node, store: &Store) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let mut robots: Vec<Robot> = Vec::new();
+        let mut robots: Vec<FleetRobot> = Vec::new();
         let mut troubles = Vec::new();
         for (index, source) in file.robots.iter().enumerate() {
             let place = format!("robots[{index}]");
@@ -77,7 +77,7 @@ impl Roster {
     }
 }
 
-fn found(folder: &Path, file: &FleetFile, source: &Source, store: &Store) -> Result<Vec<Robot>> {
+fn found(folder: &Path, file: &FleetFile, source: &RobotSource, store: &Store) -> Result<Vec<FleetRobot>> {
     if let Some(pattern) = &source.folders {
         return folders(folder, pattern, source.variable.as_deref().unwrap_or(FOLDER));
     }
@@ -90,7 +90,7 @@ fn found(folder: &Path, file: &FleetFile, source: &Source, store: &Store) -> Res
     }
 }
 
-fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<Robot>> {
+fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobot>> {
     let base = folder.to_str().ok_or_else(|| Error::spec("folders", "the folder of this file has a name that is not UTF-8"))?;
     let whole = if base.is_empty() { pattern.to_string() } else { format!("{}/{pattern}", glob::Pattern::escape(base)) };
     let paths = glob::glob(&whole).map_err(|error| Error::spec("folders", format!("`{pattern}` is no pattern: {error}")))?;
@@ -101,7 +101,7 @@ fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<Robot>> {
             continue;
         }
         let raw = path.file_name().unwrap_or(path.as_os_str());
-        let mut robot = Robot::new(raw.to_string_lossy().into_owned());
+        let mut robot = FleetRobot::new(raw.to_string_lossy().into_owned());
         match path.to_str() {
             Some(text) => robot.set_text(variable, text),
             None => {

@@ -1,6 +1,6 @@
 //! The Slurm engine: submits arrays, looks at the store until every robot is recorded, and submits the missing again.
 
-use super::cluster::{Wishes, logs, slurm};
+use super::cluster::{ClusterOptions, logs, slurm};
 use super::ledger::{Ledger, RunNote};
 use crate::error::{Error, Result};
 use std::io::Write;
@@ -13,7 +13,7 @@ const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: u32 = 10;
 
 /// Submits the arrays of a run and notes their ids. Fails where sbatch does.
-pub fn submit(ledger: &Ledger, note: &mut RunNote, wishes: &Wishes) -> Result<()> {
+pub fn submit(ledger: &Ledger, note: &mut RunNote, wishes: &ClusterOptions) -> Result<()> {
     let scripts = slurm(note, wishes)?;
     ledger.put_run(note)?;
     let folder = logs(&wishes.store, &note.fleet);

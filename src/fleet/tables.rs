@@ -1,11 +1,11 @@
 //! Records -> the fleet's tables and page, published as any other: equal records give equal tables.
 
 use super::Fleet;
-use super::ledger::{Ending, Ledger, Record};
-use super::recalibration::{self, Limits};
+use super::ledger::{Ending, Ledger, RobotRecord};
+use super::recalibration::{self, FalseAlarmRate};
 use crate::error::Result;
 use crate::report::fleet as page;
-use crate::store::{Account, KEY_FORMAT, Product, StageKey};
+use crate::store::{Account, KEY_FORMAT, PendingTable, StageKey};
 use crate::table::{
     Changes, Findings, FleetChangeRow, FleetChanges, FleetRow, FleetTable, Statistics, StatisticsRow, Table, Verdict,
 };
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 const STAGE: &str = "fleet";
 
 /// What a fleet came to.
-pub struct Told {
+pub struct FleetSummary {
     pub fleet: FleetTable,
     pub changes: FleetChanges,
     /// Where people find the tables and the page.
@@ -27,14 +27,14 @@ pub struct Told {
 }
 
 /// Makes the tables and the page from the records (in the order of the roster; none: missing) and publishes them.
-pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Result<Told> {
+pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<RobotRecord>]) -> Result<FleetSummary> {
     let earlier = recalibration::Earlier::find(fleet, ledger)?;
     let read: Vec<Read> = records.par_iter().map(|record| Read::of(ledger, record.as_ref())).collect::<Result<_>>()?;
     let changes: Vec<(&str, &Changes)> = (fleet.roster.0.iter().zip(&read))
         .filter_map(|(robot, read)| Some((robot.name.as_str(), read.changes.as_ref()?)))
         .collect();
     let alpha = fleet.file.previous.as_ref().map_or(1.0, |previous| previous.alpha);
-    let changes = recalibration::with_limits(&changes, &Limits { alpha });
+    let changes = recalibration::with_limits(&changes, &FalseAlarmRate { alpha });
     let mut flagged: BTreeMap<&str, Vec<&FleetChangeRow>> = BTreeMap::new();
     for change in changes.0.iter().filter(|change| change.flagged) {
         flagged.entry(&change.robot).or_default().push(change);
@@ -60,8 +60,8 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Re
     let html = page::html(fleet.name(), &table, &changes, &links)?;
     let key = key(fleet, &table, records);
     let products = vec![
-        ("fleet".to_string(), Product::Frame(table.to_frame()?)),
-        ("fleet_changes".into(), Product::Frame(changes.to_frame()?)),
+        ("fleet".to_string(), PendingTable::Frame(table.to_frame()?)),
+        ("fleet_changes".into(), PendingTable::Frame(changes.to_frame()?)),
     ];
     let published = ledger.store.publish(&key, products, Account::default())?;
     let mut tables = Vec::new();
@@ -73,11 +73,11 @@ pub fn publish(fleet: &Fleet, ledger: &Ledger, records: &[Option<Record>]) -> Re
     ledger.store.put_note(&["fleets", fleet.name()], "tables.json", &note)?;
     let page = ledger.store.expose_document(fleet.name(), "fleet.html", html.as_bytes())?;
     ledger.store.sync()?;
-    Ok(Told { fleet: table, changes, tables, page })
+    Ok(FleetSummary { fleet: table, changes, tables, page })
 }
 
 /// What the tables were made of: the settings and the robots' own tables.
-fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<Record>]) -> StageKey {
+fn key(fleet: &Fleet, table: &FleetTable, records: &[Option<RobotRecord>]) -> StageKey {
     let robots = fleet.roster.0.iter().zip(&table.0).zip(records).map(|((robot, row), record)| {
         let tables = record.iter().flat_map(|record| &record.tables).map(|made| made.table.table_hash.to_string());
         json!([robot.name, robot.groups, row.status, row.reason, row.flags, tables.collect::<Vec<_>>()])
@@ -106,7 +106,7 @@ struct Read {
 }
 
 impl Read {
-    fn of(ledger: &Ledger, record: Option<&Record>) -> Result<Self> {
+    fn of(ledger: &Ledger, record: Option<&RobotRecord>) -> Result<Self> {
         let Some(record) = record else { return Ok(Self::default()) };
         Ok(Self {
             statistics: ledger.load(record.last(Statistics::KIND))?,
@@ -116,7 +116,7 @@ impl Read {
         })
     }
 
-    fn row(&self, robot: &super::Robot, record: Option<&Record>) -> FleetRow {
+    fn row(&self, robot: &super::FleetRobot, record: Option<&RobotRecord>) -> FleetRow {
         let rows = self.statistics.as_ref().map(told_rows).unwrap_or_default();
         let (first, last) = (rows.first().copied(), rows.last().copied());
         let verdict = self.verdict.as_ref().and_then(|verdict| verdict.0.first());

@@ -1,8 +1,8 @@
 //! One robot: its plan, its key, its run and its record.
 
 use super::Fleet;
-use super::ledger::{Ending, LATER, Ledger, Made, Record};
-use super::robot::Robot;
+use super::ledger::{Ending, LATER, Ledger, RobotRecord, RobotTable};
+use super::robot::FleetRobot;
 use crate::error::{Error, Result};
 use crate::pipeline::{Observer, Plan, Purpose, RunOptions, Selection, StageReport, Surroundings, run};
 use crate::stage::STAGES;
@@ -15,15 +15,15 @@ pub trait Watcher: Sync {
     /// The robot's pipeline comes to a stage.
     fn stage(&self, worker: usize, stage: &str);
     /// The robot is recorded; `fresh` where this worker computed it.
-    fn ends(&self, worker: usize, record: &Record, fresh: bool);
+    fn ends(&self, worker: usize, record: &RobotRecord, fresh: bool);
 }
 
 /// What a visit to a robot came to.
 pub enum Visit {
     /// Its record stood already.
-    Recorded(Record),
+    Recorded(RobotRecord),
     /// It was computed now.
-    Made(Record),
+    Made(RobotRecord),
     /// Another living process has it in hand.
     Busy,
 }
@@ -47,7 +47,7 @@ const REASON: usize = 2000;
 
 impl Workshop<'_> {
     /// The robot's plan with all that is set for it.
-    pub fn plan(&self, robot: &Robot) -> Result<Plan> {
+    pub fn plan(&self, robot: &FleetRobot) -> Result<Plan> {
         if let Some(reason) = &robot.unreadable {
             return Err(Error::data("", reason.clone()));
         }
@@ -58,7 +58,7 @@ impl Workshop<'_> {
     }
 
     /// The plan, or why there is none, and the key of the robot's record.
-    fn prepared(&self, robot: &Robot) -> (Result<Plan>, String) {
+    fn prepared(&self, robot: &FleetRobot) -> (Result<Plan>, String) {
         let plan = self.plan(robot).and_then(|plan| plan.identity().map(|identity| (plan, identity)));
         let (plan, content) = match plan {
             Ok((plan, identity)) => (Ok(plan), identity),
@@ -73,17 +73,17 @@ impl Workshop<'_> {
     }
 
     /// The key of the robot's record.
-    pub fn key(&self, robot: &Robot) -> String {
+    pub fn key(&self, robot: &FleetRobot) -> String {
         self.prepared(robot).1
     }
 
     /// The robot's record, where there is one for its settings and data as they are.
-    pub fn record(&self, robot: &Robot) -> Result<Option<Record>> {
+    pub fn record(&self, robot: &FleetRobot) -> Result<Option<RobotRecord>> {
         self.ledger.find(&self.prepared(robot).1)
     }
 
     /// Computes a robot unless it is recorded. Fails where the store does.
-    pub fn visit(&self, robot: &Robot, worker: usize, watcher: &dyn Watcher) -> Result<Visit> {
+    pub fn visit(&self, robot: &FleetRobot, worker: usize, watcher: &dyn Watcher) -> Result<Visit> {
         let (plan, key) = self.prepared(robot);
         let standing = |ledger: &Ledger| ledger.find(&key).map(|found| found.filter(|record| record.exit_code != LATER));
         if let Some(record) = standing(&self.ledger)? {
@@ -105,10 +105,10 @@ impl Workshop<'_> {
         Ok(Visit::Made(record))
     }
 
-    fn compute(&self, robot: &Robot, plan: Result<Plan>, key: String, worker: usize, watcher: &dyn Watcher) -> Record {
+    fn compute(&self, robot: &FleetRobot, plan: Result<Plan>, key: String, worker: usize, watcher: &dyn Watcher) -> RobotRecord {
         let mut surroundings = (self.surroundings)();
         let begun = (surroundings.now)();
-        let mut record = Record::blank(robot, key, &format!("{}/{worker}", self.name));
+        let mut record = RobotRecord::blank(robot, key, &format!("{}/{worker}", self.name));
         record.log.clone_from(&self.log);
         let observer = Relay { worker, watcher };
         let options = RunOptions { selection: Selection::default(), jobs: self.threads, purpose: Purpose::Fleet };
@@ -130,7 +130,7 @@ impl Workshop<'_> {
                     .map(|name| name.to_string_lossy().into_owned())
                     .collect();
                 for stage in outcome.manifest.stages {
-                    let made = stage.outputs.into_iter().map(|output| Made {
+                    let made = stage.outputs.into_iter().map(|output| RobotTable {
                         stage: stage.id.clone(),
                         port: output.port,
                         kind: output.kind,

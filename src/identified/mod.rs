@@ -7,7 +7,7 @@ mod standing;
 pub use robot_file::robot_file;
 pub use standing::standing_of;
 
-use crate::compensate::{Arm, Coverage, Scatter, Uncertainty};
+use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
 use crate::estimate::network::Correction;
@@ -23,7 +23,7 @@ use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recor
 use std::path::{Path, PathBuf};
 
 /// What was identified, and from what.
-pub struct Identified {
+pub struct IdentifiedModel {
     pub robot: RobotDescription,
     pub parameters: Parameters,
     pub model: Model,
@@ -59,7 +59,7 @@ pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
     Ok(steps)
 }
 
-impl Identified {
+impl IdentifiedModel {
     /// The model of a run that is done: of `step`, else of the step that stands for it, else of the last stage that writes parameters.
     pub fn of_run(store: &Store, manifest: &Manifest, step: Option<&str>) -> Result<Self> {
         let run = &manifest.run_id;
@@ -140,7 +140,7 @@ impl Identified {
     }
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
-    pub fn uncertainty(&self, arm: &Arm) -> Option<Uncertainty> {
+    pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
         self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance, self.scatter))
     }
 }

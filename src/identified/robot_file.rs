@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::robot::description::RobotDescription;
-use crate::robot::import::{Text, read_calib, read_case};
+use crate::robot::import::{RobotFileText, read_calib, read_case};
 use std::path::Path;
 
 /// Reads a robot file by its ending: `.json` is the practice layout, all else calib's YAML, beside which a URDF may stand.
@@ -14,10 +14,10 @@ pub fn robot_file(path: &Path, urdf: Option<&Path>) -> Result<RobotDescription> 
         Ok((label, text))
     };
     let (label, text) = read(path)?;
-    let file = Text { label: &label, text: &text };
+    let file = RobotFileText { label: &label, text: &text };
     if raw::ending(path) == "json" {
         return Ok(read_case(file)?.robot);
     }
     let urdf = urdf.map(read).transpose()?;
-    Ok(read_calib(file, urdf.as_ref().map(|(label, text)| Text { label, text }))?.robot)
+    Ok(read_calib(file, urdf.as_ref().map(|(label, text)| RobotFileText { label, text }))?.robot)
 }

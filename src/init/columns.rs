@@ -1,7 +1,7 @@
 //! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
 use super::names::{LENGTHS, Name, joints};
-use super::points::{Way, points};
+use super::points::{PointColumns, points};
 use super::sheet::Sheet;
 use super::words;
 use crate::error::Result;
@@ -30,7 +30,7 @@ pub(super) struct Choice {
 }
 
 /// A file, as far as it was understood.
-pub(super) struct Found {
+pub(super) struct ExaminedFile {
     /// As messages name it.
     pub name: String,
     pub sheet: Sheet,
@@ -42,7 +42,7 @@ pub(super) struct Found {
     pub remarks: Vec<String>,
 }
 
-impl Found {
+impl ExaminedFile {
     pub fn read(path: &Path) -> Result<Self> {
         let sheet = Sheet::read(path)?;
         let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
@@ -172,11 +172,11 @@ impl Found {
 
     fn point(&mut self) {
         let found = points(&self.said);
-        let numeric = |way: &Way| {
+        let numeric = |way: &PointColumns| {
             let more = way.difference.iter().flat_map(|(columns, _)| columns);
             way.columns.iter().chain(more).all(|column| self.sheet.is_numeric(*column))
         };
-        let ways: Vec<&Way> = found.ways.iter().filter(|way| numeric(way)).collect();
+        let ways: Vec<&PointColumns> = found.ways.iter().filter(|way| numeric(way)).collect();
         let Some(best) = ways.first() else {
             if let Some(wanted) = found.wanted {
                 self.remarks.push(format!("only the wanted point is there: {}", quoted(&self.shown(&wanted))));
@@ -207,7 +207,7 @@ impl Found {
         self.mappings.push(mapping);
     }
 
-    fn way(&self, way: &Way) -> Choice {
+    fn way(&self, way: &PointColumns) -> Choice {
         let unit = self.length_unit(&way.columns).0;
         let mut columns = way.columns.to_vec();
         let lines = ["x", "y", "z"].iter().enumerate().map(|(axis, name)| match &way.difference {

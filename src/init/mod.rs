@@ -15,12 +15,12 @@ pub use marks::marked;
 pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result, counted};
-use columns::Found;
+use columns::ExaminedFile;
 use pipeline::missing;
 use std::path::{Path, PathBuf};
 
 /// What is there and what is wanted.
-pub struct Request<'a> {
+pub struct InitRequest<'a> {
     /// The folder of robot.yaml and pipeline.yaml.
     pub folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
@@ -32,7 +32,7 @@ pub struct Request<'a> {
 }
 
 /// Files to start from.
-pub struct Start {
+pub struct StarterFiles {
     pub robot: String,
     pub pipeline: String,
     /// What was found in each recording.
@@ -42,8 +42,8 @@ pub struct Start {
 }
 
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
-pub fn start(request: &Request) -> Result<Start> {
-    let mut found = request.data.iter().map(|path| Found::read(path)).collect::<Result<Vec<Found>>>()?;
+pub fn start(request: &InitRequest) -> Result<StarterFiles> {
+    let mut found = request.data.iter().map(|path| ExaminedFile::read(path)).collect::<Result<Vec<ExaminedFile>>>()?;
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
     let robot = match request.urdf {
         Some(_) => robots::of_urdf(request.tip),
@@ -59,10 +59,10 @@ pub fn start(request: &Request) -> Result<Start> {
     let joined = together::join(&mut found);
     let pipeline = pipeline::text(request, &found, &joined);
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
-    Ok(Start {
+    Ok(StarterFiles {
         robot,
         pipeline,
-        accounts: found.iter().map(Found::account).collect(),
+        accounts: found.iter().map(ExaminedFile::account).collect(),
         missing: if found.is_empty() {
             Vec::new()
         } else {

@@ -1,7 +1,7 @@
 //! The text of the pipeline that `init` writes.
 
-use super::Request;
-use super::columns::{Choice, Found, Mapping};
+use super::InitRequest;
+use super::columns::{Choice, ExaminedFile, Mapping};
 use super::together::Joined;
 use crate::error::one_line;
 use crate::yaml::quoted;
@@ -15,7 +15,7 @@ fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-pub(super) fn text(request: &Request, found: &[Found], joined: &Joined) -> String {
+pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joined) -> String {
     // A folder that is still to be made has its name already.
     let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
     let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -47,7 +47,7 @@ pub(super) fn text(request: &Request, found: &[Found], joined: &Joined) -> Strin
 }
 
 /// Whether no file has columns of joints, or of the measured point.
-pub(super) fn missing(found: &[Found]) -> [bool; 2] {
+pub(super) fn missing(found: &[ExaminedFile]) -> [bool; 2] {
     ["q", "x"].map(|quantity| found.iter().all(|file| file.get(quantity).is_none()))
 }
 
@@ -60,7 +60,7 @@ struct Lacks {
 }
 
 /// The settings of one file under `files`.
-fn file_text(file: &Found, lacks: &Lacks) -> String {
+fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     let sheet = &file.sheet;
     let mut out = String::new();
     let mut put = |line: &str| out.push_str(&format!("          {line}\n"));
@@ -135,7 +135,7 @@ fn mapped(mapping: &Mapping) -> String {
 }
 
 /// Lines to replace where no file has the joints, or the point.
-fn lacking(file: &Found, lacks: &Lacks, put: &mut impl FnMut(&str)) {
+fn lacking(file: &ExaminedFile, lacks: &Lacks, put: &mut impl FnMut(&str)) {
     let header = file.sheet.header;
     if lacks.joints && header {
         put("q: {column: \"A{j}\", unit: deg}   # REPLACE: no columns of joints were recognised; {j} is the joint's number");

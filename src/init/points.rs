@@ -8,11 +8,11 @@ use super::words;
 pub(super) struct Family {
     pub columns: [usize; 3],
     pub words: Vec<String>,
-    pub role: Role,
+    pub role: PointRole,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
+pub(super) enum PointRole {
     Measured,
     /// The name does not say.
     Plain,
@@ -23,7 +23,7 @@ pub(super) enum Role {
 
 /// A way to the measured point.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Way {
+pub(super) struct PointColumns {
     pub columns: [usize; 3],
     /// Columns of the difference, and whether they are taken off.
     pub difference: Option<([usize; 3], bool)>,
@@ -32,7 +32,7 @@ pub(super) struct Way {
 /// Ways to the measured point, best first; what to ask where it is not plain; what else is known of points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Points {
-    pub ways: Vec<Way>,
+    pub ways: Vec<PointColumns>,
     pub question: Option<String>,
     /// Whether the name of the best one says that it was measured.
     pub said: bool,
@@ -67,36 +67,37 @@ pub(super) fn families(names: &[Name]) -> Vec<Family> {
     found
 }
 
-fn role(rest: &[String]) -> Role {
+fn role(rest: &[String]) -> PointRole {
     let has = |listed: &[&str]| rest.iter().any(|word| listed.contains(&word.as_str()));
     match (has(&words::SIGMA), has(&words::DIFFERENCE), has(&words::MEASURED), has(&words::WANTED)) {
-        (true, ..) => Role::Sigma,
-        (_, true, ..) => Role::Difference,
-        (_, _, true, false) => Role::Measured,
-        (_, _, false, true) => Role::Wanted,
-        _ => Role::Plain,
+        (true, ..) => PointRole::Sigma,
+        (_, true, ..) => PointRole::Difference,
+        (_, _, true, false) => PointRole::Measured,
+        (_, _, false, true) => PointRole::Wanted,
+        _ => PointRole::Plain,
     }
 }
 
 /// The measured point among them.
 pub(super) fn points(names: &[Name]) -> Points {
     let mut families = families(names);
-    let of = |families: &[Family], role: Role| -> Vec<Family> {
+    let of = |families: &[Family], role: PointRole| -> Vec<Family> {
         families.iter().filter(|family| family.role == role).cloned().collect()
     };
     // `x_t` beside `x_dif` is the target; alone it may be the tracker's.
-    let others = families.iter().any(|family| family.role == Role::Difference || family.words.is_empty());
+    let others = families.iter().any(|family| family.role == PointRole::Difference || family.words.is_empty());
     for family in &mut families {
-        if family.role == Role::Plain && family.words == ["t"] && others {
-            family.role = Role::Wanted;
+        if family.role == PointRole::Plain && family.words == ["t"] && others {
+            family.role = PointRole::Wanted;
         }
     }
     let [measured, plain, wanted, differences, sigma] =
-        [Role::Measured, Role::Plain, Role::Wanted, Role::Difference, Role::Sigma].map(|role| of(&families, role));
-    let direct = |family: &Family| Way { columns: family.columns, difference: None };
+        [PointRole::Measured, PointRole::Plain, PointRole::Wanted, PointRole::Difference, PointRole::Sigma]
+            .map(|role| of(&families, role));
+    let direct = |family: &Family| PointColumns { columns: family.columns, difference: None };
     let by = |target: &Family, difference: &Family| {
         let minus = difference.words.iter().any(|word| words::TARGET_LESS_MEASURED.contains(&word.as_str()));
-        Way { columns: target.columns, difference: Some((difference.columns, minus)) }
+        PointColumns { columns: target.columns, difference: Some((difference.columns, minus)) }
     };
     let sides = "minus: target less measured point; plus: measured point less target";
     let mut found = Points {
@@ -136,7 +137,7 @@ mod tests {
 
     #[test]
     fn the_measured_point_is_never_its_target() {
-        let way = |columns: [usize; 3]| vec![Way { columns, difference: None }];
+        let way = |columns: [usize; 3]| vec![PointColumns { columns, difference: None }];
         for texts in [
             ["X_soll", "Y_soll", "Z_soll", "X_ist", "Y_ist", "Z_ist"],
             ["Goal x", "Goal y", "Goal z", "x", "y", "z"],
@@ -148,7 +149,7 @@ mod tests {
             assert_eq!((found.ways, found.question), (way([3, 4, 5]), None), "{texts:?}");
         }
         let target = found(&["x_t", "y_t", "z_t", "x_dif", "y_dif", "z_dif"]);
-        assert_eq!(target.ways, [Way { columns: [0, 1, 2], difference: Some(([3, 4, 5], true)) }]);
+        assert_eq!(target.ways, [PointColumns { columns: [0, 1, 2], difference: Some(([3, 4, 5], true)) }]);
         assert!(target.question.is_some());
         let alone = found(&["x_soll", "y_soll", "z_soll"]);
         assert_eq!((alone.ways.len(), alone.wanted), (0, Some([0, 1, 2])));

@@ -1,6 +1,6 @@
 //! How two files belong together: by points' names, found by equal values whatever the header; else by time; else row by row.
 
-use super::columns::Found;
+use super::columns::ExaminedFile;
 use super::sheet::number;
 use super::words;
 use crate::statistics;
@@ -29,7 +29,7 @@ struct Pair {
 }
 
 /// Decides, and leaves every quantity in one of the files.
-pub(super) fn join(found: &mut [Found]) -> Joined {
+pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
     let [one, two] = found else {
         if let [only] = found {
             return alone(only);
@@ -72,7 +72,7 @@ pub(super) fn join(found: &mut [Found]) -> Joined {
 }
 
 /// Names and repeats of a file that stands alone.
-fn alone(found: &mut Found) -> Joined {
+fn alone(found: &mut ExaminedFile) -> Joined {
     let ids = found.ids();
     let Some(first) = ids.first().copied() else { return Joined::default() };
     found.map("point_id", &ids, None, None);
@@ -83,8 +83,9 @@ fn alone(found: &mut Found) -> Joined {
 }
 
 /// Every quantity once: joints and what belongs to them from the first file that has them, the point from the file without joints.
-fn single(one: &mut Found, two: &mut Found) {
-    let both = |quantity: &str, one: &Found, two: &Found| one.get(quantity).is_some() && two.get(quantity).is_some();
+fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
+    let both =
+        |quantity: &str, one: &ExaminedFile, two: &ExaminedFile| one.get(quantity).is_some() && two.get(quantity).is_some();
     for quantity in ["q", "current", "direction", "velocity", "payload", "temperature", "usage", "target"] {
         if both(quantity, one, two) {
             two.drop(quantity, "in both files; this one or that of the first?");
@@ -99,7 +100,7 @@ fn single(one: &mut Found, two: &mut Found) {
 }
 
 /// Pairs of columns with equal values, best first.
-fn pairs(one: &Found, two: &Found) -> Vec<Pair> {
+fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
         (0..file.said.len())
             .filter(|column| may_name(file, *column))
@@ -112,7 +113,8 @@ fn pairs(one: &Found, two: &Found) -> Vec<Pair> {
             let shared = names.intersection(others).count() as f64 / names.len().min(others.len()).max(1) as f64;
             if shared >= LEAST_SHARED {
                 let text = names.iter().any(|name| number(name).is_none());
-                let listed = |file: &Found, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
+                let listed =
+                    |file: &ExaminedFile, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
                 let named = listed(one, *a) + listed(two, *b);
                 pairs.push(Pair { columns: [*a, *b], text, shared: (100.0 * shared) as u32, named });
             }
@@ -122,12 +124,12 @@ fn pairs(one: &Found, two: &Found) -> Vec<Pair> {
     pairs
 }
 
-fn cells(file: &Found, column: usize) -> BTreeSet<&str> {
+fn cells(file: &ExaminedFile, column: usize) -> BTreeSet<&str> {
     file.sheet.texts(column).collect()
 }
 
 /// Whether a column can name points: most cells differ, and none has decimals unless the header says that these are names.
-fn may_name(file: &Found, column: usize) -> bool {
+fn may_name(file: &ExaminedFile, column: usize) -> bool {
     let distinct = file.distinct(column);
     let rows = file.sheet.rows.len();
     let whole =
@@ -137,12 +139,12 @@ fn may_name(file: &Found, column: usize) -> bool {
 }
 
 /// Whether the cells are numbers that go up by one.
-fn runs(file: &Found, column: usize) -> bool {
+fn runs(file: &ExaminedFile, column: usize) -> bool {
     let numbers: Vec<f64> = file.sheet.numbers(column).collect();
     numbers.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
 }
 
-fn by_id(one: &mut Found, two: &mut Found, best: &Pair, pairs: &[Pair], running: bool) -> Joined {
+fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[Pair], running: bool) -> Joined {
     let alike = |pair: &&Pair| (pair.text, pair.shared, pair.named) == (best.text, best.shared, best.named);
     let columns = |file: usize| {
         let fixed = 1 - file;
@@ -168,7 +170,7 @@ fn by_id(one: &mut Found, two: &mut Found, best: &Pair, pairs: &[Pair], running:
 }
 
 /// Where files are not joined by id, the names of one of them may stand.
-fn label(one: &mut Found, two: &mut Found) {
+fn label(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     for file in [two, one] {
         let ids = file.ids();
         if let Some(first) = ids.first().copied().filter(|first| file.distinct(*first) == file.sheet.rows.len()) {
@@ -190,8 +192,8 @@ struct Timing {
     rows: [usize; 2],
 }
 
-fn timing(one: &Found, two: &Found) -> Option<Timing> {
-    let times = |file: &Found| -> Option<Vec<f64>> {
+fn timing(one: &ExaminedFile, two: &ExaminedFile) -> Option<Timing> {
+    let times = |file: &ExaminedFile| -> Option<Vec<f64>> {
         let column = *file.get("time")?.choices.first()?.columns.first()?;
         let mut times: Vec<f64> = file.sheet.numbers(column).map(|time| time * file.second).collect();
         times.sort_by(f64::total_cmp);
@@ -210,7 +212,7 @@ fn timing(one: &Found, two: &Found) -> Option<Timing> {
     Some(Timing { near, step, overlap: near <= 0.5 * step, apart: second[0] - first[0], rows: [first.len(), second.len()] })
 }
 
-fn by_time(timing: &Timing, files: [&Found; 2]) -> Joined {
+fn by_time(timing: &Timing, files: [&ExaminedFile; 2]) -> Joined {
     // Three times the usual distance, rounded up, but never as far as the next row.
     let wide = if timing.overlap { (3.0 * timing.near).max(1e-3) } else { 0.1 * timing.step };
     let tolerance = rounded_up(wide.min(0.5 * timing.step).max(1e-4)).min(0.5 * timing.step);

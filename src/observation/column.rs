@@ -4,11 +4,11 @@ use crate::units::{Quantity, Unit};
 
 /// A setting below `columns` of `ingest`, with what a recording keeps of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Column {
+pub struct DeclaredColumn {
     pub setting: &'static str,
     /// For the documentation of the setting.
     pub about: &'static str,
-    pub shape: Shape,
+    pub shape: ColumnShape,
     /// What its numbers are; [`Quantity::Number`] for texts, and for directions: 1, -1 or 0.
     pub quantity: Quantity,
     /// What a number may be, SI: one row beyond it would spoil the table.
@@ -22,7 +22,7 @@ pub struct Column {
 
 /// How a file writes a quantity.
 #[derive(Debug, Clone, Copy)]
-pub enum Shape {
+pub enum ColumnShape {
     Text,
     /// Whole numbers.
     Count,
@@ -75,7 +75,7 @@ pub enum Part {
     Anchor,
 }
 
-impl Column {
+impl DeclaredColumn {
     /// A column with one number a row, stored by one name.
     pub const fn number(
         setting: &'static str,
@@ -84,12 +84,12 @@ impl Column {
         range: [f64; 2],
         about: &'static str,
     ) -> Self {
-        Self { setting, about, shape: Shape::Number, quantity, range, stored, together: &[], part: Part::Circumstance }
+        Self { setting, about, shape: ColumnShape::Number, quantity, range, stored, together: &[], part: Part::Circumstance }
     }
 
     /// A text, stored by the name of its setting.
     pub const fn text(setting: &'static str, about: &'static str) -> Self {
-        Self { shape: Shape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
+        Self { shape: ColumnShape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
     }
 
     pub const fn as_part(self, part: Part) -> Self {
@@ -101,16 +101,16 @@ impl Column {
     }
 
     pub fn is_text(&self) -> bool {
-        matches!(self.shape, Shape::Text)
+        matches!(self.shape, ColumnShape::Text)
     }
 
     /// Numbers that reading a row of a robot with so many joints takes at most.
     pub fn numbers(&self, joints: usize) -> usize {
         match self.shape {
-            Shape::Text | Shape::Count => 0,
-            Shape::Number => 1,
-            Shape::Joints { .. } => joints,
-            Shape::Conventions(conventions) => {
+            ColumnShape::Text | ColumnShape::Count => 0,
+            ColumnShape::Number => 1,
+            ColumnShape::Joints { .. } => joints,
+            ColumnShape::Conventions(conventions) => {
                 conventions.all.iter().map(|convention| convention.numbers).max().unwrap_or_default()
             }
         }
@@ -119,7 +119,7 @@ impl Column {
     /// Quantity and range of a joint's number; of the only one where it is not by joint.
     pub fn of_joint(&self, is_prismatic: bool) -> (Quantity, [f64; 2]) {
         match self.shape {
-            Shape::Joints { prismatic: Some(other) } if is_prismatic => other,
+            ColumnShape::Joints { prismatic: Some(other) } if is_prismatic => other,
             _ => (self.quantity, self.range),
         }
     }
@@ -132,7 +132,7 @@ impl Column {
             (if quantity == Quantity::Number { name.into() } else { format!("{name}_{ending}") }, unit)
         };
         match self.shape {
-            Shape::Joints { .. } => (1..)
+            ColumnShape::Joints { .. } => (1..)
                 .zip(prismatic)
                 .map(|(joint, slides)| named(&self.stored[0].replace("{j}", &format!("{joint}")), self.of_joint(*slides).0))
                 .collect(),

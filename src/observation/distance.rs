@@ -1,6 +1,6 @@
 //! Distances of a target from an anchor (draw-wire, ballbar) whose place is estimated too.
 
-use super::{About, Column, Dimension, Kind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::{Anchor, Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -14,13 +14,13 @@ pub struct Distance;
 /// Distances that place an anchor.
 const FEWEST: usize = 4;
 
-static ABOUT: About = About {
+static ABOUT: KindDescription = KindDescription {
     name: "distance",
     word: "distance",
     dimension: Dimension::Length,
     axes: 1,
     columns: &[
-        Column::number(
+        DeclaredColumn::number(
             "distance",
             &["distance"],
             Length,
@@ -28,9 +28,9 @@ static ABOUT: About = About {
             "Distance of the target from an anchor: a draw-wire or ballbar.",
         )
         .as_part(Part::Value),
-        Column::number("sigma_distance", &["sigma_distance"], Length, [0.0, 1.0], "Standard deviation of the distance.")
+        DeclaredColumn::number("sigma_distance", &["sigma_distance"], Length, [0.0, 1.0], "Standard deviation of the distance.")
             .as_part(Part::Sigma),
-        Column::text("anchor", "Which of several anchors the distance goes to; their places are estimated.")
+        DeclaredColumn::text("anchor", "Which of several anchors the distance goes to; their places are estimated.")
             .as_part(Part::Anchor),
     ],
     own_sigma: true,
@@ -46,8 +46,8 @@ impl Distance {
     }
 }
 
-impl Kind for Distance {
-    fn about(&self) -> &'static About {
+impl MeasurementKind for Distance {
+    fn about(&self) -> &'static KindDescription {
         &ABOUT
     }
 
@@ -68,7 +68,7 @@ impl Kind for Distance {
         let mut by_name: BTreeMap<&str, Vec<(Vector3<f64>, f64)>> = BTreeMap::new();
         for row in rows {
             if let Some(reading) = self.reading(data, *row) {
-                let seat = robot.seat(robot.gauging().target(data.target(*row)));
+                let seat = robot.seat(robot.setup().target(data.target(*row)));
                 let point = (*base * robot.last_body(data.q(*row))).point(&seat.translation);
                 by_name.entry(reading.anchor).or_default().push((point, reading.values[0]));
             }

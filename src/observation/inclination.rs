@@ -3,7 +3,7 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{About, Column, Dimension, Kind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
@@ -16,13 +16,13 @@ const BOTH: &[&str] = &["tilt_x", "tilt_y"];
 /// rad
 const UPRIGHT: [f64; 2] = [-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2];
 
-static ABOUT: About = About {
+static ABOUT: KindDescription = KindDescription {
     name: "inclination",
     word: "inclination",
     dimension: Dimension::Angle,
     axes: 2,
     columns: &[
-        Column::number(
+        DeclaredColumn::number(
             "tilt_x",
             &["tilt_x"],
             Angle,
@@ -31,10 +31,10 @@ static ABOUT: About = About {
         )
         .as_part(Part::Value)
         .together(BOTH),
-        Column::number("tilt_y", &["tilt_y"], Angle, UPRIGHT, "Angle of the target's y axis above the horizon.")
+        DeclaredColumn::number("tilt_y", &["tilt_y"], Angle, UPRIGHT, "Angle of the target's y axis above the horizon.")
             .as_part(Part::Value)
             .together(BOTH),
-        Column::number("sigma_tilt", &["sigma_tilt"], Angle, [0.0, 1.0], "Standard deviation of the level's angles.")
+        DeclaredColumn::number("sigma_tilt", &["sigma_tilt"], Angle, [0.0, 1.0], "Standard deviation of the level's angles.")
             .as_part(Part::Sigma),
     ],
     own_sigma: true,
@@ -42,8 +42,8 @@ static ABOUT: About = About {
     is_screened: false,
 };
 
-impl Kind for Inclination {
-    fn about(&self) -> &'static About {
+impl MeasurementKind for Inclination {
+    fn about(&self) -> &'static KindDescription {
         &ABOUT
     }
 

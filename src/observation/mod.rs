@@ -11,11 +11,11 @@ mod point;
 mod residual;
 mod weight;
 
-pub use column::{Column, Convention, Conventions, Part, Shape};
+pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
 pub use orientation::Orientation;
-pub use point::Point;
+pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual};
 pub use weight::Weight;
 
@@ -26,7 +26,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
-pub const KINDS: &[&dyn Kind] = &[&Point, &Orientation, &Distance, &Inclination];
+pub const KINDS: &[&dyn MeasurementKind] = &[&PointKind, &Orientation, &Distance, &Inclination];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub enum Dimension {
 
 /// What a kind says of itself.
 #[derive(Debug)]
-pub struct About {
+pub struct KindDescription {
     /// E.g. `distance`.
     pub name: &'static str,
     /// What a prediction calls it that measured it.
@@ -48,7 +48,7 @@ pub struct About {
     /// Values of a row.
     pub axes: usize,
     /// In the recording.
-    pub columns: &'static [Column],
+    pub columns: &'static [DeclaredColumn],
     /// Whether it must come with its standard deviation; else the instrument's noise is taken.
     pub own_sigma: bool,
     pub rank: Rank,
@@ -86,8 +86,8 @@ impl Sensitivity {
 }
 
 /// A kind of measurement.
-pub trait Kind: Sync {
-    fn about(&self) -> &'static About;
+pub trait MeasurementKind: Sync {
+    fn about(&self) -> &'static KindDescription;
 
     /// Measured - predicted (m or rad, zero on lines without a value) and the variance of each value; `None` where the row measured
     /// none, or the robot lacks what it was measured from.
@@ -142,9 +142,9 @@ pub trait Kind: Sync {
     }
 }
 
-impl dyn Kind + '_ {
+impl dyn MeasurementKind + '_ {
     /// Its columns of a part.
-    pub fn columns(&self, part: Part) -> impl Iterator<Item = &'static Column> {
+    pub fn columns(&self, part: Part) -> impl Iterator<Item = &'static DeclaredColumn> {
         self.about().columns.iter().filter(move |column| column.part == part)
     }
 
@@ -171,7 +171,7 @@ impl dyn Kind + '_ {
 }
 
 /// Kinds that the rows may measure.
-pub fn kinds(data: &Measurements) -> Vec<&'static dyn Kind> {
+pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
     KINDS.iter().copied().filter(|kind| kind.is_in(data)).collect()
 }
 
@@ -186,9 +186,11 @@ pub fn noise(data: &Measurements, row: usize) -> f64 {
 /// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor; less
 /// what moves the whole cell unseen.
 pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<usize> {
-    let axes = |kind: &dyn Kind, wanted: RangeInclusive<usize>| rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)));
-    let used: Vec<&dyn Kind> = KINDS.iter().copied().filter(|kind| axes(*kind, 1..=kind.about().axes)).collect();
-    let (whole, rest): (Vec<&dyn Kind>, Vec<&dyn Kind>) =
+    let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
+        rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)))
+    };
+    let used: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| axes(*kind, 1..=kind.about().axes)).collect();
+    let (whole, rest): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) =
         used.iter().copied().partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
     let blind = |k: usize| whole.iter().map(|kind| kind.about().rank.blind[k]).min();
     let (translations, rotations) = (blind(0)?, blind(1)?);
@@ -202,9 +204,9 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<u
         (true, false) | (false, true) => 2,
         (false, false) => 0,
     };
-    let gauging = robot.gauging();
+    let setup = robot.setup();
     let place = if places { 3 } else { 0 };
-    let targets: usize = gauging.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
-    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * gauging.anchors.len();
+    let targets: usize = setup.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
+    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * setup.anchors.len();
     Some(seen - if places { translations } else { 0 } - rotations)
 }

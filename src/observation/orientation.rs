@@ -1,6 +1,9 @@
 //! Orientations: how a target is turned in the tracker's frame; kept as a rotation matrix, its residual is a rotation vector.
 
-use super::{About, Column, Convention, Conventions, Dimension, Kind, Part, Rank, Sensitivity, Shape, Weight};
+use super::{
+    ColumnShape, Convention, Conventions, DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity,
+    Weight,
+};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::spatial::Pose;
@@ -66,15 +69,15 @@ fn vector(rotation: UnitQuaternion<f64>) -> [f64; 3] {
     Pose::new(Rotation3::from(rotation).into_inner(), Vector3::zeros()).rotation_vector().into()
 }
 
-static ABOUT: About = About {
+static ABOUT: KindDescription = KindDescription {
     name: "orientation",
     word: "rotation",
     dimension: Dimension::Angle,
     axes: 3,
     columns: &[
-        Column {
-            shape: Shape::Conventions(&CONVENTIONS),
-            ..Column::number(
+        DeclaredColumn {
+            shape: ColumnShape::Conventions(&CONVENTIONS),
+            ..DeclaredColumn::number(
                 "orientation",
                 &["rx", "ry", "rz"],
                 Angle,
@@ -83,7 +86,7 @@ static ABOUT: About = About {
             )
             .as_part(Part::Value)
         },
-        Column::number(
+        DeclaredColumn::number(
             "sigma_orientation",
             &["sigma_r"],
             Angle,
@@ -105,8 +108,8 @@ impl Orientation {
     }
 }
 
-impl Kind for Orientation {
-    fn about(&self) -> &'static About {
+impl MeasurementKind for Orientation {
+    fn about(&self) -> &'static KindDescription {
         &ABOUT
     }
 

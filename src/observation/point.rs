@@ -1,28 +1,28 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
-use super::{About, Column, Dimension, Kind, Part, Rank, Sensitivity, Weight};
+use super::{DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use crate::units::Quantity::Length;
 use nalgebra::Vector3;
 
 #[derive(Debug, Clone, Copy)]
-pub struct Point;
+pub struct PointKind;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const SIGMAS: &[&str] = &["sigma_x", "sigma_y", "sigma_z"];
 /// m; no tracker sees farther.
 const FAR: [f64; 2] = [-200.0, 200.0];
 
-const fn axis(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
-    Column::number(setting, stored, Length, FAR, about).as_part(Part::Value)
+const fn axis(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> DeclaredColumn {
+    DeclaredColumn::number(setting, stored, Length, FAR, about).as_part(Part::Value)
 }
 
-const fn sigma(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
-    Column::number(setting, stored, Length, [0.0, 1.0], about).as_part(Part::Sigma).together(SIGMAS)
+const fn sigma(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> DeclaredColumn {
+    DeclaredColumn::number(setting, stored, Length, [0.0, 1.0], about).as_part(Part::Sigma).together(SIGMAS)
 }
 
-static ABOUT: About = About {
+static ABOUT: KindDescription = KindDescription {
     name: "point",
     word: "point",
     dimension: Dimension::Length,
@@ -40,8 +40,8 @@ static ABOUT: About = About {
     is_screened: true,
 };
 
-impl Kind for Point {
-    fn about(&self) -> &'static About {
+impl MeasurementKind for PointKind {
+    fn about(&self) -> &'static KindDescription {
         &ABOUT
     }
 

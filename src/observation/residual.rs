@@ -1,6 +1,6 @@
 //! What is left of what a row measured of one kind.
 
-use super::{Dimension, Kind, Sensitivity, Weight};
+use super::{Dimension, MeasurementKind, Sensitivity, Weight};
 use crate::effect::PlacedRow;
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -26,7 +26,7 @@ impl ExcessSigma {
 /// Measured - predicted of one kind in one row.
 #[derive(Clone, Copy)]
 pub struct Residual {
-    pub kind: &'static dyn Kind,
+    pub kind: &'static dyn MeasurementKind,
     /// Of the recording.
     pub row: usize,
     /// m or rad; on the first `axes` lines or, of a point, on those measured.
@@ -38,8 +38,8 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// What is left of a row that was placed; `None` as by [`Kind::residual`].
-    pub fn of(kind: &'static dyn Kind, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Self> {
+    /// What is left of a row that was placed; `None` as by [`MeasurementKind::residual`].
+    pub fn of(kind: &'static dyn MeasurementKind, data: &Measurements, row: usize, placed: &PlacedRow) -> Option<Self> {
         let (error, variance) = kind.residual(data, row, placed)?;
         Some(Self { kind, row, error, axes: kind.axes(data, row), variance })
     }

@@ -1,17 +1,17 @@
 //! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
 
-use super::desk::{self, Desk};
+use super::run_state::{self, RunState};
 use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
 use crate::stage::{Context, Output};
 use crate::store::frame::Frame;
-use crate::store::{Account, FinishedFile, Product, Store, TableRef};
+use crate::store::{Account, FinishedFile, PendingTable, Store, TableRef};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
 /// Where a stage is executed.
-pub(super) struct Place<'a> {
+pub(super) struct ExecutionSite<'a> {
     pub store: &'a Store,
     pub threads: &'a rayon::ThreadPool,
     pub observer: &'a dyn Observer,
@@ -19,12 +19,17 @@ pub(super) struct Place<'a> {
 }
 
 /// Runs the body of a stage; what it told the person goes into `account`. A panic is a bug with the stage's name.
-pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Account) -> Result<Vec<(String, Product)>> {
-    let stage = &desk.plan.stages[index];
-    let frames = load(desk, index, place.store)?;
+pub(super) fn stage(
+    state: &RunState,
+    index: usize,
+    place: &ExecutionSite,
+    account: &mut Account,
+) -> Result<Vec<(String, PendingTable)>> {
+    let stage = &state.plan.stages[index];
+    let frames = load(state, index, place.store)?;
     let services = StageServices::new(&stage.id, place.store, &stage.files, place.observer);
     let context =
-        Context { id: &stage.id, seed: desk.seed(index), jobs: place.threads.current_num_threads(), services: &services };
+        Context { id: &stage.id, seed: state.seed(index), jobs: place.threads.current_num_threads(), services: &services };
     let body = || place.threads.install(|| stage.stage.run(frames, &context));
     let outputs = catch_unwind(AssertUnwindSafe(body))
         .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
@@ -40,11 +45,11 @@ pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Acco
         .zip(outputs)
         .map(|(port, output)| {
             let (kind, product) = match output {
-                Output::Frame(frame) => (frame.kind(), Product::Frame(frame)),
+                Output::Frame(frame) => (frame.kind(), PendingTable::Frame(frame)),
                 Output::Streamed(streamed) => {
                     let file = streamed.handle.downcast::<FinishedFile>();
                     let file = file.map_err(|_| Error::Bug(format!("stage {}: a sink that is not the engine's", stage.id)))?;
-                    (streamed.kind, Product::File(*file))
+                    (streamed.kind, PendingTable::File(*file))
                 }
             };
             if kind != port.kind {
@@ -55,16 +60,16 @@ pub(super) fn stage(desk: &Desk, index: usize, place: &Place, account: &mut Acco
         .collect()
 }
 
-fn load(desk: &Desk, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
-    let stages = &desk.plan.stages;
+fn load(state: &RunState, index: usize, store: &Store) -> Result<Vec<Vec<(String, Frame)>>> {
+    let stages = &state.plan.stages;
     let inputs = stages[index].inputs.iter();
     inputs
         .map(|input| {
             let frames = input.from.iter().map(|origin| {
                 let from = &stages[origin.stage];
-                let tables = desk.tables[origin.stage].as_ref();
+                let tables = state.tables[origin.stage].as_ref();
                 let tables = tables.ok_or_else(|| Error::Bug(format!("stage {} has no tables yet", from.id)))?;
-                Ok((from.id.clone(), store.load(desk::table(tables, from, origin.port)?)?))
+                Ok((from.id.clone(), store.load(run_state::table(tables, from, origin.port)?)?))
             });
             frames.collect()
         })

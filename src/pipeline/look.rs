@@ -3,7 +3,7 @@
 use super::plan::{InputFile, PlannedStage};
 use super::{Plan, services};
 use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, Output, RawFile, Services, Sink, Source};
+use crate::stage::{Context, OpenedInput, Output, RawFile, Services, Sink};
 use crate::store::frame::Frame;
 use std::sync::{Mutex, PoisonError};
 
@@ -74,7 +74,7 @@ struct Onlooker<'a> {
 }
 
 impl Services for Onlooker<'_> {
-    fn open(&self, file: &RawFile) -> Result<Source> {
+    fn open(&self, file: &RawFile) -> Result<OpenedInput> {
         services::open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {

@@ -1,6 +1,5 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
-mod desk;
 mod execute;
 mod history;
 mod identity;
@@ -13,6 +12,7 @@ pub mod plan;
 mod preview;
 mod reason;
 mod run;
+mod run_state;
 mod schema;
 mod select;
 mod services;
@@ -28,8 +28,8 @@ pub use options::{Purpose, RunOptions};
 pub use overrides::Override;
 pub use plan::Plan;
 pub use preview::{Forecast, Prospect, preview};
-pub use reason::{Change, changes_of};
-pub use run::{Outcome, run};
+pub use reason::{KeyChange, changes_of};
+pub use run::{CompletedRun, run};
 pub use schema::json_schema;
 pub use select::Selection;
 pub use services::Observer;

@@ -1,7 +1,7 @@
 //! `--set` and `${variable}`: what is put into the YAML's tree before it is typed.
 
 use crate::error::{Fault, nearest};
-use crate::yaml::{self, Mark, Node, Trouble, Value};
+use crate::yaml::{self, Mark, Node, Trouble, YamlValue};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// One `--set target=value`.
@@ -34,7 +34,7 @@ impl Override {
             }
             // An empty value is an empty text.
             _ if self.value.trim().is_empty() => {
-                Ok(Node { overridden: true, ..Node::new(Value::Text(String::new()), Mark::CommandLine) })
+                Ok(Node { overridden: true, ..Node::new(YamlValue::Text(String::new()), Mark::CommandLine) })
             }
             (_, trouble) => {
                 let why = trouble.map(|trouble| trouble.message).unwrap_or_default();
@@ -120,7 +120,7 @@ fn used_variables(tree: &Node) -> BTreeSet<String> {
     let mut used = BTreeSet::new();
     if let Some(stages) = tree.get("stages") {
         stages.walk("", &mut |_, node| {
-            if let Value::Text(text) = &node.value {
+            if let YamlValue::Text(text) = &node.value {
                 used.extend(pieces(text).filter_map(|piece| match piece {
                     Piece::Variable(name) => Some(name.to_string()),
                     Piece::Plain(_) => None,
@@ -135,7 +135,7 @@ fn used_variables(tree: &Node) -> BTreeSet<String> {
 pub(super) fn substitute(node: &mut Node, path: &str, variables: &Variables) -> Vec<Trouble> {
     let mut troubles = Vec::new();
     node.walk_mut(path, &mut |path, node| {
-        let Value::Text(text) = &node.value else { return };
+        let YamlValue::Text(text) = &node.value else { return };
         let found: Vec<Piece> = pieces(text).collect();
         if !found.iter().any(|piece| matches!(piece, Piece::Variable(_))) {
             return;
@@ -167,7 +167,7 @@ fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> 
                 hint.unwrap_or_else(|| ".".into())
             ));
         };
-        if matches!(variable.value, Value::Null) {
+        if matches!(variable.value, YamlValue::Null) {
             return Err(format!("`${{{name}}}` has no value here: give it by --set {name}=VALUE"));
         }
         if text.len() == name.len() + 3 {
@@ -179,7 +179,7 @@ fn fill(node: &Node, text: &str, variables: &Variables) -> Result<Node, String> 
         overridden |= index == 0 && variable.overridden;
         filled.push_str(&value);
     }
-    Ok(Node { overridden, ..Node::new(Value::Text(filled), node.mark) })
+    Ok(Node { overridden, ..Node::new(YamlValue::Text(filled), node.mark) })
 }
 
 enum Piece<'t> {

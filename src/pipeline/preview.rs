@@ -1,8 +1,8 @@
 //! What a run would do, without doing it.
 
-use super::desk::{Desk, Key};
 use super::plan::Plan;
 use super::reason;
+use super::run_state::{KeyState, RunState};
 use super::select::Selection;
 use crate::error::Result;
 use crate::store::{Lookup, Store};
@@ -34,16 +34,16 @@ pub struct Forecast {
 
 pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<Forecast>> {
     let selected = selection.of(plan)?;
-    let mut desk = Desk::new(plan);
+    let mut state = RunState::new(plan);
     let mut forecasts = Vec::new();
     for (index, stage) in plan.stages.iter().enumerate() {
         let inside = selected.stages.contains(&index);
-        let prospect = match desk.key(index)? {
-            Key::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
-            Key::Pending(_) => Prospect::NotSelected,
-            Key::Known(key) => match store.action(&key)? {
+        let prospect = match state.key(index)? {
+            KeyState::Pending(on) if inside => Prospect::Pending { on: plan.stages[on].id.clone() },
+            KeyState::Pending(_) => Prospect::NotSelected,
+            KeyState::Known(key) => match store.action(&key)? {
                 Lookup::Done(record) if !selected.forces(index) => {
-                    desk.tables[index] = Some(record.tables);
+                    state.tables[index] = Some(record.tables);
                     Prospect::Cached
                 }
                 _ if !inside => Prospect::NotSelected,

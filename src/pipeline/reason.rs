@@ -45,7 +45,7 @@ fn last_key(store: &Store, pipeline: &str, stage: &str) -> Result<Option<StageKe
 
 /// A part of a key that is not what it was.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Change {
+pub struct KeyChange {
     /// `settings`, `input`, `file`, `schema of`, `seed`, `stage`, `implementation`, `key format`.
     pub what: &'static str,
     /// The setting, port or file.
@@ -55,11 +55,11 @@ pub struct Change {
 }
 
 /// Every part in which two keys of a stage differ.
-pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<Change> {
+pub fn changes_of(before: &StageKey, now: &StageKey) -> Vec<KeyChange> {
     let mut changes = Vec::new();
     let mut push = |what, name: &str, before: String, now: String| {
         if before != now {
-            changes.push(Change { what, name: name.into(), before, now });
+            changes.push(KeyChange { what, name: name.into(), before, now });
         }
     };
     push("stage", "", before.stage.clone(), now.stage.clone());

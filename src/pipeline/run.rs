@@ -1,12 +1,12 @@
 //! The run: every stage in order; what is already done is taken as it is, the rest is executed and published.
 
-use super::desk::{self, Desk, Key};
-use super::execute::{self, Place};
+use super::execute::{self, ExecutionSite};
 use super::lock::ActionLock;
 use super::manifest::{FileRecord, InputRecord, Manifest, OutputRecord, RunStatus, StageStatus, Surroundings};
 use super::options::RunOptions;
 use super::plan::Plan;
 use super::reason;
+use super::run_state::{self, KeyState, RunState};
 use super::select::Selected;
 use super::services::Observer;
 use crate::error::{Error, Result};
@@ -18,13 +18,13 @@ use std::time::SystemTime;
 const GROUP: f64 = 1.0;
 
 /// A run that went through.
-pub struct Outcome {
+pub struct CompletedRun {
     pub manifest: Manifest,
     /// Reports and other documents, where people find them.
     pub documents: Vec<PathBuf>,
 }
 
-impl Outcome {
+impl CompletedRun {
     /// The tables of a kind, in pipeline order.
     pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
         self.manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
@@ -41,7 +41,7 @@ pub fn run(
     options: &RunOptions,
     surroundings: &Surroundings,
     observer: &dyn Observer,
-) -> Result<Outcome> {
+) -> Result<CompletedRun> {
     let selected = options.selection.of(plan)?;
     let threads =
         rayon::ThreadPoolBuilder::new().num_threads(options.jobs).build().map_err(|e| Error::store("--jobs", e.to_string()))?;
@@ -51,7 +51,7 @@ pub fn run(
     manifest.run_id = store.reserve_run(&manifest.run_id)?;
     let record = store.begin_run(&manifest.run_id, &manifest)?;
     let mut running = Running {
-        desk: Desk::new(plan),
+        state: RunState::new(plan),
         store,
         selected,
         now: surroundings.now,
@@ -73,11 +73,11 @@ pub fn run(
     let finished = store.finish_run(record, &manifest);
     // The first error is the one that explains the others.
     result.and(finished)?;
-    Ok(Outcome { manifest, documents })
+    Ok(CompletedRun { manifest, documents })
 }
 
 struct Running<'a> {
-    desk: Desk<'a>,
+    state: RunState<'a>,
     store: &'a Store,
     selected: Selected,
     now: fn() -> SystemTime,
@@ -92,12 +92,12 @@ struct Running<'a> {
 
 impl Running<'_> {
     fn stage(&mut self, index: usize) -> Result<()> {
-        let plan = self.desk.plan;
+        let plan = self.state.plan;
         let inside = self.selected.stages.contains(&index);
-        let key = match self.desk.key(index)? {
-            Key::Known(key) => key,
-            Key::Pending(_) if !inside => return Ok(()),
-            Key::Pending(on) => {
+        let key = match self.state.key(index)? {
+            KeyState::Known(key) => key,
+            KeyState::Pending(_) if !inside => return Ok(()),
+            KeyState::Pending(on) => {
                 let (id, on) = (&plan.stages[index].id, &plan.stages[on].id);
                 let message = format!("stage `{id}` reads from `{on}`, which is not cached and was not selected: select it too");
                 return Err(Error::spec("--only, --from", message));
@@ -134,14 +134,15 @@ impl Running<'_> {
     }
 
     fn execute(&mut self, index: usize, key: StageKey, reason: String) -> Result<()> {
-        let stage = &self.desk.plan.stages[index];
+        let stage = &self.state.plan.stages[index];
         self.observer.stage_begins(&stage.id, stage.entry.name, &reason);
         let started = (self.now)();
         self.event("begins", index, serde_json::json!({ "reason": reason }))?;
         self.manifest.stages[index].reason = Some(reason);
-        let place = Place { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
+        let place =
+            ExecutionSite { store: self.store, threads: &self.threads, observer: self.observer, run: &self.manifest.run_id };
         let mut account = crate::store::Account { run: place.run.into(), started: rfc3339(started), ..Default::default() };
-        let products = execute::stage(&self.desk, index, &place, &mut account)?;
+        let products = execute::stage(&self.state, index, &place, &mut account)?;
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
@@ -164,11 +165,11 @@ impl Running<'_> {
 
     /// Takes the tables of a stage that is done into the plan, the manifest and the human paths.
     fn settle(&mut self, index: usize, record: ActionRecord) -> Result<()> {
-        let plan = self.desk.plan;
+        let plan = self.state.plan;
         let stage = &plan.stages[index];
         let mut outputs = Vec::new();
         for (port, output) in stage.outputs.iter().enumerate() {
-            let table = desk::table(&record.tables, stage, port)?;
+            let table = run_state::table(&record.tables, stage, port)?;
             let path = self.store.expose(&plan.name, &stage.id, output.name, table)?;
             if output.kind == "document" {
                 self.documents.extend(execute::documents(self.store, &plan.name, table)?);
@@ -187,7 +188,7 @@ impl Running<'_> {
         report.wall_seconds = Some(record.account.wall_seconds);
         report.notes = record.account.notes;
         report.warnings.splice(0..0, record.account.warnings);
-        self.desk.tables[index] = Some(record.tables);
+        self.state.tables[index] = Some(record.tables);
         let status = serde_json::json!({ "status": self.manifest.stages[index].status });
         self.event("ends", index, status)?;
         self.observer.stage_ends(&self.manifest.stages[index]);
@@ -195,16 +196,16 @@ impl Running<'_> {
     }
 
     fn inputs(&self, index: usize) -> Result<Vec<InputRecord>> {
-        let stages = &self.desk.plan.stages;
+        let stages = &self.state.plan.stages;
         let mut records = Vec::new();
         for input in &stages[index].inputs {
             for origin in &input.from {
                 let from = &stages[origin.stage];
-                let Some(tables) = &self.desk.tables[origin.stage] else { continue };
+                let Some(tables) = &self.state.tables[origin.stage] else { continue };
                 records.push(InputRecord {
                     port: input.port.name.into(),
                     from: format!("{}.{}", from.id, from.outputs[origin.port].name),
-                    table: desk::table(tables, from, origin.port)?.clone(),
+                    table: run_state::table(tables, from, origin.port)?.clone(),
                 });
             }
         }
@@ -213,21 +214,21 @@ impl Running<'_> {
 
     fn files(&mut self, index: usize) -> Result<Vec<FileRecord>> {
         let mut records = Vec::new();
-        for file in &self.desk.plan.stages[index].files {
+        for file in &self.state.plan.stages[index].files {
             let metadata = std::fs::metadata(&file.path).ok();
             records.push(FileRecord {
                 place: file.place.clone(),
                 path: file.path.clone(),
                 bytes: metadata.as_ref().map_or(0, std::fs::Metadata::len),
                 modified: metadata.and_then(|metadata| metadata.modified().ok()).map(rfc3339),
-                blake3: self.desk.hash(&file.path)?,
+                blake3: self.state.hash(&file.path)?,
             });
         }
         Ok(records)
     }
 
     fn event(&mut self, event: &str, index: usize, more: serde_json::Value) -> Result<()> {
-        let stage = &self.desk.plan.stages[index].id;
+        let stage = &self.state.plan.stages[index].id;
         let time = rfc3339((self.now)());
         self.record.append_event(&serde_json::json!({ "time": time, "event": event, "stage": stage, "detail": more }))
     }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::raw;
-use crate::stage::{RawFile, Services, Sink, Source, Streamed};
+use crate::stage::{OpenedInput, RawFile, Services, Sink, Streamed};
 use crate::store::frame::Frame;
 use crate::store::{FinishedFile, Store, TableWriter};
 use std::sync::{Mutex, PoisonError};
@@ -26,12 +26,12 @@ pub(super) struct StageServices<'a> {
     pub store: &'a Store,
     pub files: &'a [super::plan::InputFile],
     pub observer: &'a dyn Observer,
-    lines: Mutex<Lines>,
+    lines: Mutex<StageMessages>,
 }
 
 /// What a stage told the person.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Lines {
+pub(super) struct StageMessages {
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
 }
@@ -40,13 +40,13 @@ impl<'a> StageServices<'a> {
     pub fn new(id: &'a str, store: &'a Store, files: &'a [super::plan::InputFile], observer: &'a dyn Observer) -> Self {
         Self { id, store, files, observer, lines: Mutex::default() }
     }
-    pub fn lines(self) -> Lines {
+    pub fn lines(self) -> StageMessages {
         self.lines.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Services for StageServices<'_> {
-    fn open(&self, file: &RawFile) -> Result<Source> {
+    fn open(&self, file: &RawFile) -> Result<OpenedInput> {
         open(self.id, self.files, file)
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
@@ -69,7 +69,7 @@ impl Services for StageServices<'_> {
 }
 
 /// Opens an input file that the stage listed.
-pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -> Result<Source> {
+pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -> Result<OpenedInput> {
     if !files.iter().any(|known| known.path == file.0) {
         let message = format!("stage {id} opens {} without listing it among its files", file.0.display());
         return Err(Error::Bug(message));
@@ -77,7 +77,7 @@ pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -
     let shown = file.0.display().to_string();
     let opened = raw::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
     let size = opened.metadata().ok().map(|metadata| metadata.len());
-    Ok(Source { label: label(&file.0), reader: Box::new(opened), size })
+    Ok(OpenedInput { label: label(&file.0), reader: Box::new(opened), size })
 }
 
 /// A file as messages and tables name it: its name alone, so that equal content gives equal tables wherever it lies.

@@ -3,7 +3,7 @@
 use super::overrides::{self, Override};
 use crate::error::{Fault, nearest};
 use crate::stage::{ErasedStage, StageEntry};
-use crate::yaml::{self, Mark, Node, Trouble, Value, typed};
+use crate::yaml::{self, Mark, Node, Trouble, YamlValue, typed};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,11 +34,11 @@ pub(super) struct StageDraft {
     pub stage: Option<Box<dyn ErasedStage>>,
     pub files: Vec<InputFile>,
     /// Wishes for the wiring: port -> names of stages.
-    pub reads: BTreeMap<String, Wish>,
+    pub reads: BTreeMap<String, PortSources>,
 }
 
 /// Stages that a port is to be read from, as the YAML names them.
-pub(super) struct Wish {
+pub(super) struct PortSources {
     pub mark: Mark,
     pub names: Vec<String>,
 }
@@ -98,7 +98,7 @@ pub(super) fn read(file: &Path, text: &str, sets: &[Override], stages: &'static 
     draft.seed = tree.get("seed").and_then(|seed| typed(seed).ok()).unwrap_or_default();
 
     let mut known = BTreeSet::new();
-    if let Some(Value::List(items)) = tree.at_mut("stages").map(|list| &mut list.value) {
+    if let Some(YamlValue::List(items)) = tree.at_mut("stages").map(|list| &mut list.value) {
         for (index, item) in items.iter_mut().enumerate() {
             let path = format!("stages[{index}]");
             let unfilled = overrides::substitute(item, &path, &variables);
@@ -144,8 +144,8 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
         troubles.push(Trouble::new(message).at(mark).below(key));
     };
     match tree.get("calib").map(|node| &node.value) {
-        Some(Value::Integer(format)) if *format == i128::from(FORMAT) => {}
-        Some(Value::Integer(format)) => {
+        Some(YamlValue::Integer(format)) if *format == i128::from(FORMAT) => {}
+        Some(YamlValue::Integer(format)) => {
             fault("calib", format!("format {format} is not known to this calib, which reads {FORMAT}"))
         }
         _ => {}
@@ -155,7 +155,7 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
     {
         fault("name", format!("`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"));
     }
-    if tree.get("stages").is_some_and(|stages| matches!(&stages.value, Value::List(items) if items.is_empty())) {
+    if tree.get("stages").is_some_and(|stages| matches!(&stages.value, YamlValue::List(items) if items.is_empty())) {
         fault("stages", "expected at least one stage".into());
     }
     troubles
@@ -186,16 +186,16 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
     for (port, mark, wish) in node.get("reads").map(Node::entries).unwrap_or_default() {
         let path = format!("reads.{port}");
         match stage_names(wish) {
-            Some(names) => drop(draft.reads.insert(port.clone(), Wish { mark: *mark, names })),
+            Some(names) => drop(draft.reads.insert(port.clone(), PortSources { mark: *mark, names })),
             None => troubles.push(Trouble::new("expected the id of a stage, or a list of ids").at(wish.mark).below(&path)),
         }
     }
     if let Some(entry) = entry {
         let with = match node.get("with") {
-            Some(with) if !matches!(with.value, Value::Null) => with.clone(),
+            Some(with) if !matches!(with.value, YamlValue::Null) => with.clone(),
             _ => Node::empty_map(node.mark),
         };
-        if matches!(with.value, Value::Map(_)) {
+        if matches!(with.value, YamlValue::Map(_)) {
             let (stage, files, more) = type_settings(file, with, entry);
             (draft.stage, draft.files) = (stage, files);
             troubles.extend(more.into_iter().map(|trouble| trouble.below("with")));
@@ -206,8 +206,8 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
 
 fn stage_names(wish: &Node) -> Option<Vec<String>> {
     match &wish.value {
-        Value::Text(name) => Some(vec![name.clone()]),
-        Value::List(items) => items.iter().map(Node::text).collect(),
+        YamlValue::Text(name) => Some(vec![name.clone()]),
+        YamlValue::List(items) => items.iter().map(Node::text).collect(),
         _ => None,
     }
 }
@@ -234,7 +234,7 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
         if let Some(message) = unreadable(&path) {
             troubles.push(Trouble::new(message).at(mark).below(&place));
         }
-        let text = Node { overridden, ..Node::new(Value::Text(path.to_string_lossy().into_owned()), mark) };
+        let text = Node { overridden, ..Node::new(YamlValue::Text(path.to_string_lossy().into_owned()), mark) };
         if let Err(message) = with.put(&place, text) {
             troubles.push(Trouble::new(message).at(mark).below(&place));
         }
@@ -265,7 +265,7 @@ fn unreadable(path: &Path) -> Option<String> {
 fn non_finite(tree: &Node) -> Vec<Trouble> {
     let mut troubles = Vec::new();
     tree.walk("", &mut |path, node| {
-        if let Value::Float(value) = node.value
+        if let YamlValue::Float(value) = node.value
             && !value.is_finite()
         {
             let found = node.raw.clone().unwrap_or_else(|| value.to_string());
@@ -278,16 +278,16 @@ fn non_finite(tree: &Node) -> Vec<Trouble> {
 fn json(node: &Node) -> serde_json::Value {
     use serde_json::Value as Json;
     match &node.value {
-        Value::Null => Json::Null,
-        Value::Bool(value) => Json::Bool(*value),
-        Value::Integer(value) => match (u64::try_from(*value), i64::try_from(*value)) {
+        YamlValue::Null => Json::Null,
+        YamlValue::Bool(value) => Json::Bool(*value),
+        YamlValue::Integer(value) => match (u64::try_from(*value), i64::try_from(*value)) {
             (Ok(value), _) => value.into(),
             (_, Ok(value)) => value.into(),
             _ => value.to_string().into(),
         },
-        Value::Float(value) => (*value).into(),
-        Value::Text(text) => text.clone().into(),
-        Value::List(items) => Json::Array(items.iter().map(json).collect()),
-        Value::Map(entries) => Json::Object(entries.iter().map(|(key, _, value)| (key.clone(), json(value))).collect()),
+        YamlValue::Float(value) => (*value).into(),
+        YamlValue::Text(text) => text.clone().into(),
+        YamlValue::List(items) => Json::Array(items.iter().map(json).collect()),
+        YamlValue::Map(entries) => Json::Object(entries.iter().map(|(key, _, value)| (key.clone(), json(value))).collect()),
     }
 }

@@ -128,7 +128,7 @@ fn options(force: Option<Vec<String>>) -> RunOptions {
     RunOptions { selection: Selection { force, ..Default::default() }, jobs: 1, purpose: Purpose::Run }
 }
 /// Runs and returns what was said and what came out of `count`.
-fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, Outcome)> {
+fn go(store: &Path, plan: &Plan, options: &RunOptions) -> Result<(Vec<String>, CompletedRun)> {
     let ear = Ear::default();
     let store = Store::open(store)?;
     let outcome = run(plan, &store, options, &surroundings(), &ear)?;

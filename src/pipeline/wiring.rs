@@ -1,6 +1,6 @@
 //! Which earlier table each input port is fed from: by kind, or as `reads` wishes.
 
-use super::spec::{StageDraft, Wish};
+use super::spec::{PortSources, StageDraft};
 use crate::error::nearest;
 use crate::stage::{Arity, Port, StageEntry};
 use crate::yaml::Trouble;
@@ -82,7 +82,7 @@ fn by_kind(earlier: &[StageDraft], port: Port) -> Vec<Origin> {
     origins
 }
 
-fn wished(stages: &[StageDraft], index: usize, port: Port, wish: &Wish, troubles: &mut Vec<Trouble>) -> Vec<Origin> {
+fn wished(stages: &[StageDraft], index: usize, port: Port, wish: &PortSources, troubles: &mut Vec<Trouble>) -> Vec<Origin> {
     let mut origins = Vec::new();
     for name in &wish.names {
         match find(stages, index, port, name) {

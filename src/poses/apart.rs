@@ -3,12 +3,12 @@
 mod show;
 
 use super::site::site;
-use super::{Request, wish};
+use super::{PoseRequest, wish};
 use crate::audit::diagnosis;
 use crate::diagnose::{DiagnosedModel, contest};
-use crate::effect::{CAUSES, Effect, Form, JointTable, Load};
+use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place};
 use crate::error::{Error, Result, nearest};
-use crate::estimate::choose::{Aim, Circumstances, Site, Told, median, tell};
+use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::pipeline::StageReport;
 use crate::robot::description::RobotDescription;
 use crate::robot::{Instrument, Measurements, RobotModel};
@@ -20,14 +20,14 @@ use nalgebra::Vector3;
 const PAYLOADS: usize = 4;
 
 /// An effect at a place.
-type Name = (String, String);
+type EffectAtPlace = (String, Place);
 
 /// A finding and a rival, and what tells them apart.
 pub struct Apart<'a> {
-    request: &'a Request,
+    request: &'a PoseRequest,
     run: String,
     finding: FindingRow,
-    rival: Name,
+    rival: EffectAtPlace,
     /// None where the two are one by an identity.
     form: Option<Form>,
     robot: RobotDescription,
@@ -36,7 +36,7 @@ pub struct Apart<'a> {
     /// mm.
     sigma: f64,
     circumstances: Circumstances,
-    told: Told,
+    told: Discrimination,
 }
 
 /// A run by its name, and which of its diagnoses.
@@ -46,7 +46,7 @@ pub struct RunStage<'a> {
 }
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
-pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
+pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
     let (manifest, stage) = diagnosis(store, of.run, of.step)?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
@@ -76,11 +76,11 @@ pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[St
     let usual = median(rows.iter().map(|row| data.sigma[*row].x).collect());
     let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
-    let listed = rivals.0.iter().any(|row| row.rank == finding.rank && (&row.effect, &row.place) == (&rival.0, &rival.1));
+    let listed = rivals.0.iter().any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
     let mut tried = None;
-    let told = match contest(&diagnosed, &forms, (&rival.0, &rival.1)) {
+    let told = match contest(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((contest, form)) => {
-            rival = (form.name().to_string(), form.place().to_string());
+            rival = (form.name().to_string(), form.place());
             // A free curve is known where points were fitted, and nowhere else.
             if forms.iter().chain([&form]).any(|form| form.is(&JointTable) || form.cause().is_nameless()) {
                 within(&mut site, &recorded);
@@ -90,7 +90,7 @@ pub fn apart<'a>(request: &'a Request, store: &Store, of: &RunStage, names: &[St
             tell(&contest, (&data, &rows), (&site, &circumstances), &wish).map_err(|fault| Error::spec(&place, fault))?
         }
         // An identity of kinematics or statics: there is nothing of the rival's own to be tried.
-        Err(_) if listed => Told { before: [0.0; 2], alike: [true; 2], proposed: None },
+        Err(_) if listed => Discrimination { before: [0.0; 2], alike: [true; 2], proposed: None },
         Err(fault) => return Err(Error::spec("--separate", fault)),
     };
     Ok(Apart {
@@ -123,21 +123,25 @@ fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
 }
 
 /// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place.
-fn name(text: &str) -> Result<(&str, Option<&str>)> {
+fn name(text: &str) -> Result<(&str, Option<Place>)> {
     let (effect, place) = match text.split_once('@').or_else(|| text.split_once(" at ")) {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
     };
     let known = || CAUSES.iter().map(|cause| cause.name());
+    let named = |place: &str| {
+        let allowed = "allowed are e.g. `joint 2`, `joint 4->5`, `link 3`, `link 2-4`, `base`, `tool`, `tracker`, `recording`";
+        place.parse().map_err(|()| Error::spec("--separate", format!("`{place}` is no place; {allowed}")))
+    };
     if known().any(|name| name == effect) {
-        return Ok((effect, place));
+        return Ok((effect, place.map(named).transpose()?));
     }
     let near = nearest(effect, known()).map(|near| format!("did you mean `{near}`? ")).unwrap_or_default();
     Err(Error::spec("--separate", format!("unknown effect `{effect}`; {near}`calib effects` lists them")))
 }
 
 /// The finding that is meant, and what to tell it from.
-fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, Name)> {
+fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, EffectAtPlace)> {
     let list: Vec<String> = findings.0.iter().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place)).collect();
     if list.is_empty() {
         return Err(Error::spec(place, "found nothing that could be told from something else"));
@@ -145,7 +149,8 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     // Of equals the first by name, as the table is sorted.
     let closest = |row: &FindingRow| {
         let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
-        own.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic)).map(|rival| (rival.effect.clone(), rival.place.clone()))
+        own.min_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic))
+            .and_then(|rival| Some((rival.effect.clone(), rival.place.parse().ok()?)))
     };
     let name_one = |found: &FindingRow| {
         let message = format!(
@@ -161,7 +166,7 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     };
     let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first)) {
         (Ok(rank), _) => row.rank == rank,
-        (_, Ok((effect, place))) => row.effect == effect && place.is_none_or(|place| is_place(&row.place, place)),
+        (_, Ok((effect, place))) => row.effect == effect && place.is_none_or(|place| is_at(&row.place, place)),
         _ => false,
     };
     let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
@@ -180,17 +185,15 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     let Some(at) = at else {
         return Err(Error::spec("--separate", format!("`{second}`: say where, e.g. '{effect}@{}'", found.place)));
     };
-    let own = rivals.0.iter().find(|rival| rival.effect == effect && is_place(&rival.place, at));
-    if effect == found.effect && is_place(&found.place, at) {
+    if effect == found.effect && is_at(&found.place, at) {
         return Err(Error::spec("--separate", format!("`{second}` is the finding itself")));
     }
-    Ok((found.clone(), (effect.into(), own.map_or(at, |rival| &rival.place).into())))
+    Ok((found.clone(), (effect.into(), at)))
 }
 
-/// Whether `text` means a place: in its words, or as in names of parameters, e.g. `j2` for `joint 2`.
-fn is_place(place: &str, text: &str) -> bool {
-    let short = place.replace("joint ", "j").replace("link ", "l").replace("->", "_j").replace('-', "_");
-    place == text || short == text
+/// Whether a table means this place.
+fn is_at(text: &str, place: Place) -> bool {
+    text.parse() == Ok(place)
 }
 
 /// Puts noise and residuals as they were fitted into the recording; returns the fitted rows.

@@ -21,7 +21,7 @@ pub struct Drive<'a> {
 }
 
 /// A column: its name, its values, and the decimals that people read (none: whole numbers).
-struct Column {
+struct DriveColumn {
     name: String,
     values: Vec<f64>,
     decimals: usize,
@@ -30,11 +30,11 @@ struct Column {
 /// Decimals of joint positions: 1e-4 deg is 0.004 mm at 2.5 m.
 const JOINT_DECIMALS: usize = 4;
 
-fn columns(drive: &Drive) -> Vec<Column> {
+fn columns(drive: &Drive) -> Vec<DriveColumn> {
     let Drive { robot, ranges, poses, direction } = *drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
-    let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| Column {
+    let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| DriveColumn {
         name,
         values: rows.clone().map(value).collect(),
         decimals,

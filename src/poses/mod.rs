@@ -12,12 +12,12 @@ pub use apart::{RunStage, apart};
 pub use drive::{Drive, fault, write};
 pub use proposal::{RobotFiles, is_known, proposal};
 
-use crate::estimate::choose::{Aim, Wish};
+use crate::estimate::choose::{Aim, DesignRequest};
 use std::path::PathBuf;
 
 /// What is asked for, in the units of the command line.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct PoseRequest {
     pub count: usize,
     /// Random poses to choose from.
     pub candidates: usize,
@@ -41,7 +41,7 @@ pub struct Request {
 }
 
 /// Poses and what they promise.
-pub trait Answer {
+pub trait PoseAnswer {
     /// None where no pose helps.
     fn drive(&self) -> Option<Drive<'_>>;
     fn text(&self) -> String;
@@ -52,6 +52,6 @@ pub trait Answer {
 }
 
 /// `sigma` in m.
-fn wish(request: &Request, aim: Aim, sigma: f64) -> Wish {
-    Wish { aim, count: request.count, candidates: request.candidates, sigma, seed: request.seed }
+fn wish(request: &PoseRequest, aim: Aim, sigma: f64) -> DesignRequest {
+    DesignRequest { aim, count: request.count, candidates: request.candidates, sigma, seed: request.seed }
 }

@@ -1,8 +1,8 @@
 //! Poses for a robot file: the best for all parameters together, or for telling two effects apart whatever their sizes.
 
 use super::site::site;
-use super::{Request, recorded, wish};
-use crate::effect::{EffectStack, Load, Setting, identified, whole};
+use super::{PoseRequest, recorded, wish};
+use crate::effect::{EffectContext, EffectStack, Load, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 use std::path::Path;
 
 /// What was proposed and what for; made once, shown as text, JSON or file.
-pub struct Work<'a> {
-    pub(super) request: &'a Request,
+pub struct PoseProposal<'a> {
+    pub(super) request: &'a PoseRequest,
     pub(super) robot: RobotDescription,
     pub(super) ranges: Vec<[f64; 2]>,
     pub(super) effects: Vec<&'static str>,
@@ -41,7 +41,12 @@ pub struct RobotFiles<'a> {
 }
 
 /// Proposes poses; `pair` are two effects to separate, or none, `against` a recording to compare with.
-pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], against: Option<&Path>) -> Result<Work<'a>> {
+pub fn proposal<'a>(
+    request: &'a PoseRequest,
+    robot: &RobotFiles,
+    pair: &[String],
+    against: Option<&Path>,
+) -> Result<PoseProposal<'a>> {
     let imported = robot_file(robot.file, robot.urdf)?;
     let place = robot.file.display().to_string();
     let site = site(request, &imported, &place, None)?;
@@ -66,13 +71,24 @@ pub fn proposal<'a>(request: &'a Request, robot: &RobotFiles, pair: &[String], a
     let warnings = recording.and_then(|(_, warning)| warning).into_iter().collect();
     let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
     let ranges = site.ranges;
-    Ok(Work { request, robot: imported, ranges, effects, left_out, parameters, sigma: shown, proposal, recorded, warnings })
+    Ok(PoseProposal {
+        request,
+        robot: imported,
+        ranges,
+        effects,
+        left_out,
+        parameters,
+        sigma: shown,
+        proposal,
+        recorded,
+        warnings,
+    })
 }
 
-type Named = (Vec<&'static str>, Vec<(&'static str, String)>);
+type NamedEffects = (Vec<&'static str>, Vec<(&'static str, String)>);
 
 /// The chosen effects that poses can tell of this robot, and those left out.
-fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> Named {
+fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
     let heaviest = site.payloads.iter().copied().fold(0.0, f64::max);
     let data = Measurements {
         joints: robot.joints(),
@@ -100,8 +116,8 @@ pub fn is_known(effect: &str) -> bool {
     whole(effect, &setting()).is_some()
 }
 
-fn setting() -> Setting {
-    Setting { base: Pose::identity(), load: Load::GravityTorque }
+fn setting() -> EffectContext {
+    EffectContext { base: Pose::identity(), load: Load::GravityTorque }
 }
 
 fn model(robot: &RobotModel, effects: &[&str]) -> Model {

@@ -1,12 +1,12 @@
 //! What the proposed poses promise, as a short table and as JSON.
 
-use super::proposal::Work;
-use super::{Answer, Drive, Request, drive};
+use super::proposal::PoseProposal;
+use super::{Drive, PoseAnswer, PoseRequest, drive};
 use crate::error::counted;
 use crate::estimate::choose::{Proposal, Score, median};
 use serde_json::json;
 
-impl Answer for Work<'_> {
+impl PoseAnswer for PoseProposal<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let Proposal { poses, direction, .. } = &self.proposal;
         Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction })
@@ -26,7 +26,7 @@ impl Answer for Work<'_> {
 }
 
 /// Proposed poses, the median random set, the recording.
-fn sets(work: &Work) -> Vec<(String, Score)> {
+fn sets(work: &PoseProposal) -> Vec<(String, Score)> {
     let random = &work.proposal.random;
     let middle = |value: &dyn Fn(&Score) -> f64| median(random.iter().map(value).collect());
     let usual = Score {
@@ -47,7 +47,7 @@ fn relative(score: &Score, to: &Score) -> f64 {
     median(score.sigma.iter().zip(&to.sigma).map(|(a, b)| a / b).collect())
 }
 
-fn text(work: &Work) -> String {
+fn text(work: &PoseProposal) -> String {
     let proposal = &work.proposal;
     let asked = work.parameters.len();
     let mut text = format!(
@@ -94,7 +94,7 @@ fn text(work: &Work) -> String {
 }
 
 /// What every proposal ends with.
-pub(super) fn closing(request: &Request) -> String {
+pub(super) fn closing(request: &PoseRequest) -> String {
     let text = "self-collision and collision with the cell are not checked: drive the poses slowly first\n";
     match &request.out {
         Some(path) => format!("{text}poses: {}\n", path.display()),
@@ -102,7 +102,7 @@ pub(super) fn closing(request: &Request) -> String {
     }
 }
 
-fn separation(work: &Work) -> String {
+fn separation(work: &PoseProposal) -> String {
     let mut text = String::new();
     for part in &work.proposal.separation {
         text.push_str(&format!(
@@ -121,7 +121,7 @@ fn separation(work: &Work) -> String {
     text
 }
 
-fn document(work: &Work) -> serde_json::Value {
+fn document(work: &PoseProposal) -> serde_json::Value {
     let proposal = &work.proposal;
     let sets = sets(work);
     let name = |parameter: usize| &work.parameters[parameter].0;

@@ -1,13 +1,13 @@
 //! Where the arm may go, by what was asked and what the robot file says.
 
-use super::Request;
+use super::PoseRequest;
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::choose::Site;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::Unit;
 
 /// Where the arm may go; a joint without limits keeps to its range in `recorded`, where there is one.
-pub(super) fn site(request: &Request, robot: &RobotDescription, place: &str, recorded: Option<&[[f64; 2]]>) -> Result<Site> {
+pub(super) fn site(request: &PoseRequest, robot: &RobotDescription, place: &str, recorded: Option<&[[f64; 2]]>) -> Result<Site> {
     let unit = |kind| if kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
     let mut ranges = Vec::new();
     let mut faults = Vec::new();

@@ -1,6 +1,6 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
-use super::{Language, Note, Partial, Program, Refusal, Rewritten, solve};
+use super::{Language, Note, Partial, Program, ProgramRefusal, Rewritten, solve};
 use crate::compensate::Corrector;
 use crate::error::{Error, Fault, Result};
 use crate::robot::RobotModel;
@@ -26,7 +26,7 @@ impl ProgramFile<'_> {
         format!("{}:{}:{}", self.place, note.line, note.column)
     }
 
-    fn refused(&self, refusal: Refusal) -> Error {
+    fn refused(&self, refusal: ProgramRefusal) -> Error {
         let told = refusal.faults.iter().take(MOST_FAULTS);
         let mut faults: Vec<Fault> = told.map(|note| Fault::new(self.at(note), &note.message)).collect();
         if refusal.faults.len() > MOST_FAULTS {

@@ -55,7 +55,7 @@ pub struct Note {
 
 /// Why a program was refused.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Refusal {
+pub struct ProgramRefusal {
     /// In the order of the program.
     pub faults: Vec<Note>,
     /// How many of the faults are partial targets, which [`Partial::Left`] accepts.
@@ -73,7 +73,7 @@ pub struct Program<'p> {
 
 /// The answer to one literal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Solved {
+pub struct SolvedLiteral {
     /// The corrected numbers, in the units and the order of [`Literal::values`].
     pub values: Vec<f64>,
     /// What is to be known of it; empty if nothing.
@@ -90,14 +90,14 @@ pub struct Rewritten {
 
 /// What a language's reader gathers, by byte.
 #[derive(Debug, Default)]
-struct Found {
+struct Gathered {
     literals: Vec<Literal>,
     warnings: Vec<(usize, String)>,
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
 }
 
-impl Found {
+impl Gathered {
     fn warn(&mut self, at: usize, message: impl Into<String>) {
         self.warnings.push((at, message.into()));
     }
@@ -113,12 +113,12 @@ impl Found {
 
 impl<'p> Program<'p> {
     /// Reads a program whole; fails with every fault of it.
-    pub fn parse(bytes: &'p [u8], language: Language, partial: Partial) -> Result<Self, Refusal> {
+    pub fn parse(bytes: &'p [u8], language: Language, partial: Partial) -> Result<Self, ProgramRefusal> {
         let mut found = match language {
             Language::Krl => krl::read(bytes),
             Language::Rapid => rapid::read(bytes),
         };
-        let mut refusal = Refusal::default();
+        let mut refusal = ProgramRefusal::default();
         match partial {
             Partial::Refused => {
                 refusal.partial = found.partial.len();
@@ -150,7 +150,7 @@ impl<'p> Program<'p> {
     /// The program with every literal's numbers replaced by its answer's; fails where one has none, with all the reasons.
     ///
     /// A number that is, to the decimals written, what it was stays as it was written.
-    pub fn rewritten(&self, answers: Vec<Result<Solved, String>>) -> Result<Rewritten, Refusal> {
+    pub fn rewritten(&self, answers: Vec<Result<SolvedLiteral, String>>) -> Result<Rewritten, ProgramRefusal> {
         assert_eq!(answers.len(), self.literals.len(), "one answer a literal");
         let (mut faults, mut remarks) = (Vec::new(), Vec::new());
         let mut bytes = Vec::with_capacity(self.bytes.len() + 16 * answers.len());
@@ -177,7 +177,7 @@ impl<'p> Program<'p> {
             }
         }
         if !faults.is_empty() {
-            return Err(Refusal { faults: placed(self.bytes, faults), partial: 0 });
+            return Err(ProgramRefusal { faults: placed(self.bytes, faults), partial: 0 });
         }
         bytes.extend_from_slice(&self.bytes[from..]);
         let mut warnings = self.warnings.clone();

@@ -3,34 +3,36 @@
 //! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::{Literal, Solved, TargetKind};
-use crate::compensate::{Answer, Chain, Corrector, Nominal, Target, turns};
+use super::{Literal, SolvedLiteral, TargetKind};
+use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, turns};
 use crate::robot::RobotModel;
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Every literal corrected, in their order; an error says why there is no command.
-pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<Solved, String>> {
+pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
     let answers = corrector.batch(literals.iter().map(target).collect());
-    let solved = |(literal, answer): (&Literal, &Answer)| match &answer.q {
-        Some(q) => Ok(Solved { values: values(literal, robot, q), remark: answer.remark.clone() }),
-        None => Err(answer.remark.clone()),
+    let solved = |(literal, answer): (&Literal, &CorrectedCommand)| match &answer.q {
+        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, q), remark: answer.remark() }),
+        None => Err(answer.remark()),
     };
     literals.iter().zip(&answers).map(solved).collect()
 }
 
-fn target(literal: &Literal) -> Target {
+fn target(literal: &Literal) -> CommandTarget {
     let v = &literal.values;
     let point = || Some(Vector3::new(v[0], v[1], v[2]) * 1e-3);
     match literal.kind {
-        TargetKind::Joints => Target { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..Target::default() },
+        TargetKind::Joints => {
+            CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..CommandTarget::default() }
+        }
         TargetKind::Frame => {
             let rotation = turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians());
-            Target { point: point(), rotation: Some(rotation), ..Target::default() }
+            CommandTarget { point: point(), rotation: Some(rotation), ..CommandTarget::default() }
         }
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
-            Target { point: point(), rotation: Some(turn.to_rotation_matrix().into_inner()), ..Target::default() }
+            CommandTarget { point: point(), rotation: Some(turn.to_rotation_matrix().into_inner()), ..CommandTarget::default() }
         }
     }
 }

@@ -6,11 +6,11 @@
 //! RAPID: the same, and `1.` and `.5` (ABB, Technical reference manual RAPID kernel, "Numeric literals"; its hexadecimal, octal and
 //! binary integers are no coordinates). Blanks may stand nowhere in a number, but between it and its sign, an operator of its own.
 
-use super::{Found, Language};
+use super::{Gathered, Language};
 use std::ops::Range;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sort {
+pub(super) enum TokenKind {
     Word,
     /// Not yet known to be a number of the language.
     Number,
@@ -26,24 +26,24 @@ pub(super) enum Sort {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Token {
-    pub sort: Sort,
+    pub sort: TokenKind,
     pub span: Range<usize>,
 }
 
 impl Token {
     pub fn is(&self, sign: u8) -> bool {
-        self.sort == Sort::Sign(sign)
+        self.sort == TokenKind::Sign(sign)
     }
 }
 
 /// What is read, and how its words are compared: KRL and RAPID know no case.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'p> {
+pub(super) struct ProgramText<'p> {
     pub bytes: &'p [u8],
     pub language: Language,
 }
 
-impl Source<'_> {
+impl ProgramText<'_> {
     /// A token's text in capitals.
     pub fn upper(&self, token: &Token) -> String {
         String::from_utf8_lossy(&self.bytes[token.span.clone()]).to_ascii_uppercase()
@@ -51,7 +51,7 @@ impl Source<'_> {
 
     pub fn is_word(&self, token: &Token, words: &[&str]) -> bool {
         let text = &self.bytes[token.span.clone()];
-        token.sort == Sort::Word && words.iter().any(|word| word.as_bytes().eq_ignore_ascii_case(text))
+        token.sort == TokenKind::Word && words.iter().any(|word| word.as_bytes().eq_ignore_ascii_case(text))
     }
 
     /// The number that these tokens are, sign included, and its bytes; none where they are anything else.
@@ -63,7 +63,7 @@ impl Source<'_> {
             _ => return None,
         };
         let text = &self.bytes[token.span.clone()];
-        if token.sort != Sort::Number || !is_number(text, self.language) {
+        if token.sort != TokenKind::Number || !is_number(text, self.language) {
             return None;
         }
         let value = std::str::from_utf8(text).ok()?.parse::<f64>().ok().filter(|value| value.is_finite())?;
@@ -111,8 +111,8 @@ fn in_word(byte: u8) -> bool {
 }
 
 /// The tokens of a program; what makes their reading doubtful is a fault.
-pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
-    let Source { bytes, language } = source;
+pub(super) fn tokens(source: ProgramText, found: &mut Gathered) -> Vec<Token> {
+    let ProgramText { bytes, language } = source;
     let krl = language == Language::Krl;
     let comment = if krl { b';' } else { b'!' };
     let byte = |at: usize| bytes.get(at).copied();
@@ -125,10 +125,10 @@ pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
         let begins = std::mem::replace(&mut line_begins, here == b'\n');
         at += 1;
         let sort = match here {
-            b'\n' if krl => Sort::LineEnd,
+            b'\n' if krl => TokenKind::LineEnd,
             b' ' | b'\t' | b'\r' | b'\n' => continue,
             // KRL: `&ACCESS`, `&PARAM` and the like at the head of a file, no statements.
-            b'&' if krl && begins && out.iter().all(|token| token.sort == Sort::LineEnd) => {
+            b'&' if krl && begins && out.iter().all(|token| token.sort == TokenKind::LineEnd) => {
                 at = line_end(bytes, at);
                 continue;
             }
@@ -145,26 +145,26 @@ pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
                         at = end;
                     }
                 }
-                Sort::Text
+                TokenKind::Text
             }
             b'.' | b'0'..=b'9' if here != b'.' || byte(at).is_some_and(|next| next.is_ascii_digit()) => {
                 at = number_end(bytes, start);
-                Sort::Number
+                TokenKind::Number
             }
             here if in_word(here) => {
                 at += bytes[at..].iter().take_while(|byte| in_word(**byte)).count();
-                Sort::Word
+                TokenKind::Word
             }
             _ => match (here, byte(at)) {
                 (b':' | b'=' | b'<' | b'>', Some(b'=')) if here != b':' || !krl => {
                     at += 1;
-                    Sort::Pair(here)
+                    TokenKind::Pair(here)
                 }
                 (b'<', Some(b'>')) => {
                     at += 1;
-                    Sort::Pair(here)
+                    TokenKind::Pair(here)
                 }
-                _ => Sort::Sign(here),
+                _ => TokenKind::Sign(here),
             },
         };
         out.push(Token { sort, span: start..at });
@@ -173,7 +173,7 @@ pub(super) fn tokens(source: Source, found: &mut Found) -> Vec<Token> {
 }
 
 /// Bytes that readers take differently: what one takes for the end of a line, another takes into the comment.
-fn doubtful(bytes: &[u8], found: &mut Found) {
+fn doubtful(bytes: &[u8], found: &mut Gathered) {
     for (at, byte) in bytes.iter().enumerate() {
         match byte {
             0 => found.fault(at, "a zero byte: no program text (UTF-16 is not read)"),

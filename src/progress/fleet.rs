@@ -3,7 +3,7 @@
 use super::{PAUSE, Verbosity};
 use crate::error::{counted, visible};
 use crate::fleet::Watcher;
-use crate::fleet::{Ending, Record};
+use crate::fleet::{Ending, RobotRecord};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -144,7 +144,7 @@ impl Watcher for FleetProgress {
             bar.set_message(format!("{name}: {stage}"));
         }
     }
-    fn ends(&self, _worker: usize, record: &Record, fresh: bool) {
+    fn ends(&self, _worker: usize, record: &RobotRecord, fresh: bool) {
         let mut state = self.state();
         state.over += 1;
         state.fresh += usize::from(fresh);

@@ -1,7 +1,7 @@
 //! Axes: data to user units, round ticks (1-2-5), grid and labels.
 
 use super::number::fixed;
-use super::svg::{Point, Svg};
+use super::svg::{Svg, SvgPoint};
 
 /// Where in a picture the data go: left, top, right, bottom, in user units.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,7 @@ pub(super) fn name_y(svg: &mut Svg, area: Area, name: &str) {
     svg.text("axis", [4.0, area.top - 9.0], name);
 }
 pub(super) fn baseline(svg: &mut Svg, area: Area) {
-    svg.path("base", &[[area.left, area.bottom], [area.right, area.bottom]] as &[Point]);
+    svg.path("base", &[[area.left, area.bottom], [area.right, area.bottom]] as &[SvgPoint]);
 }
 
 /// A tick without needless zeros.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// The comparison of one stage.
 #[derive(Serialize)]
-pub(super) struct Comparison {
+pub(super) struct ComparisonView {
     step: String,
     sentence: String,
     rows: Vec<RivalView>,
@@ -26,11 +26,11 @@ struct RivalView {
 }
 
 /// The comparisons in pipeline order; stages that had too few rows compared nothing.
-pub(super) fn comparisons(tables: &Tables) -> Vec<Comparison> {
+pub(super) fn comparisons(tables: &Tables) -> Vec<ComparisonView> {
     tables.corrections.iter().filter_map(|table| comparison(&table.0)).collect()
 }
 
-fn comparison(rows: &[CorrectionsRow]) -> Option<Comparison> {
+fn comparison(rows: &[CorrectionsRow]) -> Option<ComparisonView> {
     let first = rows.first()?;
     let chosen = rows.iter().find(|row| row.chosen).unwrap_or(first);
     let error = |value: Option<f64>| value.map_or_else(String::new, mm);
@@ -56,7 +56,7 @@ fn comparison(rows: &[CorrectionsRow]) -> Option<Comparison> {
             .map_or_else(String::new, |(hidden, decay)| format!("{hidden} neurons, decay {decay}")),
         reason: row.reason.clone(),
     };
-    Some(Comparison { step: first.step.clone(), sentence, rows: rows.iter().map(view).collect() })
+    Some(ComparisonView { step: first.step.clone(), sentence, rows: rows.iter().map(view).collect() })
 }
 
 /// A rival's name in words; names that are not known stay.

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const LISTED: usize = 50;
 
 #[derive(Serialize)]
-pub(super) struct Section {
+pub(super) struct DataSection {
     joints: Vec<Joint>,
     tool: Option<String>,
     points: String,
@@ -62,7 +62,7 @@ pub(super) fn robot_name(robot: &Robot) -> String {
     base.map(|body| body.name.trim()).filter(|name| !name.is_empty()).unwrap_or("a robot without a name").to_owned()
 }
 
-impl Section {
+impl DataSection {
     pub fn new(tables: &Tables) -> Self {
         let recording = &tables.recording;
         let quantities = [

@@ -5,7 +5,7 @@ use super::number::mm;
 use super::svg::Svg;
 
 /// The errors of one set of points after one step.
-pub(super) struct Errors {
+pub(super) struct StepErrors {
     pub step: String,
     /// Class of its colour, the same in all pictures.
     pub colour: String,
@@ -26,7 +26,7 @@ const BINS: usize = 36;
 const CURVE: usize = 240;
 
 /// One axis for all steps, or the pictures could not be compared.
-fn scale(all: &[Errors]) -> Scale {
+fn scale(all: &[StepErrors]) -> Scale {
     let upper = all.iter().filter_map(|e| e.sorted_mm.last()).fold(0.0, |a: f64, b| a.max(*b));
     // The smallest single error is luck: the axis starts where the fifth percentile of the best step is.
     let lower = all.iter().filter_map(|e| e.sorted_mm.get(e.sorted_mm.len() / 20)).fold(upper, |a: f64, b| a.min(*b));
@@ -34,7 +34,7 @@ fn scale(all: &[Errors]) -> Scale {
 }
 
 /// Points per equal bin (equal on the axis as drawn), a row per step, one height scale for all.
-pub(super) fn histogram(all: &[Errors], title: &str) -> String {
+pub(super) fn histogram(all: &[StepErrors], title: &str) -> String {
     let area = Area { left: 16.0, top: TOP, right: WIDTH - 12.0, bottom: TOP + ROW * all.len() as f64 };
     let scale = scale(all).over(area.left, area.right);
     let counts: Vec<[usize; BINS]> = all.iter().map(|errors| bins(&errors.sorted_mm, scale, area)).collect();
@@ -76,7 +76,7 @@ fn bins(errors: &[f64], scale: Scale, area: Area) -> [usize; BINS] {
 }
 
 /// Share of the points whose error is at most so large, a curve per step.
-pub(super) fn cumulative(all: &[Errors], title: &str) -> String {
+pub(super) fn cumulative(all: &[StepErrors], title: &str) -> String {
     let area = Area { left: 44.0, top: 26.0, right: WIDTH - 12.0, bottom: (TOP + ROW * all.len() as f64).clamp(190.0, 330.0) };
     let scale = scale(all).over(area.left, area.right);
     let share = Scale::linear(0.0, 100.0).over(area.bottom, area.top);

@@ -50,19 +50,19 @@ impl Steps {
 }
 
 #[derive(Serialize)]
-pub(super) struct Errors {
-    verdict: Verdict,
+pub(super) struct ErrorsSection {
+    verdict: VerdictView,
     /// Sets still held out after the step that stands, the verdict's first; then those that a later step was fitted to.
     held_out: Vec<Block>,
     training: Vec<Block>,
     folds: Vec<Fold>,
-    references: Vec<Beside>,
+    references: Vec<ReferenceView>,
     pictures: Vec<Picture>,
     legend: Vec<(String, String)>,
 }
 
 #[derive(Serialize)]
-struct Verdict {
+struct VerdictView {
     /// `better`, `worse` or `unknown`: the class of its colour.
     kind: &'static str,
     sentence: String,
@@ -76,11 +76,11 @@ struct Verdict {
 struct Block {
     set: String,
     note: Option<&'static str>,
-    rows: Vec<Row>,
+    rows: Vec<ErrorsRow>,
 }
 
 #[derive(Serialize)]
-struct Row {
+struct ErrorsRow {
     step: String,
     colour: String,
     points: String,
@@ -102,7 +102,7 @@ struct Fold {
 
 /// Our figures of one step and set beside those that the pipeline names.
 #[derive(Serialize)]
-struct Beside {
+struct ReferenceView {
     label: String,
     step: String,
     set: String,
@@ -119,7 +119,7 @@ struct Picture {
     cumulative: String,
 }
 
-impl Errors {
+impl ErrorsSection {
     pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
         let rows = &tables.statistics.0;
         let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
@@ -165,7 +165,7 @@ fn sets(rows: &[StatisticsRow], held_out: bool) -> Vec<&str> {
     names
 }
 
-fn row(row: &StatisticsRow, steps: &Steps) -> Row {
+fn row(row: &StatisticsRow, steps: &Steps) -> ErrorsRow {
     let values = [
         row.mean_mm,
         row.std_mm,
@@ -178,7 +178,7 @@ fn row(row: &StatisticsRow, steps: &Steps) -> Row {
         row.rms_z_mm,
         row.noise_rms_mm,
     ];
-    Row {
+    ErrorsRow {
         step: steps.called(&row.step),
         colour: steps.colour(row.order),
         points: count(row.points),
@@ -206,9 +206,9 @@ fn fold(row: &StatisticsRow, steps: &Steps) -> Option<Fold> {
     })
 }
 
-fn beside(row: &StatisticsRow) -> Option<Beside> {
+fn beside(row: &StatisticsRow) -> Option<ReferenceView> {
     let figure = |ours, theirs: Option<f64>| (mm(ours), theirs.map_or_else(String::new, mm));
-    Some(Beside {
+    Some(ReferenceView {
         label: row.reference.clone()?,
         step: row.step.clone(),
         set: row.set.clone(),
@@ -230,9 +230,9 @@ fn points(number: i64) -> String {
     if number == 1 { "one point".into() } else { format!("{} points", count(number)) }
 }
 
-fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> Verdict {
+fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> VerdictView {
     let Some(after) = last.first() else {
-        return Verdict {
+        return VerdictView {
             kind: "unknown",
             sentence: "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
                        the model was fitted to, and flatter it."
@@ -267,7 +267,7 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
         format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
     };
-    Verdict {
+    VerdictView {
         kind,
         sentence,
         before: before_row.map(|before| (before.step.clone(), mm(before.mean_mm))),
@@ -284,13 +284,13 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
 
 fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
     let rows = tables.statistics.0.iter().filter(|row| row.held_out && row.set == set.set);
-    let errors: Vec<distribution::Errors> = rows
+    let errors: Vec<distribution::StepErrors> = rows
         .map(|row| {
             let table = tables.prediction.iter().flat_map(|table| &table.0);
             let of_row = table.filter(|p| p.step == row.step && p.set == row.set && p.held_out);
             let mut sorted_mm: Vec<f64> = of_row.map(|p| p.error_mm).collect();
             sorted_mm.sort_by(f64::total_cmp);
-            distribution::Errors { step: row.step.clone(), colour: steps.colour(row.order), sorted_mm, mean_mm: row.mean_mm }
+            distribution::StepErrors { step: row.step.clone(), colour: steps.colour(row.order), sorted_mm, mean_mm: row.mean_mm }
         })
         .filter(|errors| !errors.sorted_mm.is_empty())
         .collect();
@@ -304,7 +304,7 @@ fn picture(tables: &Tables, set: &StatisticsRow, steps: &Steps) -> Picture {
 
 /// The error over the workspace after the first step and after the one that stands.
 #[derive(Serialize)]
-pub(super) struct Workspace {
+pub(super) struct WorkspaceSection {
     legend: Vec<(String, String)>,
     panels: Vec<Panel>,
 }
@@ -316,7 +316,7 @@ struct Panel {
     svg: String,
 }
 
-impl Workspace {
+impl WorkspaceSection {
     /// Nothing where nothing was predicted.
     pub fn new(prediction: &[Prediction], standing: Option<&str>) -> Option<Self> {
         let mut filled = prediction.iter().filter(|table| !table.0.is_empty());

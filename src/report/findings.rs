@@ -12,13 +12,13 @@ use serde::Serialize;
 const DRAWN: usize = 700;
 
 #[derive(Serialize)]
-pub(super) struct Section {
+pub(super) struct FindingsSection {
     kind: &'static str,
     sentence: String,
     /// Name, mean, rms, max.
     errors: Vec<[String; 4]>,
     facts: Vec<(&'static str, String)>,
-    findings: Vec<Finding>,
+    findings: Vec<FindingView>,
     not_observable: Vec<String>,
     next: Vec<String>,
     signature: Option<String>,
@@ -28,7 +28,7 @@ pub(super) struct Section {
 }
 
 #[derive(Serialize)]
-struct Finding {
+struct FindingView {
     rank: String,
     effect: String,
     place: String,
@@ -42,7 +42,7 @@ struct Finding {
     pictures: Vec<(String, String)>,
 }
 
-impl Section {
+impl FindingsSection {
     /// None where the pipeline made no diagnosis.
     pub fn new(tables: &Tables) -> Option<Self> {
         let verdict = tables.verdict.iter().flat_map(|table| &table.0).next_back()?;
@@ -109,7 +109,7 @@ fn chance(p: f64) -> String {
     if p > 0.0 { significant(p, 2) } else { "< 1e-300".into() }
 }
 
-fn finding(row: &FindingRow, tables: &Tables) -> Finding {
+fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
     let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
     let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
     let share = |p: Option<f64>| p.map(|p| format!("{p:.2}"));
@@ -138,7 +138,7 @@ fn finding(row: &FindingRow, tables: &Tables) -> Finding {
         _ => None,
     };
     let curve: Vec<&CurveRow> = tables.curves.0.iter().filter(|point| point.rank == row.rank).collect();
-    Finding {
+    FindingView {
         rank: row.rank.to_string(),
         effect: row.effect.clone(),
         place: row.place.clone(),

@@ -8,7 +8,7 @@ use crate::table::{FitRow, ObservabilityRow, TrainingRow};
 use serde::Serialize;
 
 #[derive(Serialize)]
-pub(super) struct Section {
+pub(super) struct FitsSection {
     fits: Vec<FitView>,
     courses: Option<String>,
     legend: Vec<(String, String)>,
@@ -49,7 +49,7 @@ struct TrainingView {
     svg: String,
 }
 
-impl Section {
+impl FitsSection {
     pub fn new(tables: &Tables, steps: &Steps) -> Self {
         let fits = groups(tables.fit.iter().flat_map(|t| &t.0), |row: &FitRow| row.step.clone());
         let lines: Vec<Line> = fits

@@ -16,8 +16,8 @@ struct Page<'a> {
     style: &'static str,
     script: &'static str,
     counts: Vec<(String, usize)>,
-    robots: Vec<Row<'a>>,
-    changes: Vec<Change<'a>>,
+    robots: Vec<FleetRowView<'a>>,
+    changes: Vec<ChangeView<'a>>,
     flagged: usize,
     diagnosed: bool,
     compared: bool,
@@ -25,7 +25,7 @@ struct Page<'a> {
 }
 
 #[derive(Serialize)]
-struct Row<'a> {
+struct FleetRowView<'a> {
     name: String,
     link: Option<&'a str>,
     group: String,
@@ -50,7 +50,7 @@ struct Figure {
 }
 
 #[derive(Serialize)]
-struct Change<'a> {
+struct ChangeView<'a> {
     robot: String,
     effect: &'a str,
     place: &'a str,
@@ -85,10 +85,10 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
     render("fleet.html", include_str!("fleet.html"), &page)
 }
 
-fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Row<'a> {
+fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> FleetRowView<'a> {
     let figure = |value: Option<f64>| value.map(|value| Figure { shown: format!("{value:.3}"), value });
     let group: Vec<&str> = [&row.model, &row.plant, &row.campaign].into_iter().filter_map(|group| group.as_deref()).collect();
-    Row {
+    FleetRowView {
         name: visible(&row.robot),
         link: links.get(&row.robot).map(String::as_str),
         group: group.join(", "),
@@ -106,10 +106,10 @@ fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> Row<'a> {
     }
 }
 
-fn change(row: &crate::table::FleetChangeRow) -> Change<'_> {
+fn change(row: &crate::table::FleetChangeRow) -> ChangeView<'_> {
     let (factor, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
     let show = |value: f64| format!("{:.3e}", value * factor);
-    Change {
+    ChangeView {
         robot: visible(&row.robot),
         effect: &row.effect,
         place: &row.place,

@@ -1,12 +1,12 @@
 //! `report.json`: what the report says, for other programs. Every figure is a column of a table.
 
 use super::limits::Judgement;
-use super::{Tables, Wishes};
+use super::{ReportOptions, Tables};
 use crate::error::{Error, Result};
 use serde_json::{Value, json};
 
 /// The document; `judgement` is that of the page.
-pub(super) fn document(tables: &Tables, wishes: &Wishes, title: &str, judgement: Option<&Judgement>) -> Result<String> {
+pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, judgement: Option<&Judgement>) -> Result<String> {
     let statistics = tables.statistics.0.iter().map(|row| {
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points, "mean_mm": row.mean_mm, "std_mm": row.std_mm,

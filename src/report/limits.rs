@@ -7,7 +7,7 @@ use serde::Serialize;
 
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Limits {
+pub struct AcceptanceLimits {
     pub mean_mm: Option<f64>,
     pub p95_mm: Option<f64>,
     pub max_mm: Option<f64>,
@@ -33,7 +33,7 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 
 impl Judgement {
     /// None where there are no limits.
-    pub fn new(tables: &Tables, limits: &Limits, set: Option<&str>) -> Option<Self> {
+    pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let asked = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
         if asked.iter().all(|(_, limit)| limit.is_none()) {
             return None;

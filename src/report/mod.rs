@@ -19,7 +19,7 @@ mod parameters;
 mod svg;
 mod workspace;
 
-pub use limits::Limits;
+pub use limits::AcceptanceLimits;
 
 use crate::error::Result;
 use crate::table::{
@@ -56,11 +56,11 @@ pub struct Tables {
 }
 
 /// What the person who asked for the report chose.
-pub struct Wishes<'a> {
+pub struct ReportOptions<'a> {
     pub title: Option<&'a str>,
     /// The held-out set of the first sentence; else the one with most points.
     pub set: Option<&'a str>,
-    pub limits: Limits,
+    pub limits: AcceptanceLimits,
     /// Who, with what, where and when: shown as it was given.
     pub identity: &'a BTreeMap<String, String>,
     /// Content hashes of the tables that the report rests on.
@@ -77,13 +77,13 @@ struct Page<'a> {
     judgement: Option<&'a limits::Judgement>,
     identity: Vec<(&'a String, &'a String)>,
     hashes: &'a [(String, String)],
-    errors: errors::Errors,
-    diagnosis: Option<findings::Section>,
-    workspace: Option<errors::Workspace>,
-    parameters: parameters::Section,
-    fits: fits::Section,
-    comparisons: Vec<corrections::Comparison>,
-    data: data::Section,
+    errors: errors::ErrorsSection,
+    diagnosis: Option<findings::FindingsSection>,
+    workspace: Option<errors::WorkspaceSection>,
+    parameters: parameters::ParametersSection,
+    fits: fits::FitsSection,
+    comparisons: Vec<corrections::ComparisonView>,
+    data: data::DataSection,
     choices: Vec<(&'static str, &'a str)>,
 }
 
@@ -94,7 +94,7 @@ pub struct Pages {
 }
 
 /// The report; fails where `wishes.set` is no held-out set.
-pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
+pub fn pages(tables: &Tables, wishes: &ReportOptions) -> Result<Pages> {
     let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref()).without(&tables.withdrawn);
     let robot = data::robot_name(&tables.robot);
     let judgement = limits::Judgement::new(tables, &wishes.limits, wishes.set);
@@ -106,15 +106,15 @@ pub fn pages(tables: &Tables, wishes: &Wishes) -> Result<Pages> {
         judgement: judgement.as_ref(),
         identity: wishes.identity.iter().collect(),
         hashes: &wishes.hashes,
-        diagnosis: findings::Section::new(tables),
+        diagnosis: findings::FindingsSection::new(tables),
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
-        errors: errors::Errors::new(tables, &steps, wishes.set)?,
-        workspace: errors::Workspace::new(&tables.prediction, tables.standing.as_deref()),
-        parameters: parameters::Section::new(&tables.parameters),
-        fits: fits::Section::new(tables, &steps),
+        errors: errors::ErrorsSection::new(tables, &steps, wishes.set)?,
+        workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
+        parameters: parameters::ParametersSection::new(&tables.parameters),
+        fits: fits::FitsSection::new(tables, &steps),
         comparisons: corrections::comparisons(tables),
-        data: data::Section::new(tables),
+        data: data::DataSection::new(tables),
         choices: [("title", wishes.title), ("set", wishes.set)]
             .into_iter()
             .filter_map(|(name, value)| value.map(|value| (name, value)))

@@ -59,16 +59,16 @@ pub(super) fn count(value: i64) -> String {
 
 /// How a person reads a unit of the tables: a factor, a symbol and the usual decimals.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reading {
+pub(super) struct UnitFormat {
     factor: f64,
     pub symbol: &'static str,
     decimals: usize,
 }
 
 /// Readings of a value and of a small change of it (degrees, but arcseconds), by the symbol of the stored unit.
-pub(super) fn readings(stored: &str) -> Option<(Reading, Reading)> {
+pub(super) fn readings(stored: &str) -> Option<(UnitFormat, UnitFormat)> {
     let unit = Unit::parse(stored)?;
-    let reading = |factor: f64, symbol, decimals| Reading { factor, symbol, decimals };
+    let reading = |factor: f64, symbol, decimals| UnitFormat { factor, symbol, decimals };
     let into = |people: Unit, decimals| reading(unit.to_si(1.0) / people.to_si(1.0), people.symbol(), decimals);
     let per = |symbol, decimals| reading(unit.to_si(1.0) / Unit::Arcsecond.to_si(1.0), symbol, decimals);
     let same = |reading| Some((reading, reading));
@@ -82,7 +82,7 @@ pub(super) fn readings(stored: &str) -> Option<(Reading, Reading)> {
     }
 }
 
-impl Reading {
+impl UnitFormat {
     /// Decimals that show a sigma with two digits, at least the usual ones.
     pub fn decimals_for(&self, sigma: Option<f64>) -> usize {
         let needed = match sigma.map(|s| (s * self.factor).abs()) {

@@ -1,25 +1,25 @@
 //! The identified parameters in people's units, and what the data could not tell.
 
-use super::number::{Reading, exact, readings, significant};
+use super::number::{UnitFormat, exact, readings, significant};
 use crate::table::{ParameterRow, Parameters};
 use serde::Serialize;
 
 #[derive(Serialize)]
-pub(super) struct Section {
+pub(super) struct ParametersSection {
     groups: Vec<Group>,
     /// What was not estimated, and what has a remark.
-    remarks: Vec<Remark>,
+    remarks: Vec<RemarkView>,
 }
 
 /// The parameters of one effect.
 #[derive(Serialize)]
 struct Group {
     effect: String,
-    rows: Vec<Row>,
+    rows: Vec<ParameterView>,
 }
 
 #[derive(Serialize)]
-struct Row {
+struct ParameterView {
     name: String,
     place: String,
     nominal: String,
@@ -36,14 +36,14 @@ struct Row {
 }
 
 #[derive(Serialize)]
-struct Remark {
+struct RemarkView {
     name: String,
     place: String,
     status: String,
     remark: String,
 }
 
-impl Section {
+impl ParametersSection {
     pub fn new(parameters: &Parameters) -> Self {
         let registered = parameters.effects();
         let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
@@ -64,7 +64,7 @@ impl Section {
         Self {
             groups: groups.collect(),
             remarks: remarked
-                .map(|p| Remark {
+                .map(|p| RemarkView {
                     name: p.name.clone(),
                     place: p.place.clone(),
                     status: p.status.clone(),
@@ -92,7 +92,7 @@ fn along_the_chain(name: &str) -> Vec<(bool, String, u64)> {
 }
 
 /// A parameter among those of its effect, with which it shares its decimals.
-fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
+fn row(p: &ParameterRow, group: &[&ParameterRow]) -> ParameterView {
     let (nominal, value, unit, change, sigma, fine_unit) = match readings(&p.unit) {
         Some((coarse, fine)) => read(p, group, coarse, fine),
         // A unit that calib does not know is shown as it is stored.
@@ -105,7 +105,7 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
             p.unit.clone(),
         ),
     };
-    Row {
+    ParameterView {
         name: p.name.clone(),
         place: p.place.clone(),
         nominal,
@@ -123,10 +123,10 @@ fn row(p: &ParameterRow, group: &[&ParameterRow]) -> Row {
 fn read(
     p: &ParameterRow,
     group: &[&ParameterRow],
-    coarse: Reading,
-    fine: Reading,
+    coarse: UnitFormat,
+    fine: UnitFormat,
 ) -> (String, String, String, String, String, String) {
-    let decimals = |reading: Reading| {
+    let decimals = |reading: UnitFormat| {
         let alike = group.iter().filter(|other| other.unit == p.unit);
         alike.map(|other| reading.decimals_for(other.sigma)).max().unwrap_or_default()
     };

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-pub(super) type Point = [f64; 2];
+pub(super) type SvgPoint = [f64; 2];
 
 /// A picture under construction, in user units (about a CSS pixel on a wide screen).
 pub(super) struct Svg {
@@ -15,18 +15,18 @@ impl Svg {
     pub fn new(width: f64, height: f64) -> Self {
         Self { width, height, body: String::new() }
     }
-    pub fn line(&mut self, class: &str, from: Point, to: Point) {
+    pub fn line(&mut self, class: &str, from: SvgPoint, to: SvgPoint) {
         self.path(class, &[from, to]);
     }
     /// An open line through the points.
-    pub fn path(&mut self, class: &str, points: &[Point]) {
+    pub fn path(&mut self, class: &str, points: &[SvgPoint]) {
         let _ = write!(self.body, "<path class=\"{class}\" d=\"");
         for (i, point) in points.iter().enumerate() {
             let _ = write!(self.body, "{}{} {}", if i == 0 { 'M' } else { 'L' }, tenth(point[0]), tenth(point[1]));
         }
         self.body.push_str("\"/>\n");
     }
-    pub fn rect(&mut self, class: &str, corner: Point, size: Point) {
+    pub fn rect(&mut self, class: &str, corner: SvgPoint, size: SvgPoint) {
         let _ = writeln!(
             self.body,
             "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
@@ -36,7 +36,7 @@ impl Svg {
             tenth(size[1])
         );
     }
-    pub fn circle(&mut self, class: &str, centre: Point, radius: f64) {
+    pub fn circle(&mut self, class: &str, centre: SvgPoint, radius: f64) {
         let _ = writeln!(
             self.body,
             "<circle class=\"{class}\" cx=\"{}\" cy=\"{}\" r=\"{}\"/>",
@@ -46,7 +46,7 @@ impl Svg {
         );
     }
     /// Text at its baseline; the class says how it is anchored.
-    pub fn text(&mut self, class: &str, at: Point, text: &str) {
+    pub fn text(&mut self, class: &str, at: SvgPoint, text: &str) {
         let _ =
             writeln!(self.body, "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>", tenth(at[0]), tenth(at[1]), escape(text));
     }

@@ -10,18 +10,19 @@ const CLASSES: usize = 7;
 
 /// Two coordinates of a point, as a view of the workspace.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View {
+pub(super) struct WorkspaceView {
     pub name: &'static str,
-    axes: [Axis; 2],
+    axes: [ViewAxis; 2],
 }
 
-type Column = fn(&PredictionRow) -> f64;
+type Coordinate = fn(&PredictionRow) -> f64;
 /// Name, position and residual along one axis.
-type Axis = (&'static str, Column, Column);
-const X: Axis = ("X", |row| row.x_mm, |row| row.dx_mm);
-const Y: Axis = ("Y", |row| row.y_mm, |row| row.dy_mm);
-const Z: Axis = ("Z", |row| row.z_mm, |row| row.dz_mm);
-pub(super) const VIEWS: [View; 2] = [View { name: "X-Y", axes: [X, Y] }, View { name: "X-Z", axes: [X, Z] }];
+type ViewAxis = (&'static str, Coordinate, Coordinate);
+const X: ViewAxis = ("X", |row| row.x_mm, |row| row.dx_mm);
+const Y: ViewAxis = ("Y", |row| row.y_mm, |row| row.dy_mm);
+const Z: ViewAxis = ("Z", |row| row.z_mm, |row| row.dz_mm);
+pub(super) const VIEWS: [WorkspaceView; 2] =
+    [WorkspaceView { name: "X-Y", axes: [X, Y] }, WorkspaceView { name: "X-Z", axes: [X, Z] }];
 
 /// Classes of error with their colours: upper edges in mm, ascending, the last one open.
 pub(super) struct Colours {
@@ -74,7 +75,7 @@ fn descending(upper: f64, digits: &[f64], count: usize) -> Vec<f64> {
 
 /// One view: the points of one step, framed by all points of both steps, and how much its vectors are magnified.
 pub(super) fn scatter(
-    view: View,
+    view: WorkspaceView,
     rows: &Prediction,
     frame: [&Prediction; 2],
     colours: &Colours,
@@ -82,7 +83,7 @@ pub(super) fn scatter(
 ) -> (String, String) {
     const WIDTH: f64 = 420.0;
     let area = Area { left: 52.0, top: 26.0, right: WIDTH - 14.0, bottom: 300.0 };
-    let extent = |axis: Axis| {
+    let extent = |axis: ViewAxis| {
         let values = frame.iter().flat_map(|table| &table.0).map(axis.1);
         let (lower, upper) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
         if lower > upper { (0.0, 0.0) } else { (lower, upper) }

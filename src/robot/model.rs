@@ -1,7 +1,7 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::robot::gauging::Gauging;
+use crate::robot::setup::MeasurementSetup;
 use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};
 use nalgebra::{Matrix3, Vector3};
@@ -17,7 +17,7 @@ pub struct RobotModel {
     turns: Vec<(Matrix3<f64>, Matrix3<f64>)>,
     normals: Vec<[(usize, Vector3<f64>); 2]>,
     home: Pose,
-    gauging: Gauging,
+    setup: MeasurementSetup,
 }
 
 impl RobotModel {
@@ -38,21 +38,21 @@ impl RobotModel {
         let r = &description.tool_rotation;
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let home = Pose::new(rotation, Vector3::from(description.tool));
-        Self { description, screws, axes, points, turns, normals, home, gauging: Gauging::default() }
+        Self { description, screws, axes, points, turns, normals, home, setup: MeasurementSetup::default() }
     }
 
     /// The robot with what it is measured by.
-    pub fn measured_by(self, gauging: Gauging) -> Self {
-        Self { gauging, ..self }
+    pub fn measured_by(self, setup: MeasurementSetup) -> Self {
+        Self { setup, ..self }
     }
 
-    pub fn gauging(&self) -> &Gauging {
-        &self.gauging
+    pub fn setup(&self) -> &MeasurementSetup {
+        &self.setup
     }
 
     /// Where a target (by number) sits, the tool point without one: zero pose, base frame.
     pub fn seat(&self, target: Option<usize>) -> &Pose {
-        target.and_then(|target| self.gauging.targets.get(target)).map_or(&self.home, |target| &target.seat)
+        target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.seat)
     }
 
     pub fn description(&self) -> &RobotDescription {

@@ -8,7 +8,6 @@ use crate::stage::repeated::Repeatability;
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, RawFile, Stage, reads, writes};
 use crate::table::{ChangeRow, Changes, Parameters, Recording, Robot, Split, Table, from_parquet};
-use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::io::Read;
@@ -74,8 +73,9 @@ impl Stage for Compare {
         let robot = RobotModel::new(reads.robot.to_description()?);
         let first = self.session(&robot, &earlier, &recording, None, context)?;
         let second = self.session(&robot, &earlier, &reads.recording, Some(&reads.split), context)?;
-        let specs = first.model.stack.specs();
-        let precedence = |k: usize| ORDER.iter().position(|name| specs[k].name.starts_with(name)).unwrap_or(ORDER.len());
+        let (stack, specs) = (&first.model.stack, first.model.stack.specs());
+        let first_causes: Vec<Vec<usize>> = ORDER.iter().map(|name| stack.parameters_of(name).collect()).collect();
+        let precedence = |k: usize| first_causes.iter().position(|own| own.contains(&k)).unwrap_or(ORDER.len());
         let found = changes(&first.as_session(), &second.as_session(), precedence);
         let mut rows = Vec::new();
         for change in found {
@@ -111,7 +111,7 @@ impl Stage for Compare {
 }
 
 /// What changes by itself on a robot, the commonest first: a zero after a collision, a tool, wear of a drive.
-const ORDER: [&str; 4] = ["joint_offset.", "tool_offset.", "joint_compliance.", "link_geometry."];
+const ORDER: [&str; 4] = ["joint_offset", "tool_offset", "joint_compliance", "link_geometry"];
 
 /// The effect that a change of a parameter is.
 fn effect(name: &str) -> &str {
@@ -137,14 +137,14 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
 }
 
 /// A recording with its fit.
-struct Fit {
+struct FittedRecording {
     data: Measurements,
     rows: Vec<usize>,
     model: Model,
     fitted: Fitted,
 }
 
-impl Fit {
+impl FittedRecording {
     fn as_session(&self) -> Session<'_> {
         Session { data: &self.data, rows: &self.rows, model: &self.model, fitted: &self.fitted }
     }
@@ -159,20 +159,13 @@ impl Compare {
         recording: &Recording,
         split: Option<&Split>,
         context: &Context,
-    ) -> Result<Fit> {
+    ) -> Result<FittedRecording> {
         let mut data = recording.measurements(&self.tracker);
         let rows: Vec<usize> = (0..data.rows()).collect();
-        let mut placed = earlier.clone();
-        let base = align(robot, &data, &rows);
-        let (translation, rotation) = (base.translation, base.rotation_vector());
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
-                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
-                placed.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
-            }
-        }
+        let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;
-        for (k, spec) in model.stack.specs().iter().enumerate().filter(|(_, spec)| !spec.name.starts_with(BaseFrame::NAME)) {
+        let base: Vec<usize> = model.stack.parameters_of(BaseFrame::NAME).collect();
+        for (k, spec) in model.stack.specs().iter().enumerate().filter(|(k, _)| !base.contains(k)) {
             let prior = Prior { mean: model.x[k], sigma: spec.prior_sigma };
             model.known.entry(k).or_default().prior = Some(prior);
         }
@@ -180,8 +173,8 @@ impl Compare {
         self.repeatability.apply(&model, &mut data, &rows, context);
         let whole = Split::default();
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, split.unwrap_or(&whole), split.is_some());
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, split.unwrap_or(&whole), split.is_some());
         let rows = if split.is_some() { screening.kept } else { rows };
-        Ok(Fit { data, rows, model, fitted })
+        Ok(FittedRecording { data, rows, model, fitted })
     }
 }

@@ -1,6 +1,6 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, Verdict as Said, against_simulation, diagnose};
+use crate::diagnose::{Question, VerdictKind as Said, against_simulation, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::{Instrument, RobotModel};

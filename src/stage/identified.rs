@@ -2,12 +2,12 @@
 
 use crate::effect::Load;
 use crate::error::counted;
-use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect, cross_validate};
 use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
-use crate::table::{Beside, CovarianceTable, Fit, Observability, Parameters, Prediction, Recording, Split, Suspects};
+use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -168,12 +168,13 @@ impl Identified {
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
         let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
-        let folds = cross_validate(model, fitting.data, fitting.rows, fitted, fitting.folds, context.seed);
+        let folds =
+            cross_validate(&Session { data: fitting.data, rows: fitting.rows, model, fitted }, fitting.folds, context.seed);
         let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
-        let beside = Beside {
+        let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),

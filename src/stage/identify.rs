@@ -2,7 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
-use crate::effect::{Anchor, Effect, EffectStack, Setting, identified, whole};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
@@ -82,11 +82,11 @@ impl Stage for Identify {
         let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
-        let setting = Setting { base, load: self.load.into() };
+        let setting = EffectContext { base, load: self.load.into() };
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
         for effect in asked.filter_map(|cause| cause.whole(&setting)) {
-            if effect.name() == Anchor::NAME && robot.gauging().anchors.is_empty() {
+            if effect.name() == AnchorShift::NAME && robot.setup().anchors.is_empty() {
                 continue;
             }
             match effect.missing(&robot, &data) {
@@ -95,10 +95,11 @@ impl Stage for Identify {
             }
         }
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
-        let (candidates, held) = self.parameter_set().apply(&mut model, |_| true, context);
+        let all: Vec<usize> = (0..model.x.len()).collect();
+        let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -144,8 +145,8 @@ const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offse
 
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {
-    let anchored = !model.robot.gauging().anchors.is_empty();
-    let mut needed = GEOMETRY.iter().filter(|name| **name != Anchor::NAME || anchored);
+    let anchored = !model.robot.setup().anchors.is_empty();
+    let mut needed = GEOMETRY.iter().filter(|name| **name != AnchorShift::NAME || anchored);
     let asked = needed.all(|name| model.stack.effects().any(|(effect, _)| effect.name() == *name));
     let found = model
         .stack
@@ -163,21 +164,19 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
 
 /// A ratio is a quotient of tooth counts: errors beyond this are no manufacturing errors.
 const PLAUSIBLE_RATIO: f64 = 5e-4;
-const COMPLIANCE: &str = "joint_compliance";
 
 /// Where ratios are implausible and compliance was not asked for, fits it too and says which explanation the data favour.
-fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &Setting, context: &Context) {
+fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &EffectContext, context: &Context) {
     let implausible = |model: &Model, fitted: &Fitted| -> Vec<usize> {
-        let specs = model.stack.specs().iter().enumerate().filter(|(_, spec)| spec.name.starts_with("reduction_ratio."));
-        let free = specs.filter_map(|(k, _)| match &fitted.statuses[k] {
-            ParameterStatus::Free(sigma) if model.x[k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma) => Some(k),
-            _ => None,
-        });
-        free.collect()
+        let beyond = |k: &usize| match &fitted.statuses[*k] {
+            ParameterStatus::Free(sigma) => model.x[*k].abs() > PLAUSIBLE_RATIO.max(3.0 * sigma),
+            _ => false,
+        };
+        model.stack.parameters_of(ReductionRatio::NAME).filter(beyond).collect()
     };
     let suspects = implausible(model, fitted);
-    let Some(compliance) = whole(COMPLIANCE, setting) else { return };
-    let asked = model.stack.effects().any(|(effect, _)| effect.name() == COMPLIANCE);
+    let Some(compliance) = whole(JointCompliance::NAME, setting) else { return };
+    let asked = model.stack.effects().any(|(effect, _)| effect.name() == JointCompliance::NAME);
     if suspects.is_empty() || asked {
         return;
     }
@@ -197,12 +196,13 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
     rival.known.clone_from(&model.known);
     let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
-    let refitted = fit(&mut rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
+    let (rival, refitted) = fit(&rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);
     if gain > DECISIVE {
         context.services.warn(format!(
-            "{opening}; with `{COMPLIANCE}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
+            "{opening}; with `{}` {}, and {:.3} -> {:.3} mm per axis stays unexplained: the data favour compliance (BIC better \
              by {gain:.0})",
+            JointCompliance::NAME,
             list(&rival, &suspects),
             fitted.excess_sigma * 1e3,
             refitted.excess_sigma * 1e3

@@ -23,9 +23,9 @@ mod verdict;
 mod write;
 
 pub use columns::Columns;
-pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, Limits};
+pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
 pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
-pub use motion::Motion;
+pub use motion::VelocitySettings;
 
 use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
@@ -48,7 +48,7 @@ pub struct Ingest {
     pub duplicates: Duplicates,
     /// What becomes of rows with a joint beyond the robot's limits.
     #[serde(default)]
-    pub limits: Limits,
+    pub limits: LimitPolicy,
     /// Axes of the points that were measured at all, e.g. `[z]` for a dial gauge on a plate; without it all three, unless
     /// orientations or distances are mapped. Of those listed a cell may be blank where its column is `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -56,7 +56,7 @@ pub struct Ingest {
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
     /// takes the usual settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub motion: Option<Motion>,
+    pub motion: Option<VelocitySettings>,
     /// A file of which more than this share of rows is rejected is an error.
     #[serde(default = "half")]
     pub max_rejected_fraction: f64,
@@ -94,7 +94,7 @@ impl Stage for Ingest {
         self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
-        let arm = reads.map(|reads| arm::Arm::of(&reads.robot)).transpose()?;
+        let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?;
         let mut faults = Vec::new();
         for layout in &self.files {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
@@ -110,13 +110,13 @@ impl Stage for Ingest {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        let arm = arm::Arm::of(&reads.robot)?;
+        let arm = arm::RobotJoints::of(&reads.robot)?;
         let scan = |(index, layout)| scan::scan(self, index, layout, &arm, context);
         let mut scans = self.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
         let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
         verdict::judge(self, &scans, &fates, &arm, context)?;
         let names = names(&scans);
-        let decided = write::Decided { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
+        let decided = write::JoinDecisions { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
         let (recording, rejected) = write::write(&decided, context)?;
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context) })
     }
@@ -135,7 +135,7 @@ fn names(scans: &[scan::Scan]) -> Vec<String> {
     numbered.collect()
 }
 
-fn intake(decided: &write::Decided, context: &Context) -> Intake {
+fn intake(decided: &write::JoinDecisions, context: &Context) -> Intake {
     let mut rows: Vec<IntakeRow> = Vec::new();
     for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
         let accepted = verdict::accepted(scan, fate);

@@ -8,8 +8,8 @@ mod told;
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::network::correction::features;
-use crate::estimate::network::rivals::{CorrectionContest, fits, learn};
-use crate::estimate::network::{Activation, Arm, OUTPUTS, Recipe, Rival, Samples, Start, compare};
+use crate::estimate::network::rivals::{RivalContest, fits, learn};
+use crate::estimate::network::{Activation, OUTPUTS, Recipe, Rival, ScrewArm, TrainingSamples, TrainingStart, compare};
 use crate::estimate::swarm::Algorithm;
 use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, reads, writes};
@@ -123,7 +123,7 @@ pub enum StartSetting {
     Abc,
 }
 
-impl From<StartSetting> for Start {
+impl From<StartSetting> for TrainingStart {
     fn from(setting: StartSetting) -> Self {
         Self::Swarm(match setting {
             StartSetting::Random => return Self::Random,
@@ -226,7 +226,7 @@ impl Stage for Learn {
             return Err(Error::data("table prediction", "it belongs to another recording than the one beside it"));
         }
         let arm = robot.zip(parameters).map(|(robot, parameters)| {
-            Ok::<Arm, Error>(Arm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
+            Ok::<ScrewArm, Error>(ScrewArm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
         });
         let arm = arm.transpose()?.filter(|arm| arm.hinges.len() == recording.joints);
         let mut rows = split.rows(&recording, &self.on)?;
@@ -234,7 +234,7 @@ impl Stage for Learn {
         rows.retain(|row| recording.is_whole(*row));
         let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
-        let samples = Samples {
+        let samples = TrainingSamples {
             sources: near.iter().map(|row| sources[*row].clone()).collect(),
             residual: near.iter().map(|row| residual(&prediction.0[*row])).collect(),
         };
@@ -270,7 +270,7 @@ impl Learn {
                 ActivationSetting::Sigmoid => Activation::Sigmoid,
                 ActivationSetting::Tanh => Activation::Tanh,
             },
-            start: Start::Random,
+            start: TrainingStart::Random,
             beetles: self.beetles,
             generations: self.generations,
             iterations: self.iterations,
@@ -285,8 +285,8 @@ impl Learn {
     /// The correction as a table (empty if none helps), the rivals, and the course of a network's training.
     fn learn(
         &self,
-        samples: &Samples,
-        arm: Option<&Arm>,
+        samples: &TrainingSamples,
+        arm: Option<&ScrewArm>,
         prismatic: &[bool],
         context: &Context,
     ) -> (Network, Corrections, Training) {
@@ -312,7 +312,7 @@ impl Learn {
         }
     }
 
-    fn contest<'a>(&self, rows: usize, arm: Option<&'a Arm>, prismatic: &'a [bool], context: &Context) -> CorrectionContest<'a> {
+    fn contest<'a>(&self, rows: usize, arm: Option<&'a ScrewArm>, prismatic: &'a [bool], context: &Context) -> RivalContest<'a> {
         let recipe = self.recipe(prismatic, context);
         let decays = self.decay.map_or(DECAYS.to_vec(), |decay| vec![decay]);
         let hidden = self.hidden.map_or(HIDDEN.to_vec(), |hidden| vec![hidden]);
@@ -332,7 +332,7 @@ impl Learn {
         }
         let twice = |k: usize| rivals[..k].contains(&rivals[k]);
         let once = (0..rivals.len()).filter(|k| !twice(*k)).map(|k| rivals[k]).collect();
-        CorrectionContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
+        RivalContest { rivals: once, arm, prismatic, recipe, trial, decays, hidden, folds: self.folds }
     }
 }
 

@@ -26,7 +26,7 @@ pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
-pub use optimise::{Optimise, OptimiseReads, Problem};
+pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
@@ -207,7 +207,7 @@ impl Serialize for RawFile {
 }
 
 /// An opened input file.
-pub struct Source {
+pub struct OpenedInput {
     /// As the user named it, for messages and tables.
     pub label: String,
     pub reader: Box<dyn Read + Send>,
@@ -217,7 +217,7 @@ pub struct Source {
 
 /// What a stage may ask of the engine while it runs.
 pub trait Services: Sync {
-    fn open(&self, file: &RawFile) -> Result<Source>;
+    fn open(&self, file: &RawFile) -> Result<OpenedInput>;
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>>;
     /// A bar starts: what is done, how many units in all, and what a unit is called (`rows`, `generations`).
     fn begin(&self, what: &str, total: Option<u64>, unit: &str);

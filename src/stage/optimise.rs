@@ -4,7 +4,7 @@
 //! gets stuck. Times are no part of a table, which is the same whenever it is made; `cargo bench -- swarm` prints them.
 
 use crate::error::{Fault, Result};
-use crate::estimate::swarm::{Algorithm, Budget, Landscape, Outcome, Stop};
+use crate::estimate::swarm::{Algorithm, Budget, Landscape, SearchStop, SwarmResult};
 use crate::estimate::threads::in_order;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::statistics::quantile;
@@ -18,7 +18,7 @@ use std::sync::Mutex;
 #[serde(deny_unknown_fields, default)]
 pub struct Optimise {
     /// What is minimised.
-    pub problems: Vec<Problem>,
+    pub problems: Vec<BenchmarkProblem>,
     /// The optimisers to compare.
     pub methods: Vec<Algorithm>,
     /// Individuals of a swarm; half of a bee colony is employed.
@@ -30,13 +30,13 @@ pub struct Optimise {
     /// Of so many searches each the whole course is kept.
     pub courses: usize,
     /// Published times to stand beside ours.
-    pub reference: Vec<Reference>,
+    pub reference: Vec<PublishedTime>,
 }
 
 /// A function, and how near to its minimum counts as found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Problem {
+pub struct BenchmarkProblem {
     pub function: Landscape,
     pub dimensions: usize,
     /// The search ends where the value is nearer to the minimum than this.
@@ -46,7 +46,7 @@ pub struct Problem {
 /// A published time to the target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
+pub struct PublishedTime {
     /// Where it stands, e.g. `Table 2`.
     pub label: String,
     pub function: Landscape,
@@ -59,7 +59,7 @@ pub struct Reference {
 impl Default for Optimise {
     fn default() -> Self {
         Self {
-            problems: vec![Problem { function: Landscape::Michalewicz, dimensions: 2, tolerance: 1e-4 }],
+            problems: vec![BenchmarkProblem { function: Landscape::Michalewicz, dimensions: 2, tolerance: 1e-4 }],
             methods: Algorithm::ALL.to_vec(),
             population: 50,
             evaluations: 30_000,
@@ -114,7 +114,8 @@ impl Stage for Optimise {
             }
         }
         let twice = |i: usize| {
-            let same = |j: &Problem| j.function == self.problems[i].function && j.dimensions == self.problems[i].dimensions;
+            let same =
+                |j: &BenchmarkProblem| j.function == self.problems[i].function && j.dimensions == self.problems[i].dimensions;
             self.problems[..i].iter().any(same)
         };
         faults.extend(
@@ -166,7 +167,7 @@ impl Stage for Optimise {
 
 impl Optimise {
     /// One search on one thread.
-    pub fn search(&self, problem: &Problem, method: Algorithm, seed: u64) -> Outcome {
+    pub fn search(&self, problem: &BenchmarkProblem, method: Algorithm, seed: u64) -> SwarmResult {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(f64::NEG_INFINITY);
         let budget = Budget {
             generations: method.generations(self.population, self.evaluations),
@@ -179,14 +180,15 @@ impl Optimise {
         method.minimise(self.population, &function, &problem.function.bounds(problem.dimensions), &budget, |_, _| {})
     }
 
-    fn row(&self, step: &str, problem: &Problem, method: Algorithm, outcomes: &[Outcome]) -> SearchesRow {
+    fn row(&self, step: &str, problem: &BenchmarkProblem, method: Algorithm, outcomes: &[SwarmResult]) -> SearchesRow {
         let minimum = problem.function.minimum(problem.dimensions).unwrap_or(0.0);
-        let mut reached: Vec<f64> = outcomes.iter().filter(|o| o.stop == Stop::Target).map(|o| o.evaluations as f64).collect();
+        let mut reached: Vec<f64> =
+            outcomes.iter().filter(|o| o.stop == SearchStop::Target).map(|o| o.evaluations as f64).collect();
         let mut errors: Vec<f64> = outcomes.iter().map(|o| (o.value - minimum).max(0.0)).collect();
         reached.sort_by(f64::total_cmp);
         errors.sort_by(f64::total_cmp);
         let stuck = outcomes.iter().filter(|outcome| stuck(outcome)).count();
-        let beside = |r: &&Reference| (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method);
+        let beside = |r: &&PublishedTime| (r.function, r.dimensions, r.method) == (problem.function, problem.dimensions, method);
         let reference = self.reference.iter().find(beside);
         SearchesRow {
             step: step.into(),
@@ -208,7 +210,7 @@ impl Optimise {
 }
 
 /// Whether a search missed the target and found nothing better in the second half of its generations.
-fn stuck(outcome: &Outcome) -> bool {
+fn stuck(outcome: &SwarmResult) -> bool {
     let half = outcome.history.get(outcome.history.len() / 2);
-    outcome.stop != Stop::Target && half.is_some_and(|half| half.best <= outcome.value)
+    outcome.stop != SearchStop::Target && half.is_some_and(|half| half.best <= outcome.value)
 }

@@ -79,11 +79,11 @@ impl ParameterSet<'_> {
         faults
     }
 
-    /// Sorts those of the model's parameters that `open` lets this stage estimate into (candidates, held), and tells the model
-    /// what is known beforehand. Patterns that match none of them are warned of.
-    pub fn apply(&self, model: &mut Model, open: impl Fn(&str) -> bool, context: &Context) -> (Vec<usize>, Vec<usize>) {
+    /// Sorts the parameters that this stage may estimate (`open`, positions in the stack) into (candidates, held), and tells the
+    /// model what is known beforehand. Patterns that match none of them are warned of.
+    pub fn apply(&self, model: &mut Model, open: &[usize], context: &Context) -> (Vec<usize>, Vec<usize>) {
         let specs = model.stack.specs();
-        let names: Vec<&str> = specs.iter().map(|spec| spec.name.as_str()).filter(|name| open(name)).collect();
+        let names: Vec<&str> = open.iter().map(|k| specs[*k].name.as_str()).collect();
         for (setting, pattern) in self.patterns().filter(|(_, pattern)| !names.iter().any(|name| matches(pattern, name))) {
             let near = nearest(pattern, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
             context
@@ -92,14 +92,11 @@ impl ParameterSet<'_> {
         }
         let any = |patterns: &[String], name: &str| patterns.iter().any(|pattern| matches(pattern, name));
         let wanted = |name: &str| self.free.is_none_or(|free| any(free, name)) && !any(self.hold, name);
-        let asked = (0..specs.len()).filter(|k| open(&specs[*k].name));
-        let (candidates, held): (Vec<usize>, Vec<usize>) = asked.partition(|k| wanted(&specs[*k].name));
+        let (candidates, held): (Vec<usize>, Vec<usize>) = open.iter().partition(|k| wanted(&specs[**k].name));
+        let base: Vec<usize> = model.stack.parameters_of(BaseFrame::NAME).collect();
         let mut known = BTreeMap::new();
-        for &k in &candidates {
+        for &k in candidates.iter().filter(|k| !base.contains(k)) {
             let (name, unit) = (&specs[k].name, specs[k].unit);
-            if name.starts_with(BaseFrame::NAME) {
-                continue;
-            }
             let about = Known {
                 prior: longest(self.prior, name)
                     .map(|prior| Prior { mean: unit.to_si(prior.mean), sigma: unit.to_si(prior.sigma) }),

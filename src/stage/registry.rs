@@ -38,7 +38,7 @@ impl<T: Stage> ErasedStage for T {
 }
 
 /// A stage whose settings are typed, or all their faults.
-pub type Parsed = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
+pub type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
 
 /// One kind of stage, as the pipeline's YAML names it.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +49,7 @@ pub struct StageEntry {
     pub reads: fn() -> Vec<Port>,
     pub writes: fn() -> Vec<Port>,
     /// Types the settings; all their faults, with paths below `with`.
-    pub parse: fn(&Node) -> Parsed,
+    pub parse: fn(&Node) -> ParsedStage,
     pub schema: fn(&mut SchemaGenerator) -> Schema,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result};
-use crate::report::{Limits, Tables, Wishes, pages};
+use crate::report::{AcceptanceLimits, ReportOptions, Tables, pages};
 use crate::robot::{Instrument, RobotModel};
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
@@ -112,9 +112,9 @@ impl Stage for Report {
             withdrawn,
         };
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
-        let limits = Limits { mean_mm, p95_mm, max_mm };
+        let limits = AcceptanceLimits { mean_mm, p95_mm, max_mm };
         let (title, set) = (self.title.as_deref(), self.set.as_deref());
-        let wishes = Wishes { title, set, limits, identity: &self.identity, hashes };
+        let wishes = ReportOptions { title, set, limits, identity: &self.identity, hashes };
         let pages = pages(&tables, &wishes).map_err(|error| placed(error, context.id))?;
         let document =
             |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };

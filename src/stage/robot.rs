@@ -2,7 +2,7 @@
 
 use super::{Context, RawFile, Stage, reads, writes};
 use crate::error::{Error, Fault, Result};
-use crate::robot::import::{Text, read_calib, read_case};
+use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,12 +72,12 @@ impl Stage for ReadRobot {
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
         let (label, text) = text(&self.file, context)?;
-        let file = Text { label: &label, text: &text };
+        let file = RobotFileText { label: &label, text: &text };
         let imported = match self.format {
             RobotFormat::Case => read_case(file)?,
             RobotFormat::Calib => {
                 let urdf = self.urdf.as_ref().map(|file| self::text(file, context)).transpose()?;
-                read_calib(file, urdf.as_ref().map(|(label, text)| Text { label, text }))?
+                read_calib(file, urdf.as_ref().map(|(label, text)| RobotFileText { label, text }))?
             }
         };
         for note in imported.notes {

@@ -8,17 +8,18 @@ use std::collections::BTreeMap;
 
 /// Fits, and with `screen` sets aside what does not belong.
 pub fn fit_rows(
-    model: &mut Model,
+    start: &Model,
     data: &Measurements,
     options: &FitOptions,
     split: &Split,
     screen: bool,
-) -> (Fitted, Screening) {
+) -> (Model, Fitted, Screening) {
     if !screen {
         let kept = options.rows.to_vec();
-        return (fit(model, data, options), Screening { kept, ..Screening::default() });
+        let (model, fitted) = fit(start, data, options);
+        return (model, fitted, Screening { kept, ..Screening::default() });
     }
-    fit_screened(model, data, options, &numbered(split))
+    fit_screened(start, data, options, &numbered(split))
 }
 
 /// The number of the set that each row belongs to.

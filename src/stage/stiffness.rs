@@ -1,5 +1,6 @@
 //! Joint stiffness on top of an identified geometry, which is kept: the second step of the paper's sequence (Sec. 4, Eqs. 24-30).
 
+use crate::effect::JointCompliance;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::FitOptions;
 use crate::robot::RobotModel;
@@ -43,16 +44,15 @@ impl Stage for Stiffness {
     }
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
-        const EFFECT: &str = "joint_compliance";
         let robot = RobotModel::new(reads.robot.to_description()?);
         let mut data = reads.recording.measurements(&self.tracker);
         let rows = reads.split.rows(&reads.recording, &self.on)?;
-        let mut model = reads.parameters.model(robot, &[EFFECT], self.load.into())?;
-        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == EFFECT);
+        let mut model = reads.parameters.model(robot, &[JointCompliance::NAME], self.load.into())?;
+        let compliance = model.stack.effects().find(|(effect, _)| effect.name() == JointCompliance::NAME);
         if let Some(reason) = compliance.and_then(|(effect, _)| effect.missing(&model.robot, &data)) {
             return Err(Error::data("with.load", format!("no joint load is known: {reason}")));
         }
-        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{EFFECT}.j{joint}")).collect();
+        let wanted: Vec<String> = self.joints.iter().map(|joint| format!("{}.j{joint}", JointCompliance::NAME)).collect();
         let specs = model.stack.specs();
         if let Some(unknown) = wanted.iter().find(|name| !specs.iter().any(|spec| spec.name == **name)) {
             return Err(Error::spec(
@@ -60,15 +60,14 @@ impl Stage for Stiffness {
                 format!("this robot has no `{unknown}`: allowed are its revolute joints, from 1"),
             ));
         }
-        let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|other| other == name);
-        let open = |name: &str| name.starts_with(EFFECT) && chosen(name);
-        let (candidates, _) = self.parameter_set().apply(&mut model, open, context);
+        let chosen = |k: &usize| wanted.is_empty() || wanted.contains(&specs[*k].name);
+        let own: Vec<usize> = model.stack.parameters_of(JointCompliance::NAME).collect();
+        let open: Vec<usize> = own.iter().copied().filter(chosen).collect();
+        let (candidates, _) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
-        let specs = model.stack.specs();
-        let held: Vec<usize> =
-            (0..specs.len()).filter(|k| specs[*k].name.starts_with(EFFECT) && !candidates.contains(k)).collect();
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let held: Vec<usize> = own.into_iter().filter(|k| !candidates.contains(k)).collect();
         let seen_before: Vec<bool> = reads.prediction.0.iter().map(|row| !row.held_out).collect();
         let fitting = Fitting {
             data: &data,

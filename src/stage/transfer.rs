@@ -61,11 +61,14 @@ impl Stage for Transfer {
         let points = |of: &[nalgebra::Vector3<f64>]| whole.iter().map(|row| of[*row]).collect::<Vec<_>>();
         let base = align_points(&points(&predicted), &points(&data.position)) * there.base();
         let mut model = earlier.model_standing(base, robot, &[], self.load.into())?;
-        let open = |name: &str| self.free.is_some() || name.starts_with(BaseFrame::NAME);
-        let (candidates, held) = self.parameter_set().apply(&mut model, open, context);
+        let open: Vec<usize> = match self.free {
+            Some(_) => (0..model.x.len()).collect(),
+            None => model.stack.parameters_of(BaseFrame::NAME).collect(),
+        };
+        let (candidates, held) = self.parameter_set().apply(&mut model, &open, context);
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
-        let (fitted, screening) = fit_rows(&mut model, &data, &options, &reads.split, self.screen);
+        let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,

@@ -15,13 +15,13 @@ use std::collections::BTreeMap;
 pub struct Validate {
     /// Figures from elsewhere (a paper, a data sheet, last year's report) to stand beside ours.
     #[serde(default)]
-    pub reference: Vec<Reference>,
+    pub reference: Vec<PublishedErrors>,
 }
 
 /// Published or agreed statistics of one step on one set.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Reference {
+pub struct PublishedErrors {
     /// Where the figures stand, e.g. `Table 9`.
     pub label: String,
     /// The step of ours that they belong beside.
@@ -117,13 +117,13 @@ impl Stage for Validate {
     }
 }
 
-type Groups<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;
+type RowsByStepAndSet<'a> = BTreeMap<(&'a str, Cow<'a, str>, bool), Vec<&'a PredictionRow>>;
 
 /// Rows by (step, set, held out), in that order; fails where a table tells of several steps.
 ///
 /// Rows that did not measure a whole point are a set of their own, e.g. `fit (distance)`: their errors are of another kind.
-fn groups(step: &Labelled<Prediction>) -> Result<Groups<'_>> {
-    let mut groups = Groups::new();
+fn groups(step: &Labelled<Prediction>) -> Result<RowsByStepAndSet<'_>> {
+    let mut groups = RowsByStepAndSet::new();
     for row in &step.table.0 {
         let set = match &row.measured {
             Some(measured) => Cow::Owned(format!("{} ({measured})", row.set)),

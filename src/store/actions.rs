@@ -55,7 +55,7 @@ pub enum Lookup {
 
 /// A table on its way into the store.
 #[derive(Debug)]
-pub enum Product {
+pub enum PendingTable {
     Frame(Frame),
     File(FinishedFile),
 }
@@ -127,12 +127,12 @@ impl Store {
 
     /// Commits what a stage made: objects first, then the record. If a whole record is there already, that one stands. All can be
     /// seen at once and is durable after the next `sync`.
-    pub fn publish(&self, key: &StageKey, products: Vec<(String, Product)>, account: Account) -> Result<Published> {
+    pub fn publish(&self, key: &StageKey, products: Vec<(String, PendingTable)>, account: Account) -> Result<Published> {
         let mut tables = BTreeMap::new();
         for (port, product) in products {
             let file = match product {
-                Product::Frame(frame) => self.write_frame(&frame)?,
-                Product::File(file) => file,
+                PendingTable::Frame(frame) => self.write_frame(&frame)?,
+                PendingTable::File(file) => file,
             };
             let table = self.put_object(file)?;
             if tables.insert(port.clone(), table).is_some() {

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::raw;
 
 /// The columns of a table, by name.
-type Columns = BTreeMap<String, ArrayRef>;
+type NamedArrays = BTreeMap<String, ArrayRef>;
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 1 << 16;
@@ -76,7 +76,7 @@ impl Decoded {
         {
             return Err(Error::Bug(format!("table {kind}: column {} twice", twice.1.0)));
         }
-        let columns: Columns = pairs.into_iter().collect();
+        let columns: NamedArrays = pairs.into_iter().collect();
         let mut frame = FrameBuilder::new(kind);
         let added = added_since(kind, version, &columns, self.batch.num_rows())?;
         for (name, column) in columns.into_iter().chain(added) {
@@ -87,10 +87,10 @@ impl Decoded {
 }
 
 /// Nullable columns that a later minor version has, as nulls.
-fn added_since(kind: &str, version: Version, columns: &Columns, rows: usize) -> Result<Columns> {
+fn added_since(kind: &str, version: Version, columns: &NamedArrays, rows: usize) -> Result<NamedArrays> {
     let schema = schema::of(kind)?;
     if version.minor == schema.version.minor {
-        return Ok(Columns::new());
+        return Ok(NamedArrays::new());
     }
     let added = schema
         .fields

@@ -30,7 +30,7 @@ mod view;
 mod workspace;
 pub mod writer;
 
-pub use actions::{Account, ActionRecord, Lookup, Product, Published};
+pub use actions::{Account, ActionRecord, Lookup, PendingTable, Published};
 pub use bucket::Bucket;
 pub use content::TableHash;
 pub use key::{ActionId, FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey};
@@ -58,7 +58,7 @@ use workspace::Workspace;
 const STORE_FORMAT: u32 = 1;
 
 #[derive(Serialize, Deserialize)]
-struct Format {
+struct StoreMarker {
     calib_store: u32,
 }
 
@@ -116,12 +116,12 @@ impl Store {
 }
 
 fn format_text() -> Result<Vec<u8>> {
-    serde_json::to_vec(&Format { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))
+    serde_json::to_vec(&StoreMarker { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))
 }
 
 fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {
     let place = path.display().to_string();
-    match serde_json::from_slice::<Format>(bytes) {
+    match serde_json::from_slice::<StoreMarker>(bytes) {
         Ok(format) if format.calib_store == STORE_FORMAT => Ok(()),
         Ok(format) => Err(Error::spec(
             place,

@@ -1,12 +1,12 @@
 //! The rivals of each learned correction as text and as JSON.
 
 use crate::error::Result;
-use crate::pipeline::Outcome;
+use crate::pipeline::CompletedRun;
 use crate::store::Store;
 use crate::table::{Corrections, CorrectionsRow, Table};
 use serde_json::json;
 
-fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<CorrectionsRow>> {
+fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<CorrectionsRow>> {
     let mut rows = Vec::new();
     for output in outcome.tables(Corrections::KIND) {
         rows.extend(Corrections::from_frame(&store.load(&output.table)?)?.0);
@@ -15,7 +15,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<CorrectionsRow>> {
 }
 
 /// One line per rival, the kept one marked; nothing where nothing was learnt.
-pub fn corrections(outcome: &Outcome, store: &Store) -> Result<String> {
+pub fn corrections(outcome: &CompletedRun, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     if rows.is_empty() {
         return Ok(String::new());
@@ -48,7 +48,7 @@ pub fn corrections(outcome: &Outcome, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
-pub fn corrections_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn corrections_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: CorrectionsRow| {
         json!({
             "step": row.step, "rival": row.rival, "chosen": row.chosen, "reason": row.reason, "before_mm": row.before_mm,

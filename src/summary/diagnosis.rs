@@ -5,7 +5,9 @@ use crate::pipeline::StageReport;
 use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
-use crate::table::{FindingNumbers, Findings, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow};
+use crate::table::{
+    FindingNumbers, Findings, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow, is_separable_by_poses,
+};
 use serde_json::{Value, json};
 
 /// The tables of a diagnosis.
@@ -21,14 +23,6 @@ pub struct DiagnosisSummary {
 
 /// Rivals of a finding that poses are offered for.
 const ASKED: usize = 2;
-
-/// Whether poses may tell an effect from others: steps and drifts have had their time, faults of rows have none.
-fn by_poses(effect: &str) -> bool {
-    !matches!(
-        effect,
-        "zero_shift" | "tool_shift" | "base_shift" | "tracker_drift" | "joint_log_lag" | "outlier" | "mislabelled_point"
-    )
-}
 
 /// Places and variables that are shown.
 const SHOWN: usize = 5;
@@ -57,9 +51,9 @@ impl DiagnosisSummary {
     fn next(&self, store: &str) -> Option<Vec<String>> {
         let mut lines: Vec<String> = self.verdict.next_measurements.as_deref()?.lines().map(String::from).collect();
         let step = if self.step == Diagnose::NAME { String::new() } else { format!(" --step {}", typed(&self.step)) };
-        for finding in self.findings.0.iter().filter(|finding| by_poses(&finding.effect)) {
+        for finding in self.findings.0.iter().filter(|finding| is_separable_by_poses(&finding.effect)) {
             let mut own: Vec<&RivalRow> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).collect();
-            own.retain(|rival| by_poses(&rival.effect));
+            own.retain(|rival| is_separable_by_poses(&rival.effect));
             own.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
             for rival in own.iter().take(ASKED) {
                 let name = format!("{}@{}", rival.effect, rival.place);

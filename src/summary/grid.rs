@@ -1,6 +1,6 @@
 //! An answer for a person: columns below each other, numbers with the digits that tell something, as wide as the terminal.
 
-use crate::audit::{Answer, Value};
+use crate::audit::{QueryResult, QueryValue};
 use crate::error::{counted, one_line};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
@@ -23,7 +23,7 @@ struct Drawn {
 }
 
 /// The first rows, and how many are left out.
-pub fn grid(answer: &Answer, rows: usize, width: Option<usize>) -> String {
+pub fn grid(answer: &QueryResult, rows: usize, width: Option<usize>) -> String {
     let shown = rows.min(answer.rows());
     let columns = answer.names().zip(answer.columns(shown)).map(|(name, values)| drawn(name, &values)).collect();
     let mut text = draw(columns, shown, width);
@@ -80,17 +80,17 @@ fn fit(columns: &mut Vec<Drawn>, width: usize) -> Vec<String> {
     left_out
 }
 
-fn drawn(name: &str, values: &[Value]) -> Drawn {
-    let right = values.iter().all(|value| matches!(value, Value::Null | Value::Integer(_) | Value::Number(_)));
+fn drawn(name: &str, values: &[QueryValue]) -> Drawn {
+    let right = values.iter().all(|value| matches!(value, QueryValue::Null | QueryValue::Integer(_) | QueryValue::Number(_)));
     let decimals = decimals(values, if name.ends_with("_mm") { LENGTH } else { 0 });
     let mut cells: Vec<String> = values
         .iter()
         .map(|value| match value {
-            Value::Null => String::new(),
-            Value::Boolean(truth) => truth.to_string(),
-            Value::Integer(number) => number.to_string(),
-            Value::Number(number) => written(*number, decimals),
-            Value::Text(text) => cut(&one_line(text), LONGEST),
+            QueryValue::Null => String::new(),
+            QueryValue::Boolean(truth) => truth.to_string(),
+            QueryValue::Integer(number) => number.to_string(),
+            QueryValue::Number(number) => written(*number, decimals),
+            QueryValue::Text(text) => cut(&one_line(text), LONGEST),
         })
         .collect();
     if right && decimals.is_some() {
@@ -101,8 +101,8 @@ fn drawn(name: &str, values: &[Value]) -> Drawn {
 }
 
 /// Decimals that suit all numbers of a column, at least so many; nothing where they are of too different sizes.
-fn decimals(values: &[Value], least: i32) -> Option<usize> {
-    let sizes = values.iter().filter_map(|value| if let Value::Number(number) = value { Some(number.abs()) } else { None });
+fn decimals(values: &[QueryValue], least: i32) -> Option<usize> {
+    let sizes = values.iter().filter_map(|value| if let QueryValue::Number(number) = value { Some(number.abs()) } else { None });
     let sizes: Vec<f64> = sizes.filter(|size| size.is_finite() && *size > 0.0).collect();
     let (Some(largest), Some(smallest)) = (sizes.iter().copied().reduce(f64::max), sizes.iter().copied().reduce(f64::min)) else {
         return Some(0);
@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     fn numbers(values: &[f64]) -> Vec<String> {
-        drawn("n", &values.iter().map(|value| Value::Number(*value)).collect::<Vec<_>>()).cells
+        drawn("n", &values.iter().map(|value| QueryValue::Number(*value)).collect::<Vec<_>>()).cells
     }
 
     #[test]
@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn a_length_far_away_keeps_its_micrometres() {
-        assert_eq!(drawn("x_mm", &[Value::Number(4744.84123)]).cells, ["4744.8412"]);
-        assert_eq!(drawn("x_mm", &[Value::Number(0.0286965)]).cells, ["0.0286965"]);
+        assert_eq!(drawn("x_mm", &[QueryValue::Number(4744.84123)]).cells, ["4744.8412"]);
+        assert_eq!(drawn("x_mm", &[QueryValue::Number(0.0286965)]).cells, ["0.0286965"]);
     }
 
     #[test]
@@ -187,11 +187,11 @@ mod tests {
     #[test]
     fn a_narrow_terminal_cuts_texts_and_then_columns() {
         let columns = || {
-            let text = |text: &str| Value::Text(text.to_string().into());
+            let text = |text: &str| QueryValue::Text(text.to_string().into());
             vec![
                 drawn("point", &[text("P1"), text("a point with a long name")]),
-                drawn("x_mm", &[Value::Number(1954.25), Value::Null]),
-                drawn("kept", &[Value::Boolean(true), Value::Boolean(false)]),
+                drawn("x_mm", &[QueryValue::Number(1954.25), QueryValue::Null]),
+                drawn("kept", &[QueryValue::Boolean(true), QueryValue::Boolean(false)]),
             ]
         };
         assert_eq!(
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_text_keeps_its_zeros() {
-        assert_eq!(drawn("version", &[Value::Text("1.0".into()), Value::Text("2.0".into())]).cells, ["1.0", "2.0"]);
+        assert_eq!(drawn("version", &[QueryValue::Text("1.0".into()), QueryValue::Text("2.0".into())]).cells, ["1.0", "2.0"]);
     }
 
     #[test]

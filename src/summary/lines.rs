@@ -1,22 +1,22 @@
 //! An answer for other programs: CSV and JSON, numbers to the last digit, every row.
 
-use crate::audit::{Answer, Value};
+use crate::audit::{QueryResult, QueryValue};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 use std::fmt::Display;
 
 /// A header, then the rows; null is an empty cell.
-pub fn csv(answer: &Answer) -> Result<String> {
+pub fn csv(answer: &QueryResult) -> Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(answer.names().map(|name| inert(Cow::Borrowed(name)))).map_err(bug)?;
     for row in 0..answer.rows() {
         let cells = answer.row(row).map(|value| match value {
-            Value::Null => String::new(),
-            Value::Boolean(truth) => truth.to_string(),
-            Value::Integer(number) => number.to_string(),
+            QueryValue::Null => String::new(),
+            QueryValue::Boolean(truth) => truth.to_string(),
+            QueryValue::Integer(number) => number.to_string(),
             // As short as it can be and still be the same number: 1e-7, not 0.0000001.
-            Value::Number(number) => format!("{number:?}"),
-            Value::Text(text) => inert(text),
+            QueryValue::Number(number) => format!("{number:?}"),
+            QueryValue::Text(text) => inert(text),
         });
         writer.write_record(cells).map_err(bug)?;
     }
@@ -30,7 +30,7 @@ fn inert(text: Cow<str>) -> String {
 }
 
 /// One array of objects, a row a line, columns in their order; what is no number is null.
-pub fn json(answer: &Answer) -> Result<String> {
+pub fn json(answer: &QueryResult) -> Result<String> {
     let quoted = |text: &str| serde_json::to_string(text).map_err(bug);
     let names = answer.names().map(quoted).collect::<Result<Vec<String>>>()?;
     let mut rows = Vec::with_capacity(answer.rows());
@@ -38,11 +38,11 @@ pub fn json(answer: &Answer) -> Result<String> {
         let mut cells = Vec::with_capacity(names.len());
         for (name, value) in names.iter().zip(answer.row(row)) {
             let value = match value {
-                Value::Null => "null".into(),
-                Value::Boolean(truth) => truth.to_string(),
-                Value::Integer(number) => number.to_string(),
-                Value::Number(number) => serde_json::to_string(&number).map_err(bug)?,
-                Value::Text(text) => quoted(&text)?,
+                QueryValue::Null => "null".into(),
+                QueryValue::Boolean(truth) => truth.to_string(),
+                QueryValue::Integer(number) => number.to_string(),
+                QueryValue::Number(number) => serde_json::to_string(&number).map_err(bug)?,
+                QueryValue::Text(text) => quoted(&text)?,
             };
             cells.push(format!("{name}: {value}"));
         }

@@ -10,8 +10,9 @@ const TABLES: usize = 6;
 const CAUSES: usize = 5;
 
 pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
-    let told =
-        |letter: char, told: &crate::audit::Told| format!("{letter}  {}  {}  {:.16}\n", told.run, told.pipeline, told.started);
+    let told = |letter: char, told: &crate::audit::RunSummary| {
+        format!("{letter}  {}  {}  {:.16}\n", told.run, told.pipeline, told.started)
+    };
     let mut text = told('A', &diff.a) + &told('B', &diff.b);
     let shown = if stat { diff.causes.len() } else { CAUSES };
     for cause in diff.causes.iter().take(shown) {

@@ -1,12 +1,12 @@
 //! The comparison of optimisers as text and as JSON.
 
 use crate::error::Result;
-use crate::pipeline::Outcome;
+use crate::pipeline::CompletedRun;
 use crate::store::Store;
 use crate::table::{Searches, SearchesRow, Table};
 use serde_json::json;
 
-fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<SearchesRow>> {
+fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<SearchesRow>> {
     let mut rows = Vec::new();
     for output in outcome.tables(Searches::KIND) {
         rows.extend(Searches::from_frame(&store.load(&output.table)?)?.0);
@@ -15,7 +15,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<SearchesRow>> {
 }
 
 /// One line per function and optimiser; nothing where nothing was searched.
-pub fn searches(outcome: &Outcome, store: &Store) -> Result<String> {
+pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
     let rows = rows(outcome, store)?;
     if rows.is_empty() {
         return Ok(String::new());
@@ -59,7 +59,7 @@ pub fn searches(outcome: &Outcome, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
-pub fn searches_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn searches_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: SearchesRow| {
         json!({
             "step": row.step, "function": row.function, "dimensions": row.dimensions, "method": row.method,

@@ -1,13 +1,13 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
 use crate::error::Result;
-use crate::pipeline::Outcome;
+use crate::pipeline::CompletedRun;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{Standing, Statistics, StatisticsRow, Table};
 use serde_json::json;
 
-fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
+fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
     let mut rows = Vec::new();
     for output in outcome.tables(Statistics::KIND) {
         rows.extend(Statistics::from_frame(&store.load(&output.table)?)?.0);
@@ -18,7 +18,7 @@ fn rows(outcome: &Outcome, store: &Store) -> Result<Vec<StatisticsRow>> {
 /// Three tables: points that no model has seen, those that the models were fitted to, and these again
 /// cross-validated. `expected` is the rms of a complete
 /// model under the instrument's noise.
-pub fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &Store) -> Result<String> {
     let mut rows = rows(outcome, store)?;
     let withdrawn: Vec<&str> = standing.iter().flat_map(|stands| &stands.withdrawn).map(|gone| gone.step.as_str()).collect();
     for row in rows.iter_mut().filter(|row| withdrawn.contains(&row.step.as_str())) {
@@ -41,7 +41,7 @@ pub fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store)
 
 /// What the model that stands makes of the held-out set with most points, in a line, where it was diagnosed; a line more for every
 /// step that was worse.
-pub fn headline(outcome: &Outcome, standing: Option<&Standing>, store: &Store) -> Result<String> {
+pub fn headline(outcome: &CompletedRun, standing: Option<&Standing>, store: &Store) -> Result<String> {
     let Some(standing) = standing else { return Ok(String::new()) };
     let mut text: String = standing.warnings().map(|warning| format!("{warning}\n")).collect();
     if !standing.withdrawn.is_empty() {
@@ -156,7 +156,7 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
     text + "\n"
 }
 
-pub fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::Value> {
+pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: StatisticsRow| {
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
@@ -172,12 +172,12 @@ pub fn statistics_json(outcome: &Outcome, store: &Store) -> Result<serde_json::V
     Ok(rows(outcome, store)?.into_iter().map(row).collect())
 }
 
-pub fn rejected_rows(outcome: &Outcome) -> u64 {
+pub fn rejected_rows(outcome: &CompletedRun) -> u64 {
     outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
 }
 
 /// Nothing where nothing was rejected.
-pub fn rejected(outcome: &Outcome) -> String {
+pub fn rejected(outcome: &CompletedRun) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
         let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
         format!("rejected rows: {}, each with its reason in {path}\n", output.table.rows)

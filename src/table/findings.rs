@@ -1,6 +1,7 @@
 //! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
 
 use crate::diagnose::Diagnosis;
+use crate::effect::cause;
 
 crate::table::rows! { "findings",
     /// Findings, strongest first; key `rank`.
@@ -57,6 +58,11 @@ crate::table::rows! { "rivals",
         /// That it is the rival and not the finding.
         probability: Option<f64>,
     }
+}
+
+/// Whether more poses may separate an effect of these tables from others.
+pub fn is_separable_by_poses(effect: &str) -> bool {
+    cause(effect).is_none_or(|cause| cause.is_separable_by_poses())
 }
 
 fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &crate::diagnose::Finding)> {

@@ -3,12 +3,12 @@
 mod numbers;
 mod reading;
 
-use crate::estimate::network::arm::Arm;
-use crate::estimate::network::basis::{BasisTerm, Wave, Way};
-use crate::estimate::network::correction::{Body, Correction, Dress, Feature, Map};
+use crate::estimate::network::arm::ScrewArm;
+use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
+use crate::estimate::network::correction::{Body, Correction, Feature, Map, NetworkScaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::region::Region;
-use crate::estimate::network::{Activation, Shape};
+use crate::estimate::network::{Activation, LayerSizes};
 
 crate::table::rows! { "network",
     /// Numbers of the learned correction, one a row; key (`member`, `part`, `layer`, `to`, `from`). No rows: no correction.
@@ -100,7 +100,7 @@ impl Network {
         }
     }
 
-    fn dress(&mut self, dress: &Dress, prismatic: &[bool]) {
+    fn dress(&mut self, dress: &NetworkScaling, prismatic: &[bool]) {
         for (i, (feature, scaling)) in dress.features.iter().zip(&dress.inputs).enumerate() {
             let unit = feature_unit(*feature, prismatic);
             self.put(0, map_name(feature.map), [0, i + 1, feature.source + 1], 1.0);
@@ -120,10 +120,10 @@ impl Network {
         }
         for (t, term) in linear.terms.iter().enumerate() {
             let (part, layer, from) = match term.way {
-                Way::Along(axis) => ("along", 0, axis),
-                Way::Turn(joint) => ("turn", 0, joint),
-                Way::Shift(station, axis) => ("shift", station, axis),
-                Way::Tilt(station, axis) => ("tilt", station, axis),
+                OutputMotion::Along(axis) => ("along", 0, axis),
+                OutputMotion::Turn(joint) => ("turn", 0, joint),
+                OutputMotion::Shift(station, axis) => ("shift", station, axis),
+                OutputMotion::Tilt(station, axis) => ("tilt", station, axis),
             };
             self.put(0, part, [layer, t + 1, from + 1], 1.0);
             for wave in &term.waves {
@@ -141,7 +141,7 @@ impl Network {
         }
     }
 
-    fn arm(&mut self, arm: &Arm) {
+    fn arm(&mut self, arm: &ScrewArm) {
         for (j, hinge) in arm.hinges.iter().enumerate() {
             self.row("axis", 0, j + 1, &hinge.axis);
             self.row("point", 0, j + 1, &hinge.point.map(|value| value * MILLI));
@@ -153,7 +153,7 @@ impl Network {
 }
 
 /// Where parameter `index` of a network stands in the table: part, and layer, to, from.
-fn place(shape: Shape, index: usize) -> (&'static str, [usize; 3]) {
+fn place(shape: LayerSizes, index: usize) -> (&'static str, [usize; 3]) {
     if shape.hidden_weights().contains(&index) {
         ("weight", [1, index / shape.inputs + 1, index % shape.inputs + 1])
     } else if shape.hidden_biases().contains(&index) {
@@ -177,7 +177,7 @@ fn feature_unit(feature: Feature, prismatic: &[bool]) -> f64 {
 
 /// Shifts are stored in mm, turns in rad; per m of torque or travel where a wave is one.
 fn coefficient_unit(term: &BasisTerm) -> f64 {
-    if matches!(term.way, Way::Along(_) | Way::Shift(..)) { MILLI } else { 1.0 }
+    if matches!(term.way, OutputMotion::Along(_) | OutputMotion::Shift(..)) { MILLI } else { 1.0 }
 }
 
 fn map_name(map: Map) -> &'static str {

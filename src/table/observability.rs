@@ -17,7 +17,7 @@ use crate::estimate::{Fitted, Repeated};
 
 /// What stands beside a fit in its table.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Beside {
+pub struct FitContext {
     /// Rank of the geometry, found and by theory, where all of it was asked for.
     pub geometry: Option<(usize, usize)>,
     /// Standard deviation of the joints that rows are weighted by, rad.
@@ -30,8 +30,8 @@ pub struct Beside {
 
 impl Observability {
     /// What a fit could see.
-    pub fn of(step: &str, fitted: &Fitted, beside: &Beside) -> Self {
-        let Beside { geometry, repeatability, folds, earlier } = *beside;
+    pub fn of(step: &str, fitted: &Fitted, beside: &FitContext) -> Self {
+        let FitContext { geometry, repeatability, folds, earlier } = *beside;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.

@@ -28,10 +28,12 @@ crate::table::rows! { "parameters",
     }
 }
 
-use crate::effect::{Anchor, BaseFrame, Effect, EffectStack, Form, Load, Setting, ToolOffset, identified, whole};
+use crate::effect::{
+    AnchorShift, BaseFrame, Effect, EffectContext, EffectStack, Form, JointCompliance, Load, ToolOffset, identified, whole,
+};
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
-use crate::robot::{self, Gauging, RobotModel, Target};
+use crate::robot::{self, MeasurementSetup, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -202,24 +204,20 @@ impl Parameters {
     /// [`Parameters::model`] of a robot whose base stands elsewhere.
     pub fn model_standing(&self, base: Pose, robot: RobotModel, more: &[&str], load: Load) -> Result<Model> {
         // Factors per ampere and per newton metre are different parameters of one name: the table's unit decides.
-        let load =
-            match self.0.iter().find(|row| row.effect == "joint_compliance" && row.form.is_none()).map(|row| row.unit.as_str()) {
-                Some("rad/A") => Load::MotorCurrent,
-                Some(_) => Load::GravityTorque,
-                None => load,
-            };
-        let robot = self.gauging(robot);
-        let setting = Setting { base, load };
+        let compliance = self.0.iter().find(|row| row.effect == JointCompliance::NAME && row.form.is_none());
+        let load = compliance.and_then(|row| Load::of_compliance(Unit::parse(&row.unit)?)).unwrap_or(load);
+        let robot = self.with_setup(robot);
+        let setting = EffectContext { base, load };
         let names = identified().map(|cause| cause.name());
         let chosen: Vec<&str> = names.filter(|name| self.effects().contains(name) || more.contains(name)).collect();
         let whole = chosen.iter().filter_map(|name| whole(name, &setting));
         let placed = self.forms()?.into_iter().map(|form| Box::new(form) as Box<dyn Effect>);
         let effects = whole.chain(placed).collect();
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
-        let targets = !robot.gauging().targets.is_empty();
+        let targets = !robot.setup().targets.is_empty();
         // Where these stand is their start: nothing is left to correct.
         let stands = |row: &ParameterRow| match row.effect.as_str() {
-            BaseFrame::NAME | Anchor::NAME => true,
+            BaseFrame::NAME | AnchorShift::NAME => true,
             effect => targets && effect == ToolOffset::NAME,
         };
         for row in self.0.iter().filter(|row| !stands(row)) {
@@ -236,10 +234,11 @@ impl Parameters {
     }
 
     /// The robot with the targets and anchors that the parameters place.
-    fn gauging(&self, robot: RobotModel) -> RobotModel {
+    fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors = self.placed(Anchor::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
-        let mut gauging = Gauging { targets: Vec::new(), anchors: anchors.collect() };
+        let anchors =
+            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
+        let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
             self.0.iter().any(|row| row.name == rx)
@@ -251,9 +250,9 @@ impl Parameters {
                 oriented: turned(&name),
                 name,
             };
-            gauging.targets = targets.into_iter().map(target).collect();
+            setup.targets = targets.into_iter().map(target).collect();
         }
-        robot.measured_by(gauging)
+        robot.measured_by(setup)
     }
 
     /// Named things of an effect with their translation and rotation vector.
@@ -269,6 +268,18 @@ impl Parameters {
         }
         let pose = |[x, y, z, rx, ry, rz]: [f64; 6]| Pose::from_rotation_vector(Vector3::new(rx, ry, rz), Vector3::new(x, y, z));
         parts.into_iter().map(|(name, part)| (name, pose(part))).collect()
+    }
+
+    /// The same of a robot whose base stands elsewhere in the tracker's frame.
+    pub fn standing_at(mut self, base: &Pose) -> Self {
+        let (translation, rotation) = (base.translation, base.rotation_vector());
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            for (ending, value, unit) in [("", translation[axis], Unit::Millimetre), ("r", rotation[axis], Unit::Radian)] {
+                let name = format!("{}.{ending}{name}", BaseFrame::NAME);
+                self.0.iter_mut().filter(|row| row.name == name).for_each(|row| row.value = unit.from_si(value));
+            }
+        }
+        self
     }
 
     /// Where the base stands in the tracker's frame; the identity without `base_frame`.

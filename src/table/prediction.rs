@@ -57,15 +57,15 @@ impl Prediction {
     ) -> Self {
         let sigma = covariance.map(|covariance| covariance.of_predictions(model, data));
         let predicted = model.predict(data);
-        let mut misses = model.misses(data).into_iter();
+        let mut errors = model.row_errors(data).into_iter();
         let rows = predicted.iter().enumerate().map(|(row, point)| {
             let point = point * 1e3;
-            let miss = misses.next();
+            let error = errors.next();
             let whole = data.whole(row);
             let residual = if whole {
                 data.position[row] * 1e3 - point
             } else {
-                miss.as_ref().map_or_else(Vector3::zeros, |miss| miss.point * 1e3)
+                error.as_ref().map_or_else(Vector3::zeros, |error| error.point * 1e3)
             };
             PredictionRow {
                 sequence: recording.sequence[row],
@@ -80,8 +80,8 @@ impl Prediction {
                 dx_mm: residual.x,
                 dy_mm: residual.y,
                 dz_mm: residual.z,
-                error_mm: match &miss {
-                    Some(miss) if !whole => miss.length * 1e3,
+                error_mm: match &error {
+                    Some(error) if !whole => error.length * 1e3,
                     _ => residual.norm(),
                 },
                 noise_mm: noise(data, row) * 1e3,
@@ -89,7 +89,7 @@ impl Prediction {
                 fold_error_mm: None,
                 block_error_mm: None,
                 measured: (!whole).then(|| measured(data, row)),
-                turn_rad: miss.and_then(|miss| miss.angle),
+                turn_rad: error.and_then(|error| error.angle),
             }
         });
         Self(rows.collect())

@@ -5,7 +5,7 @@ mod columns;
 pub use columns::columns;
 
 use crate::error::Result;
-use crate::observation::{Column, KINDS};
+use crate::observation::{DeclaredColumn, KINDS};
 use crate::robot::{Instrument, Measurements, Named};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
@@ -194,7 +194,7 @@ const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 
 impl Recording {
     /// The numbers of a column, SI: where they are, the first of them, and how far the next row's is.
-    fn numbers(&self, column: &Column) -> Option<(&[f64], usize, usize)> {
+    fn numbers(&self, column: &DeclaredColumn) -> Option<(&[f64], usize, usize)> {
         let points = [(POINT, Some(&self.position)), (SIGMA, self.position_sigma.as_ref()), (SIMULATED, self.simulated.as_ref())];
         for (settings, points) in points {
             if let Some(axis) = settings.iter().position(|setting| *setting == column.setting) {

@@ -17,15 +17,15 @@ const CLEARLY: f64 = 2.0;
 const FEWEST: usize = 5;
 
 /// Errors (mm) by row of the recording.
-type Errors = BTreeMap<i64, f64>;
+type ErrorsByRow = BTreeMap<i64, f64>;
 
 /// Errors of the whole points that a step did not see, its suspects apart.
 #[derive(Debug, Clone, Default)]
 pub struct Unseen {
     /// Of rows that it was fitted to, by fits without their folds.
-    folds: Errors,
+    folds: ErrorsByRow,
     /// Of all other rows.
-    held_out: Errors,
+    held_out: ErrorsByRow,
     /// Rows that it, or a step before it, was fitted to.
     fitted: BTreeSet<i64>,
 }
@@ -125,7 +125,7 @@ impl Unseen {
 }
 
 /// Rms of both at the points that both have, and how many, where the first is worse.
-fn worse(one: &Errors, other: &Errors) -> Option<(f64, f64, usize)> {
+fn worse(one: &ErrorsByRow, other: &ErrorsByRow) -> Option<(f64, f64, usize)> {
     let pairs: Vec<(f64, f64)> =
         one.iter().filter_map(|(row, own)| Some((own * own, other.get(row).map(|error| error * error)?))).collect();
     if pairs.len() < FEWEST {
@@ -150,7 +150,7 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
         None => steps.len(),
     };
     let never = never_fitted(steps);
-    let judged = |step: &Step| -> Errors {
+    let judged = |step: &Step| -> ErrorsByRow {
         let others = step.unseen.held_out.iter().filter(|(row, _)| !never.contains(row));
         step.unseen.folds.iter().chain(others).map(|(row, error)| (*row, *error)).collect()
     };
@@ -172,7 +172,7 @@ pub fn standing(steps: &[Step], diagnosed: Option<&str>) -> Option<Standing> {
     }
     let model = steps[..end].get(..=stands)?.iter().rfind(|step| step.own).unwrap_or(&steps[stands]);
     let chosen = &steps[stands];
-    let guard = |step: &Step| -> Errors {
+    let guard = |step: &Step| -> ErrorsByRow {
         step.unseen.held_out.iter().filter(|(row, _)| never.contains(row)).map(|(row, error)| (*row, *error)).collect()
     };
     let better = steps[..stands].iter().filter_map(|step| compared(chosen, step, worse(&guard(chosen), &guard(step))));

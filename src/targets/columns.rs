@@ -6,7 +6,7 @@ use crate::units::{Header, Quantity, Unit};
 
 /// What a column holds; joints and axes from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Role {
+pub(super) enum ColumnRole {
     Joint(usize, Unit),
     Axis(usize, Unit),
     /// w, x, y, z.
@@ -29,9 +29,9 @@ pub struct Units {
 
 /// The columns of a file of targets.
 #[derive(Debug, Clone)]
-pub(super) struct Columns {
+pub(super) struct TargetColumns {
     pub count: usize,
-    pub roles: Vec<(usize, Role)>,
+    pub roles: Vec<(usize, ColumnRole)>,
     /// Column and unit of each joint; empty where joints are not given.
     pub joints: Vec<(usize, Unit)>,
     pub point: bool,
@@ -41,7 +41,7 @@ pub(super) struct Columns {
 /// What columns of joints may be called beside the robot's own names.
 const JOINT_NAMES: [&str; 4] = ["q", "a", "j", "joint"];
 
-impl Columns {
+impl TargetColumns {
     /// Reads the header; fails where it names no whole target, or a unit is missing.
     pub fn read(place: &str, header: &[String], robot: &RobotDescription, units: Units) -> Result<Self> {
         let mut faults = Vec::new();
@@ -59,15 +59,15 @@ impl Columns {
         let n = robot.joints.len();
         let joint = |j: usize| {
             roles.iter().find_map(|(index, role)| match role {
-                Role::Joint(k, unit) if *k == j => Some((*index, *unit)),
+                ColumnRole::Joint(k, unit) if *k == j => Some((*index, *unit)),
                 _ => None,
             })
         };
         let joints: Vec<(usize, Unit)> = (0..n).filter_map(joint).collect();
-        let count = |of: fn(&Role) -> bool| roles.iter().filter(|(_, role)| of(role)).count();
-        let point = count(|role| matches!(role, Role::Axis(..)));
-        let quaternion = count(|role| matches!(role, Role::Quaternion(_)));
-        let turns = count(|role| matches!(role, Role::Turn(..)));
+        let count = |of: fn(&ColumnRole) -> bool| roles.iter().filter(|(_, role)| of(role)).count();
+        let point = count(|role| matches!(role, ColumnRole::Axis(..)));
+        let quaternion = count(|role| matches!(role, ColumnRole::Quaternion(_)));
+        let turns = count(|role| matches!(role, ColumnRole::Turn(..)));
         if !joints.is_empty() && joints.len() < n {
             let missing: Vec<String> = (0..n).filter(|j| joint(*j).is_none()).map(|j| format!("q{}", j + 1)).collect();
             faults.push(Fault::new(place, format!("has no column for {} of the robot's {n} joints", missing.join(", "))));
@@ -91,16 +91,16 @@ impl Columns {
     }
 }
 
-fn same(a: &Role, b: &Role) -> bool {
+fn same(a: &ColumnRole, b: &ColumnRole) -> bool {
     match (a, b) {
-        (Role::Joint(a, _), Role::Joint(b, _)) | (Role::Axis(a, _), Role::Axis(b, _)) | (Role::Turn(a, _), Role::Turn(b, _)) => {
-            a == b
-        }
+        (ColumnRole::Joint(a, _), ColumnRole::Joint(b, _))
+        | (ColumnRole::Axis(a, _), ColumnRole::Axis(b, _))
+        | (ColumnRole::Turn(a, _), ColumnRole::Turn(b, _)) => a == b,
         _ => a == b,
     }
 }
 
-fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Role>, String> {
+fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<ColumnRole>, String> {
     let lower = name.trim().to_lowercase();
     let named = |text: &str| robot.joints.iter().position(|joint| joint.name.to_lowercase() == text);
     // Of a joint called `joint_1_s` the `s` is no unit.
@@ -125,22 +125,22 @@ fn role(name: &str, robot: &RobotDescription, units: Units) -> Result<Option<Rol
             JointKind::Revolute => of(Quantity::Angle, units.angle, "--angle deg")?,
             JointKind::Prismatic => of(Quantity::Length, units.length, "--length mm")?,
         };
-        return Ok(unit.map(|unit| Role::Joint(joint, unit)));
+        return Ok(unit.map(|unit| ColumnRole::Joint(joint, unit)));
     }
     if let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == stem) {
-        return Ok(of(Quantity::Length, units.length, "--length mm")?.map(|unit| Role::Axis(axis, unit)));
+        return Ok(of(Quantity::Length, units.length, "--length mm")?.map(|unit| ColumnRole::Axis(axis, unit)));
     }
     if let (Some(part), None) = (["qw", "qx", "qy", "qz"].iter().position(|part| *part == stem), unit) {
-        return Ok(Some(Role::Quaternion(part)));
+        return Ok(Some(ColumnRole::Quaternion(part)));
     }
     if let Some(turn) = ["a", "b", "c"].iter().position(|turn| *turn == stem) {
-        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?.map(|unit| Role::Turn(turn, unit)));
+        return Ok(of(Quantity::Angle, units.angle, "--angle deg")?.map(|unit| ColumnRole::Turn(turn, unit)));
     }
     Ok(match (stem, unit) {
-        ("payload", Some(Unit::Kilogram)) => Some(Role::Payload),
-        ("temp" | "temperature", Some(Unit::Celsius)) => Some(Role::Temperature),
-        ("time", Some(Unit::Second)) => Some(Role::Time),
-        (_, Some(Unit::Ampere)) => numbered("i").map(|n| Role::Current(n - 1)),
-        _ => numbered("dir").map(|n| Role::Direction(n - 1)),
+        ("payload", Some(Unit::Kilogram)) => Some(ColumnRole::Payload),
+        ("temp" | "temperature", Some(Unit::Celsius)) => Some(ColumnRole::Temperature),
+        ("time", Some(Unit::Second)) => Some(ColumnRole::Time),
+        (_, Some(Unit::Ampere)) => numbered("i").map(|n| ColumnRole::Current(n - 1)),
+        _ => numbered("dir").map(|n| ColumnRole::Direction(n - 1)),
     })
 }

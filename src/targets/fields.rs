@@ -4,11 +4,11 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 /// Where a field stands, and its text without quotes.
-pub(super) type Field<'t> = (Range<usize>, Cow<'t, str>);
+pub(super) type TextField<'t> = (Range<usize>, Cow<'t, str>);
 
 /// The fields of a line. A quote opens a field only where it begins one, behind blanks at most; inside,
 /// two are one (RFC 4180). Fails where one is not closed.
-pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<Field<'_>>, String> {
+pub(super) fn fields(line: &str, delimiter: char) -> Result<Vec<TextField<'_>>, String> {
     let mut out = Vec::with_capacity(16);
     let (mut start, mut quoted, mut opened) = (0, false, 0);
     let mut chars = line.char_indices().peekable();

@@ -1,9 +1,9 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
-use super::columns::{Columns, Role};
-use super::text::Row;
+use super::columns::{ColumnRole, TargetColumns};
+use super::text::TargetRow;
 use super::{Layout, Unreached};
-use crate::compensate::{Answer, Corrector, Target};
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Result};
 use crate::raw;
 use crate::robot::description::JointKind;
@@ -25,7 +25,7 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
     let reader = raw::parquet(input, BATCH).map_err(fault)?;
     let schema = reader.schema.clone();
     let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
-    let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
+    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
     let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
     let mut unreached = Unreached::default();
@@ -35,7 +35,7 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
         let targets = targets(&batch, &columns, layout, rows)?;
         let answers = corrector.batch(targets);
         for (k, answer) in answers.iter().enumerate().filter(|(_, answer)| answer.q.is_none()) {
-            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark);
+            unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark());
         }
         let columns = answered(&batch, &columns, layout, &answers);
         let batch = RecordBatch::try_new(out_schema.clone(), columns).map_err(|error| Error::Bug(error.to_string()))?;
@@ -45,7 +45,7 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
     writer.close().map(|_| unreached).map_err(|error| Error::store("output", error.to_string()))
 }
 
-fn described(schema: &Schema, columns: &Columns, layout: &Layout, sigma: bool) -> Schema {
+fn described(schema: &Schema, columns: &TargetColumns, layout: &Layout, sigma: bool) -> Schema {
     let joint = |index: usize| columns.joints.iter().any(|(column, _)| *column == index);
     let mut fields: Vec<Arc<Field>> = Vec::new();
     for (index, field) in schema.fields().iter().enumerate() {
@@ -79,7 +79,7 @@ fn stored(kind: JointKind) -> Unit {
     if kind == JointKind::Revolute { Unit::Radian } else { Unit::Millimetre }
 }
 
-fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usize) -> Result<Vec<Target>> {
+fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before: usize) -> Result<Vec<CommandTarget>> {
     let mut numbers = Vec::new();
     for (index, role) in &columns.roles {
         let column = batch.column(*index);
@@ -90,10 +90,13 @@ fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usiz
     }
     (0..batch.num_rows())
         .map(|row| {
-            let mut taken = Row::default();
+            let mut taken = TargetRow::default();
             for (role, name, column) in &numbers {
                 let values = column.as_primitive::<Float64Type>();
-                let needed = matches!(role, Role::Joint(..) | Role::Axis(..) | Role::Quaternion(_) | Role::Turn(..));
+                let needed = matches!(
+                    role,
+                    ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
+                );
                 if !values.is_null(row) && values.value(row).is_finite() {
                     taken.take(*role, values.value(row), layout.robot.joints.len());
                 } else if needed {
@@ -106,8 +109,9 @@ fn targets(batch: &RecordBatch, columns: &Columns, layout: &Layout, before: usiz
         .collect()
 }
 
-fn answered(batch: &RecordBatch, columns: &Columns, layout: &Layout, answers: &[Answer]) -> Vec<ArrayRef> {
-    let numbers = |of: &dyn Fn(&Answer) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
+fn answered(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, answers: &[CorrectedCommand]) -> Vec<ArrayRef> {
+    let numbers =
+        |of: &dyn Fn(&CorrectedCommand) -> f64| -> ArrayRef { Arc::new(answers.iter().map(of).collect::<Float64Array>()) };
     let joint_numbers = |joint: usize, unit: Unit| -> ArrayRef {
         Arc::new(answers.iter().map(|answer| Some(unit.from_si(answer.q.as_ref()?[joint]))).collect::<Float64Array>())
     };
@@ -132,7 +136,7 @@ fn answered(batch: &RecordBatch, columns: &Columns, layout: &Layout, answers: &[
             out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.sigma) * 1e3));
             out.push(numbers(&|answer| answer.uncertainty.map_or(0.0, |known| known.u95) * 1e3));
         }
-        out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark.as_str())).collect::<StringArray>()));
+        out.push(Arc::new(answers.iter().map(|answer| Some(answer.remark())).collect::<StringArray>()));
     }
     out
 }

@@ -1,9 +1,9 @@
 //! Targets in delimited text: read in batches, every byte kept but the numbers of joints; what is known of each is appended.
 
-use super::columns::{Columns, Role};
+use super::columns::{ColumnRole, TargetColumns};
 use super::fields::fields;
 use super::{Layout, Unreached, decimal};
-use crate::compensate::{Answer, Corrector, Target, turns};
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector, turns};
 use crate::error::{Error, Fault, Result};
 use crate::robot::Bound;
 use crate::robot::description::JointKind;
@@ -47,11 +47,11 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     let cells = fields(body.trim_start_matches('\u{feff}'), delimiter)
         .map_err(|message| Error::Data(vec![Fault::new(format!("{}:{number}", layout.place), message)]))?;
     let names: Vec<String> = cells.into_iter().map(|field| field.1.into_owned()).collect();
-    let columns = Columns::read(layout.place, &names, layout.robot, layout.units)?;
+    let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let mut joints: Vec<(usize, usize, Unit)> =
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
-    let table = Sheet { layout, columns: &columns, joints, delimiter };
+    let table = TextTable { layout, columns: &columns, joints, delimiter };
     put(output, &format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())))?;
     let mut block = Block::default();
     loop {
@@ -65,7 +65,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
                 _ => Ok(unreached),
             };
         }
-        let parsed: Vec<Result<Option<(Target, Spans)>, String>> =
+        let parsed: Vec<Result<Option<(CommandTarget, Spans)>, String>> =
             lines.par_iter().map(|line| if line.trim().is_empty() { Ok(None) } else { table.target(line).map(Some) }).collect();
         let faults: Vec<Fault> = (parsed.iter().enumerate())
             .filter_map(|(k, row)| Some(Fault::new(format!("{}:{}", layout.place, first + k), row.as_ref().err()?)))
@@ -81,14 +81,14 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             spans.push(span);
         }
         let mut answers = corrector.batch(targets).into_iter();
-        let rows: Vec<(&str, Option<(Spans, Answer)>)> = lines
+        let rows: Vec<(&str, Option<(Spans, CorrectedCommand)>)> = lines
             .into_iter()
             .zip(spans)
             .map(|(line, spans)| (line, spans.and_then(|spans| Some((spans, answers.next()?)))))
             .collect();
         for (k, answer) in rows.iter().enumerate().filter_map(|(k, (_, answered))| Some((k, &answered.as_ref()?.1))) {
             if answer.q.is_none() {
-                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark);
+                unreached.push(|| format!("{}:{}", layout.place, first + k), &answer.remark());
             }
         }
         let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
@@ -179,15 +179,15 @@ struct Spans {
     comma: bool,
 }
 
-struct Sheet<'a> {
+struct TextTable<'a> {
     layout: &'a Layout<'a>,
-    columns: &'a Columns,
+    columns: &'a TargetColumns,
     /// Column, joint, unit; in the order of the columns.
     joints: Vec<(usize, usize, Unit)>,
     delimiter: char,
 }
 
-impl Sheet<'_> {
+impl TextTable<'_> {
     /// Header of what is appended, with its delimiters.
     fn appended_names(&self, sigma: bool) -> String {
         let mut names = Vec::new();
@@ -209,7 +209,7 @@ impl Sheet<'_> {
         names.iter().map(|name| format!("{}{name}", self.delimiter)).collect()
     }
 
-    fn target(&self, line: &str) -> Result<(Target, Spans), String> {
+    fn target(&self, line: &str) -> Result<(CommandTarget, Spans), String> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
         if cells.len() != self.columns.count {
@@ -220,11 +220,14 @@ impl Sheet<'_> {
             parse(text, self.delimiter)
                 .map_err(|()| format!("column {}: field {} is `{text}`, no number", range.start + 1, index + 1))
         };
-        let mut row = Row::default();
+        let mut row = TargetRow::default();
         for (index, role) in &self.columns.roles {
             if let Some(value) = number(*index)? {
                 row.take(*role, value, self.layout.robot.joints.len());
-            } else if matches!(role, Role::Joint(..) | Role::Axis(..) | Role::Quaternion(_) | Role::Turn(..)) {
+            } else if matches!(
+                role,
+                ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
+            ) {
                 return Err(format!("column {} is empty", cells[*index].0.start + 1));
             }
         }
@@ -234,7 +237,7 @@ impl Sheet<'_> {
     }
 
     /// Lines with their targets' results; lines without one as they are.
-    fn lines(&self, rows: &[(&str, Option<(Spans, Answer)>)]) -> String {
+    fn lines(&self, rows: &[(&str, Option<(Spans, CorrectedCommand)>)]) -> String {
         let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
         for (line, answered) in rows {
             match answered {
@@ -245,7 +248,7 @@ impl Sheet<'_> {
         out
     }
 
-    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &Answer) {
+    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &CorrectedCommand) {
         let (body, ending) = split_ending(line);
         let point = if spans.comma { ',' } else { '.' };
         let mut at = 0;
@@ -277,9 +280,10 @@ impl Sheet<'_> {
                 append(Some(known.sigma * 1e3), 4);
                 append(Some(known.u95 * 1e3), 4);
             }
-            let quote = if answer.remark.contains(self.delimiter) { "\"" } else { "" };
+            let remark = answer.remark();
+            let quote = if remark.contains(self.delimiter) { "\"" } else { "" };
             out.push(self.delimiter);
-            out.extend([quote, &answer.remark, quote]);
+            out.extend([quote, &remark, quote]);
         }
         out.push_str(ending);
     }
@@ -315,31 +319,31 @@ fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
 
 /// The numbers of one row, by what they mean.
 #[derive(Default)]
-pub(super) struct Row {
-    target: Target,
+pub(super) struct TargetRow {
+    target: CommandTarget,
     point: [f64; 3],
     quaternion: [f64; 4],
     turns: [f64; 3],
 }
 
-impl Row {
-    pub fn take(&mut self, role: Role, value: f64, joints: usize) {
+impl TargetRow {
+    pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
         let put =
             |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value;
         match role {
-            Role::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
-            Role::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
-            Role::Quaternion(part) => self.quaternion[part] = value,
-            Role::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
-            Role::Payload => self.target.payload = Some(value),
-            Role::Temperature => self.target.temperature = Some(value),
-            Role::Time => self.target.time = Some(value),
-            Role::Direction(joint) => put(&mut self.target.direction, joint, value),
-            Role::Current(joint) => put(&mut self.target.current, joint, value),
+            ColumnRole::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
+            ColumnRole::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
+            ColumnRole::Quaternion(part) => self.quaternion[part] = value,
+            ColumnRole::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
+            ColumnRole::Payload => self.target.payload = Some(value),
+            ColumnRole::Temperature => self.target.temperature = Some(value),
+            ColumnRole::Time => self.target.time = Some(value),
+            ColumnRole::Direction(joint) => put(&mut self.target.direction, joint, value),
+            ColumnRole::Current(joint) => put(&mut self.target.current, joint, value),
         }
     }
 
-    pub fn target(mut self, columns: &Columns, cartesian: bool) -> Result<Target, String> {
+    pub fn target(mut self, columns: &TargetColumns, cartesian: bool) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
         let joints =
             joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));

@@ -16,7 +16,7 @@ pub enum Mark {
 
 #[derive(Debug, Clone)]
 pub struct Node {
-    pub value: Value,
+    pub value: YamlValue,
     pub mark: Mark,
     /// A number or boolean as it was spelt, for where text is wanted.
     pub raw: Option<String>,
@@ -26,7 +26,7 @@ pub struct Node {
 }
 
 #[derive(Debug, Clone)]
-pub enum Value {
+pub enum YamlValue {
     Null,
     Bool(bool),
     Integer(i128),
@@ -38,49 +38,49 @@ pub enum Value {
 }
 
 impl Node {
-    pub fn new(value: Value, mark: Mark) -> Self {
+    pub fn new(value: YamlValue, mark: Mark) -> Self {
         Self { value, mark, raw: None, overridden: false, bytes: None }
     }
-    pub(super) fn parsed(value: Value, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
+    pub(super) fn parsed(value: YamlValue, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
         Self { value, mark, raw: None, overridden: false, bytes }
     }
     pub fn empty_map(mark: Mark) -> Self {
-        Self::new(Value::Map(Vec::new()), mark)
+        Self::new(YamlValue::Map(Vec::new()), mark)
     }
 
     /// Remembers how numbers and booleans were spelt.
     pub(super) fn fill_raw(&mut self, text: &str) {
         let bytes = self.bytes.take();
         match &mut self.value {
-            Value::Bool(_) | Value::Integer(_) | Value::Float(_) => {
+            YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_) => {
                 self.raw = bytes.and_then(|(start, length)| {
                     let start = usize::try_from(start).ok()?;
                     let end = start.checked_add(usize::try_from(length).ok()?)?;
                     text.get(start..end).map(|raw| raw.trim().to_string())
                 });
             }
-            Value::List(items) => items.iter_mut().for_each(|item| item.fill_raw(text)),
-            Value::Map(entries) => entries.iter_mut().for_each(|(_, _, value)| value.fill_raw(text)),
-            Value::Null | Value::Text(_) => {}
+            YamlValue::List(items) => items.iter_mut().for_each(|item| item.fill_raw(text)),
+            YamlValue::Map(entries) => entries.iter_mut().for_each(|(_, _, value)| value.fill_raw(text)),
+            YamlValue::Null | YamlValue::Text(_) => {}
         }
     }
 
     /// A scalar as text, as it was spelt; nothing for lists, blocks and null.
     pub fn text(&self) -> Option<String> {
         match &self.value {
-            Value::Text(text) => Some(text.clone()),
-            Value::Bool(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            Value::Integer(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            Value::Float(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
-            Value::Null | Value::List(_) | Value::Map(_) => None,
+            YamlValue::Text(text) => Some(text.clone()),
+            YamlValue::Bool(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            YamlValue::Integer(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            YamlValue::Float(value) => Some(self.raw.clone().unwrap_or_else(|| value.to_string())),
+            YamlValue::Null | YamlValue::List(_) | YamlValue::Map(_) => None,
         }
     }
 
     pub fn entries(&self) -> &[(String, Mark, Node)] {
-        if let Value::Map(entries) = &self.value { entries } else { &[] }
+        if let YamlValue::Map(entries) = &self.value { entries } else { &[] }
     }
     pub fn items(&self) -> &[Node] {
-        if let Value::List(items) = &self.value { items } else { &[] }
+        if let YamlValue::List(items) = &self.value { items } else { &[] }
     }
     pub fn get(&self, key: &str) -> Option<&Node> {
         self.entries().iter().find(|(name, _, _)| name == key).map(|(_, _, node)| node)
@@ -92,8 +92,10 @@ impl Node {
             return Some(self);
         }
         match &self.value {
-            Value::Map(entries) => entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest))),
-            Value::List(items) => {
+            YamlValue::Map(entries) => {
+                entries.iter().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at(rest)))
+            }
+            YamlValue::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get(index)?.at(rest)
             }
@@ -105,10 +107,10 @@ impl Node {
             return Some(self);
         }
         match &mut self.value {
-            Value::Map(entries) => {
+            YamlValue::Map(entries) => {
                 entries.iter_mut().find_map(|(key, _, node)| rest_after(path, key).and_then(|rest| node.at_mut(rest)))
             }
-            Value::List(items) => {
+            YamlValue::List(items) => {
                 let (index, rest) = split_index(path)?;
                 items.get_mut(index)?.at_mut(rest)
             }
@@ -135,24 +137,24 @@ impl Node {
             *place = node;
             return Ok(());
         }
-        if matches!(self.value, Value::Null) {
-            self.value = Value::Map(Vec::new());
+        if matches!(self.value, YamlValue::Null) {
+            self.value = YamlValue::Map(Vec::new());
         }
         match &mut self.value {
-            Value::Map(entries) => {
+            YamlValue::Map(entries) => {
                 for (key, _, child) in entries.iter_mut() {
                     if let Some(rest) = rest_after(path, key) {
                         return child.put(rest, node);
                     }
                 }
                 let (key, rest) = split_key(path);
-                let mut child = Node::new(Value::Null, node.mark);
+                let mut child = Node::new(YamlValue::Null, node.mark);
                 let mark = node.mark;
                 child.put(rest, node)?;
                 entries.push((key.into(), mark, child));
                 Ok(())
             }
-            Value::List(items) => {
+            YamlValue::List(items) => {
                 let (index, rest) = split_index(path).ok_or_else(|| format!("`{path}` is no index of a list"))?;
                 if index > items.len() {
                     return Err(format!(
@@ -161,7 +163,7 @@ impl Node {
                     ));
                 }
                 if index == items.len() {
-                    items.push(Node::new(Value::Null, node.mark));
+                    items.push(Node::new(YamlValue::Null, node.mark));
                 }
                 items[index].put(rest, node)
             }
@@ -172,7 +174,7 @@ impl Node {
     /// Takes the map entry out that holds the path; false where there is none.
     pub(super) fn remove(&mut self, path: &str) -> bool {
         match &mut self.value {
-            Value::Map(entries) => {
+            YamlValue::Map(entries) => {
                 let Some(index) = entries.iter().position(|(key, _, _)| rest_after(path, key).is_some()) else { return false };
                 let rest = rest_after(path, &entries[index].0).unwrap_or_default().to_string();
                 // The innermost entry that can go, so that the siblings are still looked at.
@@ -181,7 +183,7 @@ impl Node {
                 }
                 true
             }
-            Value::List(items) => match split_index(path) {
+            YamlValue::List(items) => match split_index(path) {
                 Some((index, rest)) => items.get_mut(index).is_some_and(|item| item.remove(rest)),
                 None => false,
             },
@@ -193,12 +195,12 @@ impl Node {
     pub fn walk(&self, path: &str, visit: &mut dyn FnMut(&str, &Node)) {
         visit(path, self);
         match &self.value {
-            Value::List(items) => {
+            YamlValue::List(items) => {
                 for (index, item) in items.iter().enumerate() {
                     item.walk(&format!("{path}[{index}]"), visit);
                 }
             }
-            Value::Map(entries) => {
+            YamlValue::Map(entries) => {
                 for (key, _, value) in entries {
                     value.walk(&join(path, key), visit);
                 }
@@ -209,12 +211,12 @@ impl Node {
     pub fn walk_mut(&mut self, path: &str, visit: &mut dyn FnMut(&str, &mut Node)) {
         visit(path, self);
         match &mut self.value {
-            Value::List(items) => {
+            YamlValue::List(items) => {
                 for (index, item) in items.iter_mut().enumerate() {
                     item.walk_mut(&format!("{path}[{index}]"), visit);
                 }
             }
-            Value::Map(entries) => {
+            YamlValue::Map(entries) => {
                 for (key, _, value) in entries {
                     value.walk_mut(&join(path, key), visit);
                 }

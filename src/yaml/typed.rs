@@ -1,7 +1,7 @@
 //! Trees as typed values: the serde deserializer over [`Node`].
 
 use super::trouble::Clue;
-use super::{Mark, Node, Trouble, Value};
+use super::{Mark, Node, Trouble, YamlValue};
 use serde::de::value::StrDeserializer;
 use serde::de::{
     self, DeserializeOwned, DeserializeSeed, Deserializer, EnumAccess, IntoDeserializer, MapAccess, SeqAccess, Unexpected,
@@ -46,7 +46,9 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
     let mut candidates: Vec<(String, Mark)> = Vec::new();
     block.walk(&trouble.path, &mut |path, node| match &clue {
         Clue::Expected(_) => candidates.push((path.into(), node.mark)),
-        Clue::Word(word) if matches!(&node.value, Value::Text(text) if text == word) => candidates.push((path.into(), node.mark)),
+        Clue::Word(word) if matches!(&node.value, YamlValue::Text(text) if text == word) => {
+            candidates.push((path.into(), node.mark))
+        }
         Clue::Key(key) => {
             let entry = node.entries().iter().find(|(name, _, _)| name == key);
             candidates.extend(entry.map(|(name, mark, _)| (super::path::join(path, name), *mark)));
@@ -57,7 +59,7 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
         let mut bent = root.clone();
         let Some(place) = bent.at_mut(path) else { return false };
         // Of the two, one is another value than what stands there.
-        place.value = if matches!(place.value, Value::Null) { Value::Bool(true) } else { Value::Null };
+        place.value = if matches!(place.value, YamlValue::Null) { YamlValue::Bool(true) } else { YamlValue::Null };
         T::deserialize(&bent).is_err_and(|other| other.clue == trouble.clue && other.message != trouble.message)
     };
     let found = match clue {
@@ -73,13 +75,13 @@ fn locate<T: DeserializeOwned>(trouble: Trouble, root: &Node) -> Trouble {
 impl Node {
     fn unexpected(&self) -> Unexpected<'_> {
         match &self.value {
-            Value::Null => Unexpected::Unit,
-            Value::Bool(value) => Unexpected::Bool(*value),
-            Value::Integer(_) => Unexpected::Other("a number"),
-            Value::Float(value) => Unexpected::Float(*value),
-            Value::Text(text) => Unexpected::Str(text),
-            Value::List(_) => Unexpected::Seq,
-            Value::Map(_) => Unexpected::Map,
+            YamlValue::Null => Unexpected::Unit,
+            YamlValue::Bool(value) => Unexpected::Bool(*value),
+            YamlValue::Integer(_) => Unexpected::Other("a number"),
+            YamlValue::Float(value) => Unexpected::Float(*value),
+            YamlValue::Text(text) => Unexpected::Str(text),
+            YamlValue::List(_) => Unexpected::Seq,
+            YamlValue::Map(_) => Unexpected::Map,
         }
     }
 }
@@ -92,26 +94,26 @@ impl<'de> Deserializer<'de> for &'de Node {
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Trouble> {
         let result = match &self.value {
-            Value::Null => visitor.visit_unit(),
-            Value::Bool(value) => visitor.visit_bool(*value),
-            Value::Integer(value) => match (u64::try_from(*value), i64::try_from(*value)) {
+            YamlValue::Null => visitor.visit_unit(),
+            YamlValue::Bool(value) => visitor.visit_bool(*value),
+            YamlValue::Integer(value) => match (u64::try_from(*value), i64::try_from(*value)) {
                 (Ok(value), _) => visitor.visit_u64(value),
                 (_, Ok(value)) => visitor.visit_i64(value),
                 _ => visitor.visit_i128(*value),
             },
-            Value::Float(value) if value.is_finite() && value.abs() > LARGEST => {
+            YamlValue::Float(value) if value.is_finite() && value.abs() > LARGEST => {
                 Err(Trouble::new(format!("{value:e} is no quantity of a cell; expected at most {LARGEST:e}")))
             }
-            Value::Float(value) => visitor.visit_f64(*value),
-            Value::Text(text) => visitor.visit_borrowed_str(text),
-            Value::List(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
-            Value::Map(entries) => visitor.visit_map(Entries { entries: entries.iter(), value: None }),
+            YamlValue::Float(value) => visitor.visit_f64(*value),
+            YamlValue::Text(text) => visitor.visit_borrowed_str(text),
+            YamlValue::List(items) => visitor.visit_seq(Items { items: items.iter().enumerate() }),
+            YamlValue::Map(entries) => visitor.visit_map(Entries { entries: entries.iter(), value: None }),
         };
         result.map_err(|trouble| trouble.at(self.mark))
     }
     fn deserialize_str<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Trouble> {
         match (&self.value, &self.raw) {
-            (Value::Bool(_) | Value::Integer(_) | Value::Float(_), Some(raw)) => {
+            (YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_), Some(raw)) => {
                 visitor.visit_borrowed_str(raw).map_err(|trouble: Trouble| trouble.at(self.mark))
             }
             _ => self.deserialize_any(visitor),
@@ -121,7 +123,7 @@ impl<'de> Deserializer<'de> for &'de Node {
         self.deserialize_str(visitor)
     }
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Trouble> {
-        if matches!(self.value, Value::Null) { visitor.visit_none() } else { visitor.visit_some(self) }
+        if matches!(self.value, YamlValue::Null) { visitor.visit_none() } else { visitor.visit_some(self) }
     }
     fn deserialize_newtype_struct<V: Visitor<'de>>(self, _name: &'static str, visitor: V) -> Result<V::Value, Trouble> {
         visitor.visit_newtype_struct(self)
@@ -133,8 +135,8 @@ impl<'de> Deserializer<'de> for &'de Node {
         visitor: V,
     ) -> Result<V::Value, Trouble> {
         let result = match &self.value {
-            Value::Text(text) => visitor.visit_enum(StrDeserializer::new(text)),
-            Value::Map(entries) => match entries.as_slice() {
+            YamlValue::Text(text) => visitor.visit_enum(StrDeserializer::new(text)),
+            YamlValue::Map(entries) => match entries.as_slice() {
                 [(key, mark, node)] => visitor.visit_enum(Variant { key, mark: *mark, node }),
                 _ => Err(Trouble::new(format!("expected one of: {}", variants.join(", ")))),
             },
@@ -202,7 +204,7 @@ impl<'de> VariantAccess<'de> for Variant<'de> {
     type Error = Trouble;
     fn unit_variant(self) -> Result<(), Trouble> {
         match self.node.value {
-            Value::Null => Ok(()),
+            YamlValue::Null => Ok(()),
             _ => Err(Trouble::new(format!("`{}` takes no settings of its own", self.key)).at(self.node.mark).below(self.key)),
         }
     }

@@ -3,8 +3,8 @@
 use crate::problem::Case;
 use calib::robot::Instrument;
 use calib::store::key::{KEY_FORMAT, StageKey};
-use calib::store::{Account, Product, Store};
-use calib::table::{Beside, Fit, Observability, Parameters, Recording, Table};
+use calib::store::{Account, PendingTable, Store};
+use calib::table::{Fit, FitContext, Observability, Parameters, Recording, Table};
 use std::collections::BTreeMap;
 
 /// Points of each robot.
@@ -17,7 +17,7 @@ pub fn fleet(robots: usize) -> calib::error::Result<()> {
     let mut recordings = Vec::new();
     for robot in 0..robots {
         let case = Case::simulated_as(ROWS, robot as u64);
-        let product = Product::Frame(recording(&case).to_frame()?);
+        let product = PendingTable::Frame(recording(&case).to_frame()?);
         let published = store.publish(&key("simulate", robot), vec![("recording".into(), product)], Account::default())?;
         recordings.push(published.record.tables["recording"].clone());
     }
@@ -31,9 +31,12 @@ pub fn fleet(robots: usize) -> calib::error::Result<()> {
         let (model, fitted) = case.fit();
         let clock = add(&mut spent, "2 fit", clock);
         let products = vec![
-            ("parameters".to_string(), Product::Frame(Parameters::of("identify", &model, &fitted, &[], None).to_frame()?)),
-            ("fit".to_string(), Product::Frame(Fit::of("identify", &fitted).to_frame()?)),
-            ("observability".to_string(), Product::Frame(Observability::of("identify", &fitted, &Beside::default()).to_frame()?)),
+            ("parameters".to_string(), PendingTable::Frame(Parameters::of("identify", &model, &fitted, &[], None).to_frame()?)),
+            ("fit".to_string(), PendingTable::Frame(Fit::of("identify", &fitted).to_frame()?)),
+            (
+                "observability".to_string(),
+                PendingTable::Frame(Observability::of("identify", &fitted, &FitContext::default()).to_frame()?),
+            ),
         ];
         let clock = add(&mut spent, "3 tables", clock);
         store.publish(&key("identify", robot), products, Account::default())?;

@@ -1,7 +1,7 @@
 //! What the benches fit: a robot, its recording, and which of its rows.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, identified};
+use calib::effect::{EffectContext, EffectStack, Load, identified};
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::robot::{Measurements, RobotModel};
@@ -106,15 +106,14 @@ impl Case {
 
     /// The whole identification: alignment, visibility, fit, uncertainty.
     pub fn fit(&self) -> (Model, Fitted) {
-        let mut model = model(&self.robot, align(&self.robot, &self.data, &self.rows), &self.effects);
+        let model = model(&self.robot, align(&self.robot, &self.data, &self.rows), &self.effects);
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        let fitted = fit(&mut model, &self.data, &FitOptions { rows: &self.rows, candidates: &candidates });
-        (model, fitted)
+        fit(&model, &self.data, &FitOptions { rows: &self.rows, candidates: &candidates })
     }
 }
 
 fn model(robot: &RobotModel, base: Pose, effects: &[String]) -> Model {
-    let setting = Setting { base, load: Load::GravityTorque };
+    let setting = EffectContext { base, load: Load::GravityTorque };
     let chosen = identified().filter(|cause| effects.iter().any(|name| name == cause.name()));
     Model::nominal(robot.clone(), EffectStack::new(robot, base, chosen.filter_map(|cause| cause.whole(&setting)).collect()))
 }

@@ -1,8 +1,8 @@
 //! Table 2 of Wang et al. (2020) with times: success, evaluations and wall time to the target beside the paper's, and in ten
 //! dimensions, of which a network has more.
 
-use calib::estimate::swarm::{Algorithm, Landscape, Stop};
-use calib::stage::{Optimise, Problem};
+use calib::estimate::swarm::{Algorithm, Landscape, SearchStop};
+use calib::stage::{BenchmarkProblem, Optimise};
 use std::time::Instant;
 
 /// The paper's times to the target, s; none for its own method.
@@ -14,11 +14,11 @@ pub fn table() {
     let stage = Optimise::default();
     compare(&stage, &stage.problems[0], stage.seeds, &PUBLISHED);
     for function in [Landscape::Rastrigin, Landscape::Rosenbrock, Landscape::Ackley, Landscape::Michalewicz] {
-        compare(&stage, &Problem { function, dimensions: 10, tolerance: 1e-2 }, 30, &[]);
+        compare(&stage, &BenchmarkProblem { function, dimensions: 10, tolerance: 1e-2 }, 30, &[]);
     }
 }
 
-fn compare(stage: &Optimise, problem: &Problem, seeds: usize, published: &[(Algorithm, f64)]) {
+fn compare(stage: &Optimise, problem: &BenchmarkProblem, seeds: usize, published: &[(Algorithm, f64)]) {
     println!(
         "{}-D {}, absolute error {:e}, {seeds} seeds, at most {} evaluations, one core",
         problem.dimensions,
@@ -38,7 +38,7 @@ fn compare(stage: &Optimise, problem: &Problem, seeds: usize, published: &[(Algo
             let outcome = stage.search(problem, method, seed);
             let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
             errors.push((outcome.value - minimum).max(0.0));
-            if outcome.stop == Stop::Target {
+            if outcome.stop == SearchStop::Target {
                 times.push(milliseconds);
                 evaluations.push(outcome.evaluations as f64);
             }

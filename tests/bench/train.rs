@@ -1,9 +1,9 @@
 //! The network of Wang et al. (2020), trained on rows from a file: seconds, losses and parameters as JSON.
 
 use calib::estimate::network::descent::{Descent, descend};
-use calib::estimate::network::loss::{Batch, Loss, Scratch};
-use calib::estimate::network::{Activation, OUTPUTS, Shape};
-use calib::estimate::swarm::{Algorithm, Bounds, Budget, Outcome};
+use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
+use calib::estimate::network::{Activation, LayerSizes, OUTPUTS};
+use calib::estimate::swarm::{Algorithm, Budget, SearchBox, SwarmResult};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -21,18 +21,18 @@ pub fn train(file: &str) {
     let count = |name: &str| problem[name].as_u64().expect("a whole number") as usize;
     let x: Vec<Vec<f64>> = rows(&problem["x"]);
     let y: Vec<[f64; OUTPUTS]> = rows(&problem["y"]).into_iter().map(|row| row.try_into().expect("three targets")).collect();
-    let shape = Shape { inputs: x[0].len(), hidden: count("hidden"), outputs: OUTPUTS, activation: Activation::Sigmoid };
+    let shape = LayerSizes { inputs: x[0].len(), hidden: count("hidden"), outputs: OUTPUTS, activation: Activation::Sigmoid };
     let batch = Batch::new(&x, &y);
     let loss = Loss { shape, batch: &batch, decay: problem["decay"].as_f64().expect("a number") };
-    let search = |seed: u64| -> Outcome {
+    let search = |seed: u64| -> SwarmResult {
         let budget = Budget { generations: count("generations"), evaluations: None, target: None, seed, jobs: 1 };
-        let bounds = Bounds::cube(shape.parameters(), -1.0, 1.0);
+        let bounds = SearchBox::cube(shape.parameters(), -1.0, 1.0);
         Algorithm::Bso.minimise(count("beetles"), &loss, &bounds, &budget, |_, _| {})
     };
     let swarm = least(RUNS, || drop(search(1)));
     let found: Vec<f64> = (1..=count("seeds") as u64).map(|seed| search(seed).value).collect();
 
-    let mut scratch = Scratch::new(shape);
+    let mut scratch = LossBuffers::new(shape);
     let mut descent = |start: &[f64], iterations: usize| -> Descent {
         descend(|x, gradient| loss.gradient(x, gradient, &mut scratch), |_| None, start.to_vec(), iterations)
     };

@@ -4,7 +4,7 @@ mod standing;
 mod true_error;
 mod within;
 
-use calib::compensate::{Chain, Nominal, SETTLED, Wanted, inverse, least_change};
+use calib::compensate::{Chain, Nominal, SETTLED, ToolGoal, inverse, least_change};
 use calib::robot::RobotModel;
 use calib::twin::conceal::robots::Kind;
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
     let robot = RobotModel::new(Kind::Sr210d.description([0.0; 3]));
     let q = [0.3, 0.2, -0.4, 0.5, 0.8, -1.0];
-    let wanted = Wanted { pose: robot.forward(&q), oriented: true };
+    let wanted = ToolGoal { pose: robot.forward(&q), oriented: true };
     let found = inverse(&robot, &wanted, &[0.0; 6]);
     let placed = Nominal::new(&robot).place(&found);
     assert!((placed.translation - wanted.pose.translation).norm() < 1e-9);
@@ -31,7 +31,7 @@ fn a_cartesian_pose_is_found_and_reached_within_the_limits() {
 fn a_redundant_arm_moves_its_joints_no_more_than_needed() {
     let robot = RobotModel::new(Kind::Seven7r.description([60.0, 0.0, 20.0]));
     let home = [0.4, 0.7, -0.3, 1.0, 0.2, 0.6, -0.5];
-    let mut wanted = Wanted { pose: robot.forward(&home), oriented: false };
+    let mut wanted = ToolGoal { pose: robot.forward(&home), oriented: false };
     wanted.pose.translation += Vector3::new(3e-3, -2e-3, 4e-3);
     let mut chain = Nominal::new(&robot);
     let found = least_change(&mut chain, &wanted, &home, &home);
@@ -186,8 +186,8 @@ fn what_is_known_of_a_target_stands_behind_it() {
 #[test]
 fn joints_and_the_pose_they_stand_for_are_corrected_alike() {
     let joints = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,25,40,10\n";
-    let robot =
-        calib::robot::import::read_calib(calib::robot::import::Text { label: "robot.yaml", text: ROBOT }, None).expect("a robot");
+    let robot = calib::robot::import::read_calib(calib::robot::import::RobotFileText { label: "robot.yaml", text: ROBOT }, None)
+        .expect("a robot");
     let q = [10.0f64, 20.0, -30.0, 25.0, 40.0, 10.0].map(f64::to_radians);
     let pose = RobotModel::new(robot.robot).forward(&q);
     let [x, y, z]: [f64; 3] = (pose.translation * 1e3).into();

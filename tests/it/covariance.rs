@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
-use calib::compensate::{Arm, Circumstance, Scatter, Uncertainty};
+use calib::compensate::{Circumstance, IdentifiedArm, Scatter, Uncertainty};
 use calib::effect::Load;
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
 use calib::robot::Measurements;
@@ -10,10 +10,9 @@ use calib::table::{CovarianceTable, Parameters, Table};
 
 fn fitted(data: &Measurements, robot: &calib::robot::RobotModel) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let mut model = model(robot, align(robot, data, &rows), &GEOMETRY);
+    let model = model(robot, align(robot, data, &rows), &GEOMETRY);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
 }
 
 #[test]
@@ -49,7 +48,7 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
     let read = parameters.model(truth.robot.clone(), &[], Load::GravityTorque).expect("a model");
     let covariance = CovarianceTable::of(&model, &fitted, None).of_model(&read).expect("a covariance");
     let want = fitted.covariance.as_ref().expect("a covariance").of_predictions(&model, &data);
-    let arm = Arm::new(read, None);
+    let arm = IdentifiedArm::new(read, None);
     let uncertainty = Uncertainty::new(&arm, covariance, Scatter::default());
     let mut reach = arm.reach();
     for (row, want) in want.iter().enumerate() {
@@ -62,11 +61,11 @@ fn a_stored_covariance_says_of_every_point_what_the_fit_said() {
 #[test]
 fn what_an_earlier_step_estimated_stays_in_the_table_of_a_later_one() {
     let (data, truth) = recording(&fixture::spherical(), &GEOMETRY, 60, 5);
-    let (mut model, fitted) = fitted(&data, &truth.robot);
+    let (model, fitted) = fitted(&data, &truth.robot);
     let first = CovarianceTable::of(&model, &fitted, None);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let joints: Vec<usize> = (0..model.x.len()).filter(|k| model.stack.specs()[*k].name.starts_with("joint_offset")).collect();
-    let again = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &joints });
+    let (model, again) = fit(&model, &data, &FitOptions { rows: &rows, candidates: &joints });
     let second = CovarianceTable::of(&model, &again, Some(&first));
     let is_offset = |name: &str| name.starts_with("joint_offset");
     let mixed = |table: &CovarianceTable| table.0.iter().filter(|row| is_offset(&row.parameter) != is_offset(&row.other)).count();

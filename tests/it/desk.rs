@@ -1,7 +1,7 @@
 //! A stand-in for the engine: runs a stage on files in memory and keeps what it writes.
 
 use calib::error::{Error, Result};
-use calib::stage::{Context, Output, RawFile, Services, Sink, Source, Stage, Streamed, Writes};
+use calib::stage::{Context, OpenedInput, Output, RawFile, Services, Sink, Stage, Streamed, Writes};
 use calib::store::frame::Frame;
 use calib::table::Table;
 use std::collections::BTreeMap;
@@ -68,14 +68,14 @@ impl Sink for Keep {
 }
 
 impl Services for Desk {
-    fn open(&self, file: &RawFile) -> Result<Source> {
+    fn open(&self, file: &RawFile) -> Result<OpenedInput> {
         let label = file.0.display().to_string();
         if let Some(content) = self.files.get(&file.0) {
             let reader = Box::new(std::io::Cursor::new(content.clone()));
-            return Ok(Source { label, reader, size: Some(content.len() as u64) });
+            return Ok(OpenedInput { label, reader, size: Some(content.len() as u64) });
         }
         let reader = std::fs::File::open(&file.0).map_err(|error| Error::data(&label, error.to_string()))?;
-        Ok(Source { label, reader: Box::new(reader), size: None })
+        Ok(OpenedInput { label, reader: Box::new(reader), size: None })
     }
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>> {
         Ok(Box::new(Keep { kind, rows: 0, frames: Vec::new(), chunks: self.chunks.clone() }))

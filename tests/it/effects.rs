@@ -1,14 +1,14 @@
 //! The laws that every effect obeys: zero parameters are the nominal robot, partials are derivatives, order is irrelevant.
 
 use crate::fixture;
-use calib::effect::{Effect, EffectStack, Load, ParameterSpec, Setting, identified};
+use calib::effect::{Effect, EffectContext, EffectStack, Load, ParameterSpec, identified};
 use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
 use calib::units::Unit;
 use nalgebra::Vector3;
 
-fn setting(load: Load) -> Setting {
-    Setting { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load }
+fn setting(load: Load) -> EffectContext {
+    EffectContext { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load }
 }
 
 fn data(robot: &RobotModel, rows: usize) -> Measurements {

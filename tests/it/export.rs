@@ -2,7 +2,7 @@
 
 use crate::compensate::{calib, cell};
 use calib::robot::RobotModel;
-use calib::robot::import::{Text, read_calib};
+use calib::robot::import::{RobotFileText, read_calib};
 use serde_json::Value;
 
 fn exported(format: &str) -> String {
@@ -32,9 +32,9 @@ fn tables_and_urdf_are_the_arm_that_was_identified() {
     let model: Value = serde_json::from_str(&exported("json")).expect("JSON");
     let urdf = exported("urdf");
     let beside = "calib_robot: 1\nname: u\nunits: {length: mm, angle: deg}\nkinematics:\n  urdf: {base: base_link, tip: tool0}\n";
-    let label = |text| Text { label: "robot.yaml", text };
+    let label = |text| RobotFileText { label: "robot.yaml", text };
     let robots = [
-        read_calib(label(beside), Some(Text { label: "arm.urdf", text: &urdf })).expect("a URDF"),
+        read_calib(label(beside), Some(RobotFileText { label: "arm.urdf", text: &urdf })).expect("a URDF"),
         read_calib(label(&exported("dh")), None).expect("a DH table"),
         read_calib(label(&exported("mdh")), None).expect("a modified DH table"),
     ];

@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{FitOptions, Fitted, Folds, Model, align, cross_validate, fit};
+use calib::estimate::{FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
@@ -12,16 +12,15 @@ use calib::table::{Observability, Prediction, Statistics};
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let robot = RobotModel::new(fixture::offset_wrist());
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let mut model = model(&robot, align(&robot, data, &rows), effects);
+    let model = model(&robot, align(&robot, data, &rows), effects);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
 }
 
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
     let (model, fitted) = identify(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    cross_validate(&model, data, &rows, &fitted, count, 7)
+    cross_validate(&Session { data, rows: &rows, model: &model, fitted: &fitted }, count, 7)
 }
 
 fn rms(errors: &[f64]) -> f64 {
@@ -62,9 +61,9 @@ fn a_fold_is_what_a_fit_without_its_rows_says() {
         let mut differences = Vec::new();
         for block in 0..5 {
             let kept: Vec<usize> = (0..80).filter(|row| row / 16 != block).collect();
-            let mut model = model(&robot, align(&robot, &data, &kept), &effects);
-            let candidates: Vec<usize> = (0..model.x.len()).collect();
-            fit(&mut model, &data, &FitOptions { rows: &kept, candidates: &candidates });
+            let start = model(&robot, align(&robot, &data, &kept), &effects);
+            let candidates: Vec<usize> = (0..start.x.len()).collect();
+            let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
             let predicted = model.predict(&data);
             differences
                 .extend((16 * block..16 * (block + 1)).map(|row| found[row] - (data.position[row] - predicted[row]).norm()));

@@ -2,7 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectStack, Form, Hypothesis, Load, ParameterEstimate, ParameterSpec, Place, Setting, Summary,
+    CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, ParameterSpec, Place, Summary,
     Survey, cause, hypotheses, people, whole,
 };
 use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
@@ -58,8 +58,8 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
     out
 }
 
-fn setting() -> Setting {
-    Setting { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
+fn setting() -> EffectContext {
+    EffectContext { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
 }
 
 /// Runs `law` on every hypothesis of every fixture arm; returns how many there were.
@@ -221,7 +221,7 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
 
 fn numbers_of(form: &Form, robot: &RobotModel) -> Vec<ParameterEstimate> {
     let estimate =
-        |spec: ParameterSpec| ParameterEstimate { name: spec.name, value: 1.5, unit: people(spec.unit).1, sigma: None };
+        |spec: ParameterSpec| ParameterEstimate { name: spec.name, form: 0, value: 1.5, unit: people(spec.unit).1, sigma: None };
     form.parameters(robot).into_iter().map(estimate).collect()
 }
 

@@ -8,7 +8,7 @@ use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::description::RobotDescription;
-use calib::robot::{Gauging, Measurements, Named, Readings, RobotModel, Target};
+use calib::robot::{MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -33,9 +33,9 @@ impl Cell {
             seat: Pose::new(home.rotation, home.point(&(Vector3::from(*offset) * 1e-3))),
             oriented: false,
         };
-        let gauging = Gauging { targets: targets.iter().map(target).collect(), anchors: Vec::new() };
+        let setup = MeasurementSetup { targets: targets.iter().map(target).collect(), anchors: Vec::new() };
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.05, -0.1, 2.2));
-        let mut truth = model(&robot.measured_by(gauging), base, &GEOMETRY);
+        let mut truth = model(&robot.measured_by(setup), base, &GEOMETRY);
         for (k, spec) in truth.stack.specs().to_vec().iter().enumerate() {
             if !spec.name.starts_with("base_frame") && !spec.name.starts_with("tool_offset") {
                 truth.x[k] = 5e-4 * normal(1000 * seed + k);
@@ -53,7 +53,7 @@ impl Cell {
         let all = fixture::poses(&self.description, poses * (part + 1));
         let joints = self.description.joints.len();
         let q = &all[poses * part * joints..];
-        let names: Vec<&str> = self.truth.robot.gauging().targets.iter().map(|target| target.name.as_str()).collect();
+        let names: Vec<&str> = self.truth.robot.setup().targets.iter().map(|target| target.name.as_str()).collect();
         let count = names.len().max(1);
         let rows = poses * count;
         let mut data = Measurements {
@@ -78,9 +78,9 @@ impl Cell {
     /// Orientation of the last body in every row, from points: where it puts a point and its neighbours.
     fn turns(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
         let moved = |axis: usize| {
-            let mut gauging = self.truth.robot.gauging().clone();
-            gauging.targets.iter_mut().for_each(|target| target.seat.translation[axis] += 0.5);
-            Model { robot: self.truth.robot.clone().measured_by(gauging), ..self.truth.clone() }.predict(data)
+            let mut setup = self.truth.robot.setup().clone();
+            setup.targets.iter_mut().for_each(|target| target.seat.translation[axis] += 0.5);
+            Model { robot: self.truth.robot.clone().measured_by(setup), ..self.truth.clone() }.predict(data)
         };
         let (own, beside) = (self.truth.predict(data), [moved(0), moved(1), moved(2)]);
         (0..data.rows())
@@ -126,8 +126,7 @@ impl Cell {
         let mut model = model(&robot, base, &effects);
         model.known = known(&model);
         let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-        let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-        (model, fitted)
+        fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
     }
 }
 
@@ -179,7 +178,7 @@ fn targets_known_from_elsewhere_show_the_zero_of_the_last_joint() {
         model.known.insert(k, Known { prior: Some(Prior { mean: 0.0, sigma: 1e-5 }), bounds: None });
     }
     let candidates: Vec<usize> = (0..specs.len()).collect();
-    let fitted = fit(&mut model, &data, &FitOptions { rows: &rows, candidates: &candidates });
+    let (_, fitted) = fit(&model, &data, &FitOptions { rows: &rows, candidates: &candidates });
     let zero = specs.iter().position(|spec| spec.name == "joint_offset.j6").expect("a parameter");
     let ParameterStatus::Free(sigma) = fitted.statuses[zero] else { panic!("{:?}", fitted.statuses[zero]) };
     assert!(sigma < 1e-4, "{sigma:e} rad");
@@ -207,7 +206,7 @@ fn poses_add_the_orientation_of_the_tool_to_the_rank() {
             "{name}: {:?} rad",
             fitted.excess_sigma_angle
         );
-        let turns: Vec<f64> = model.misses(&data).iter().filter_map(|miss| miss.angle).collect();
+        let turns: Vec<f64> = model.row_errors(&data).iter().filter_map(|error| error.angle).collect();
         let rms = (turns.iter().map(|turn| turn * turn).sum::<f64>() / turns.len() as f64).sqrt();
         assert!((0.85..1.12).contains(&(rms / (3f64.sqrt() * SIGMA_TURN))), "{name}: orientations are off by {rms:e} rad");
     }
@@ -222,7 +221,7 @@ fn distances_from_one_anchor_see_all_but_where_the_cell_stands() {
     data.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = cell.fit(&data, nothing);
     assert_eq!(free(&fitted), 27 + 3 - 6);
-    let off: Vec<f64> = model.misses(&data).iter().map(|miss| miss.length).collect();
+    let off: Vec<f64> = model.row_errors(&data).iter().map(|error| error.length).collect();
     let rms = (off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64).sqrt();
     let expected = 2e-5 * (1.0f64 - 24.0 / 200.0).sqrt();
     assert!((0.85..1.15).contains(&(rms / expected)), "{rms:e} m are left, {expected:e} expected");

@@ -1,7 +1,7 @@
 //! Least squares on position data: rank as the theory says, truth recovered, uncertainty honest.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, whole};
+use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
@@ -25,7 +25,7 @@ pub fn normal(index: usize) -> f64 {
 }
 
 pub fn model(robot: &RobotModel, base: Pose, effects: &[&str]) -> Model {
-    let setting = Setting { base, load: Load::GravityTorque };
+    let setting = EffectContext { base, load: Load::GravityTorque };
     let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
@@ -95,10 +95,9 @@ fn recording_drawn(
 fn identify(data: &Measurements, description: &RobotDescription, effects: &[&str], rows: &[usize]) -> (Model, Fitted) {
     let robot = RobotModel::new(description.clone());
     let base = align(&robot, data, rows);
-    let mut model = model(&robot, base, effects);
+    let model = model(&robot, base, effects);
     let candidates: Vec<usize> = (0..model.stack.specs().len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows, candidates: &candidates })
 }
 
 fn rms(model: &Model, data: &Measurements, rows: impl Iterator<Item = usize>) -> f64 {

@@ -91,7 +91,7 @@ fn every_kind_of_robot_that_init_writes_is_read() {
         let output = calib(folder.path(), &["init", "--robot", kind], "");
         assert!(output.status.success());
         let text = std::fs::read_to_string(folder.path().join("robot.yaml")).expect("a robot file");
-        let file = calib::robot::import::Text { label: "robot.yaml", text: &text };
+        let file = calib::robot::import::RobotFileText { label: "robot.yaml", text: &text };
         calib::robot::import::read_calib(file, None).unwrap_or_else(|error| panic!("{kind}: {error}"));
     }
 }

@@ -39,6 +39,7 @@ mod init;
 mod layers;
 mod learn;
 mod motion;
+mod names;
 mod network;
 mod parameter_sets;
 mod pipelines;

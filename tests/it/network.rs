@@ -1,14 +1,16 @@
 //! The perceptron, its gradient, its training, its valid range and the judge of whether it helps.
 
-use calib::estimate::network::arm::Arm;
-use calib::estimate::network::correction::{Body, Dress, Networks, Scaling, features};
-use calib::estimate::network::loss::{Batch, Loss, Scratch};
+use calib::estimate::network::arm::ScrewArm;
+use calib::estimate::network::correction::{Body, NetworkScaling, Networks, Scaling, features};
+use calib::estimate::network::loss::{Batch, Loss, LossBuffers};
 use calib::estimate::network::region::Region;
-use calib::estimate::network::rivals::{Comparison, CorrectionContest, learn};
-use calib::estimate::network::{Activation, Correction, Recipe, Rival, Samples, Shape, Start, compare, train};
+use calib::estimate::network::rivals::{RivalComparison, RivalContest, learn};
+use calib::estimate::network::{
+    Activation, Correction, LayerSizes, Recipe, Rival, TrainingSamples, TrainingStart, compare, train,
+};
 use calib::estimate::swarm::Algorithm;
 use calib::robot::RobotModel;
-use calib::robot::import::{Text, read_calib};
+use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::table::{Network, Table};
 use rand::rngs::ChaCha8Rng;
@@ -21,7 +23,7 @@ fn recipe(joints: usize) -> Recipe {
         through: None,
         hidden: 12,
         activation: Activation::Sigmoid,
-        start: Start::Swarm(Algorithm::Bso),
+        start: TrainingStart::Swarm(Algorithm::Bso),
         beetles: 20,
         generations: 30,
         iterations: 200,
@@ -39,9 +41,9 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Poses of a six-joint arm with a smooth remainder of about 0.9 mm (times `signal`) and noise of `noise` m per axis.
-fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> Samples {
+fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> TrainingSamples {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut samples = Samples::default();
+    let mut samples = TrainingSamples::default();
     for _ in 0..rows {
         let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
         let reach = (q[1] + 0.3).sin() + (q[1] + q[2]).cos();
@@ -54,7 +56,7 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> Samples {
     samples
 }
 
-fn mean_error(samples: &Samples, correction: Option<&Correction>) -> f64 {
+fn mean_error(samples: &TrainingSamples, correction: Option<&Correction>) -> f64 {
     let left = samples.sources.iter().zip(&samples.residual).map(|(q, r)| {
         let delta = correction.map_or([0.0; 3], |correction| correction.at(q).delta);
         (0..3).map(|k| (r[k] - delta[k]).powi(2)).sum::<f64>().sqrt()
@@ -87,9 +89,9 @@ fn the_gradient_is_that_of_central_differences() {
         let ways: Vec<Vec<[f64; 3]>> = (0..150).map(|_| (0..outputs).map(|_| way()).collect()).collect();
         let batch = Batch::new(&x, &y);
         let batch = if outputs == 3 { batch } else { batch.through(&ways) };
-        let shape = Shape { inputs: 7, hidden: 5, outputs, activation };
+        let shape = LayerSizes { inputs: 7, hidden: 5, outputs, activation };
         let loss = Loss { shape, batch: &batch, decay: 0.7 };
-        let mut scratch = Scratch::new(shape);
+        let mut scratch = LossBuffers::new(shape);
         let mut w: Vec<f64> = (0..shape.parameters()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let mut gradient = vec![0.0; w.len()];
         let (value, squares) = loss.gradient(&w, &mut gradient, &mut scratch);
@@ -139,17 +141,17 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
 }
 
 /// The SR210D, its base turned and shifted in the tracker's frame.
-fn sr210d() -> Arm {
+fn sr210d() -> ScrewArm {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let text = std::fs::read_to_string(file).unwrap();
-    let robot = RobotModel::new(read_calib(Text { label: "robot.yaml", text: &text }, None).unwrap().robot);
-    Arm::of(&robot, &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()))
+    let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).unwrap().robot);
+    ScrewArm::of(&robot, &Pose::from_rotation_vector([0.02, -0.03, 2.0].into(), [4.5, -1.8, 0.9].into()))
 }
 
 /// Poses of that arm whose joints 1 and 2 have encoders with waves of 90 and 60 urad, plus `noise` m per axis.
-fn waves(rows: usize, arm: &Arm, noise: f64, seed: u64) -> Samples {
+fn waves(rows: usize, arm: &ScrewArm, noise: f64, seed: u64) -> TrainingSamples {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut samples = Samples::default();
+    let mut samples = TrainingSamples::default();
     for _ in 0..rows {
         let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.2..1.2)).collect();
         let stance = arm.stance(&q);
@@ -160,8 +162,8 @@ fn waves(rows: usize, arm: &Arm, noise: f64, seed: u64) -> Samples {
     samples
 }
 
-fn contest<'a>(arm: Option<&'a Arm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> CorrectionContest<'a> {
-    CorrectionContest {
+fn contest<'a>(arm: Option<&'a ScrewArm>, rivals: &[Rival], cheap: &Recipe, folds: usize) -> RivalContest<'a> {
+    RivalContest {
         rivals: rivals.to_vec(),
         arm,
         prismatic: &[false; 6],
@@ -177,19 +179,24 @@ const ALL: [Rival; 6] = [
     Rival::Ridge,
     Rival::Process,
     Rival::Curves,
-    Rival::Network(Start::Random),
-    Rival::Network(Start::Swarm(Algorithm::Bso)),
-    Rival::JointNetwork(Start::Random),
+    Rival::Network(TrainingStart::Random),
+    Rival::Network(TrainingStart::Swarm(Algorithm::Bso)),
+    Rival::JointNetwork(TrainingStart::Random),
 ];
 
-fn error(comparison: &Comparison, rival: Rival) -> f64 {
+fn error(comparison: &RivalComparison, rival: Rival) -> f64 {
     comparison.judged.iter().find(|judged| judged.rival == Some(rival)).unwrap().mean()
 }
 
 #[test]
 fn training_is_the_same_on_one_thread_and_on_three() {
     let samples = arm(90, 1.0, 0.2e-3, 3);
-    for start in [Start::Random, Start::Swarm(Algorithm::Bas), Start::Swarm(Algorithm::Bso), Start::Swarm(Algorithm::Abc)] {
+    for start in [
+        TrainingStart::Random,
+        TrainingStart::Swarm(Algorithm::Bas),
+        TrainingStart::Swarm(Algorithm::Bso),
+        TrainingStart::Swarm(Algorithm::Abc),
+    ] {
         let on = |jobs| train(&samples, &Recipe { jobs, start, ..recipe(6) }, |_| {});
         assert_eq!(on(1), on(3), "{start:?}");
     }
@@ -239,7 +246,7 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
     };
     let (training, unseen) = (slow(200, 11), slow(300, 12));
     let cheap = Recipe { generations: 5, iterations: 100, ..recipe(6) };
-    let left = |through: Option<Arm>| {
+    let left = |through: Option<ScrewArm>| {
         let (correction, _) = train(&training, &Recipe { through, ..cheap.clone() }, |_| {});
         mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None)
     };
@@ -257,7 +264,7 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     assert!(best.helps() && best.mean() < 0.8 * smooth.judged[0].mean(), "{smooth:?}");
     let refused = (0..20).filter(|seed| {
         let recipe = Recipe { seed: *seed, ..cheap.clone() };
-        let rivals = [Rival::Ridge, Rival::Process, Rival::Network(Start::Random)];
+        let rivals = [Rival::Ridge, Rival::Process, Rival::Network(TrainingStart::Random)];
         compare(&arm(120, 0.0, 0.5e-3, 200 + seed), &contest(None, &rivals, &recipe, 4), |_, _| {}).chosen == 0
     });
     let refused = refused.count();
@@ -269,7 +276,7 @@ fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
 fn targets_of_one_pose_do_not_vouch_for_each_other() {
     let once = arm(60, 0.0, 0.5e-3, 77);
     let mut rng = ChaCha8Rng::seed_from_u64(78);
-    let mut thrice = Samples::default();
+    let mut thrice = TrainingSamples::default();
     for _target in 0..3 {
         thrice.sources.extend(once.sources.iter().cloned());
         thrice.residual.extend(once.residual.iter().map(|r| r.map(|value| value + 0.02e-3 * normal(&mut rng))));
@@ -316,11 +323,14 @@ fn a_correction_comes_back_from_its_table() {
     let prismatic = [true, false, false];
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let features = features(&prismatic, true, true);
-    let shape = Shape { inputs: features.len(), hidden: 4, outputs: 3, activation: Activation::Tanh };
+    let shape = LayerSizes { inputs: features.len(), hidden: 4, outputs: 3, activation: Activation::Tanh };
     let mut number = |from: f64, to: f64| rng.random_range(from..to);
     let mut scaling = || Scaling { mean: number(-1.0, 1.0), scale: number(0.1, 2.0) };
-    let dress =
-        Dress { inputs: features.iter().map(|_| scaling()).collect(), outputs: [scaling(), scaling(), scaling()], features };
+    let dress = NetworkScaling {
+        inputs: features.iter().map(|_| scaling()).collect(),
+        outputs: [scaling(), scaling(), scaling()],
+        features,
+    };
     assert_eq!(dress.features.len(), 6);
     let members = (0..3).map(|_| (0..shape.parameters()).map(|_| number(-3.0, 3.0)).collect()).collect();
     let sources: Vec<Vec<f64>> = (0..40).map(|_| (0..4).map(|_| number(-1.5, 1.5)).collect()).collect();

@@ -39,8 +39,8 @@ impl Case {
             self.start.x[*k] = *value;
         }
         self.start.known = known.iter().copied().collect();
-        let fitted = fit(&mut self.start, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
-        (self.start.x.clone(), fitted)
+        let (model, fitted) = fit(&self.start, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
+        (model.x, fitted)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Proposed poses tell more than random ones, and simulated fits confirm it; limits hold, seeds repeat.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, identified, whole};
-use calib::estimate::choose::{Aim, Proposal, Score, Site, Wish, median, propose};
+use calib::effect::{EffectContext, EffectStack, Load, identified, whole};
+use calib::estimate::choose::{Aim, DesignRequest, Proposal, Score, Site, median, propose};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
@@ -24,13 +24,13 @@ fn site(robot: &RobotDescription) -> Site {
     }
 }
 
-fn wish(aim: Aim) -> Wish {
-    Wish { aim, count: COUNT, candidates: 250, sigma: SIGMA, seed: 5 }
+fn wish(aim: Aim) -> DesignRequest {
+    DesignRequest { aim, count: COUNT, candidates: 250, sigma: SIGMA, seed: 5 }
 }
 
 fn model(robot: &RobotDescription, effects: &[&str]) -> Model {
     let robot = RobotModel::new(robot.clone());
-    let setting = Setting { base: Pose::identity(), load: Load::GravityTorque };
+    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
     let made = effects.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     let stack = EffectStack::new(&robot, setting.base, made);
     Model::nominal(robot, stack)
@@ -95,8 +95,7 @@ fn scatter(robot: &RobotDescription, poses: &Measurements, free: &[usize], scale
         let mut data = poses.clone();
         data.position = truth.predict(&data);
         data.position.iter_mut().for_each(|point| *point += Vector3::from_fn(|_, _| SIGMA * normal()));
-        let mut fitted = model(robot, &effects);
-        let outcome = fit(&mut fitted, &data, &FitOptions { rows: &rows, candidates: free });
+        let (fitted, outcome) = fit(&model(robot, &effects), &data, &FitOptions { rows: &rows, candidates: free });
         for (k, parameter) in free.iter().enumerate() {
             assert!(
                 matches!(outcome.statuses[*parameter], ParameterStatus::Free(_)),
@@ -135,7 +134,7 @@ fn simulated_fits_scatter_as_predicted_and_less_than_with_random_poses() {
 fn the_same_seed_gives_the_same_poses_and_another_seed_others() {
     let robot = fixture::offset_wrist();
     let poses = |seed: u64| {
-        let wish = Wish { candidates: 150, count: 20, seed, ..wish(Aim::Information) };
+        let wish = DesignRequest { candidates: 150, count: 20, seed, ..wish(Aim::Information) };
         let proposal = propose(model(&robot, &GEOMETRY), &site(&robot), &wish).expect("poses");
         (proposal.poses.q, proposal.poses.payload, proposal.direction)
     };
@@ -149,7 +148,7 @@ fn limits_box_floor_and_payloads_are_kept() {
     let mut site = site(&robot);
     site.bounds = [[0.4, 2.5], [-1.2, 1.2], [f64::NEG_INFINITY, 2.3]];
     site.floor = 0.5;
-    let wish = Wish { candidates: 200, ..wish(Aim::Information) };
+    let wish = DesignRequest { candidates: 200, ..wish(Aim::Information) };
     let proposal = propose(model(&robot, &all_effects()), &site, &wish).expect("poses");
     let nominal = RobotModel::new(robot.clone());
     for row in 0..COUNT {
@@ -181,15 +180,15 @@ fn poses_for_two_hypotheses_tell_them_apart_better_than_random_ones() {
 #[test]
 fn what_cannot_be_proposed_is_said() {
     let robot = fixture::spherical();
-    let fault = |site: &Site, effects: &[&str], wish: Wish| match propose(model(&robot, effects), site, &wish) {
+    let fault = |site: &Site, effects: &[&str], wish: DesignRequest| match propose(model(&robot, effects), site, &wish) {
         Ok(_) => panic!("expected a fault"),
         Err(fault) => fault,
     };
-    let few = Wish { count: 5, candidates: 100, ..wish(Aim::Information) };
+    let few = DesignRequest { count: 5, candidates: 100, ..wish(Aim::Information) };
     assert!(fault(&site(&robot), &GEOMETRY, few).contains("5 poses cannot tell 27 parameters: take at least 9"));
     let mut nowhere = site(&robot);
     nowhere.floor = 9.0;
     assert!(fault(&nowhere, &GEOMETRY, wish(Aim::Information)).contains("no pose of"));
     let pair = Aim::Separation(["reduction_ratio".into(), "joint_compliance".into()]);
-    assert!(fault(&site(&robot), &GEOMETRY, Wish { candidates: 100, ..wish(pair) }).contains("not among the effects"));
+    assert!(fault(&site(&robot), &GEOMETRY, DesignRequest { candidates: 100, ..wish(pair) }).contains("not among the effects"));
 }

@@ -5,7 +5,7 @@ mod random;
 mod rapid;
 mod reader;
 
-use calib::program::{Language, Note, Partial, Program, Solved, TargetKind};
+use calib::program::{Language, Note, Partial, Program, SolvedLiteral, TargetKind};
 
 fn told(notes: &[Note]) -> Vec<String> {
     notes.iter().map(|note| format!("{}:{}: {}", note.line, note.column, note.message)).collect()
@@ -29,7 +29,8 @@ fn refused(language: Language, text: &str) -> Vec<String> {
 
 /// The program with `by` added to every number of every target.
 fn moved(program: &Program, by: f64) -> Vec<u8> {
-    let answer = |values: &Vec<f64>| Solved { values: values.iter().map(|value| value + by).collect(), remark: String::new() };
+    let answer =
+        |values: &Vec<f64>| SolvedLiteral { values: values.iter().map(|value| value + by).collect(), remark: String::new() };
     let answers = program.literals().iter().map(|literal| Ok(answer(&literal.values))).collect();
     program.rewritten(answers).expect("every target has an answer").bytes
 }
@@ -59,7 +60,7 @@ fn a_number_that_loses_its_sign_does_not_run_into_its_name() {
 fn a_program_with_one_target_without_an_answer_is_refused_whole() {
     let text = "PTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}\nPTP {A1 1,A2 2,A3 3,A4 4,A5 5,A6 7}\n";
     let program = Program::parse(text.as_bytes(), Language::Krl, Partial::Refused).expect("accepted");
-    let good = Solved { values: vec![1.0; 6], remark: String::new() };
+    let good = SolvedLiteral { values: vec![1.0; 6], remark: String::new() };
     let refusal = program.rewritten(vec![Ok(good), Err("not reached".into())]).expect_err("no answer");
     assert_eq!(told(&refusal.faults), ["2:9: not reached"]);
 }

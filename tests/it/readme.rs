@@ -1,7 +1,7 @@
 //! The examples of the README are what calib reads.
 
 use calib::pipeline::Plan;
-use calib::robot::import::{Text, read_calib};
+use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::STAGES;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub fn example(key: &str) -> String {
 #[test]
 fn the_robot_file_of_the_readme_is_read() {
     let text = example("calib_robot:");
-    let robot = read_calib(Text { label: "README.md", text: &text }, None).unwrap_or_else(|e| panic!("{e}")).robot;
+    let robot = read_calib(RobotFileText { label: "README.md", text: &text }, None).unwrap_or_else(|e| panic!("{e}")).robot;
     assert_eq!(robot.joints.len(), 6);
     // Its one twist is the axis of a wrist: through the axis of joint 4, parallel to joint 3.
     let wrist = &robot.joints[4];

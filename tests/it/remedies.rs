@@ -9,10 +9,9 @@ use calib::robot::{Measurements, RobotModel};
 fn identify(description: &RobotDescription, data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
     let robot = RobotModel::new(description.clone());
     let rows: Vec<usize> = (0..data.rows()).collect();
-    let mut model = model(&robot, align(&robot, data, &rows), effects);
+    let model = model(&robot, align(&robot, data, &rows), effects);
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
 }
 
 /// What would show the named parameter, which must be hidden now.

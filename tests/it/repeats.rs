@@ -51,11 +51,10 @@ fn start(data: &Measurements, effects: &[&str]) -> Model {
 }
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
-    let mut model = start(data, effects);
+    let model = start(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
-    let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-    (model, fitted)
+    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
 }
 
 #[test]

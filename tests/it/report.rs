@@ -3,13 +3,13 @@
 mod browser;
 mod tables;
 
-use calib::stage::{Context, Labelled, Report, ReportReads, Services, Sink, Source, Stage, Validate, ValidateReads};
+use calib::stage::{Context, Labelled, OpenedInput, Report, ReportReads, Services, Sink, Stage, Validate, ValidateReads};
 use calib::table::*;
 use tables::{point, tables};
 
 struct Silent;
 impl Services for Silent {
-    fn open(&self, _: &calib::stage::RawFile) -> calib::error::Result<Source> {
+    fn open(&self, _: &calib::stage::RawFile) -> calib::error::Result<OpenedInput> {
         Err(calib::error::Error::Bug("no files here".into()))
     }
     fn sink(&self, _: &'static str) -> calib::error::Result<Box<dyn Sink>> {

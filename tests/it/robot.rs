@@ -4,7 +4,7 @@ use crate::arms::{ARMS, Arm};
 use crate::desk::{Desk, shared};
 use calib::robot::RobotModel;
 use calib::robot::description::{Coupling, JointKind, RobotDescription};
-use calib::robot::import::{Imported, Text, read_calib, read_case};
+use calib::robot::import::{Imported, RobotFileText, read_calib, read_case};
 use calib::stage::{RawFile, ReadRobot, RobotFormat, RobotReads, Stage};
 use calib::table::{Robot, Table};
 use nalgebra::{Matrix3, Vector3};
@@ -24,14 +24,14 @@ fn reference(file: &str) -> String {
 }
 
 fn read(text: &str) -> RobotDescription {
-    read_calib(Text { label: "robot.yaml", text }, None).unwrap_or_else(|e| panic!("{text}\n{e}")).robot
+    read_calib(RobotFileText { label: "robot.yaml", text }, None).unwrap_or_else(|e| panic!("{text}\n{e}")).robot
 }
 
 fn read_urdf(name: &str) -> RobotDescription {
     let text = format!("{HEAD}kinematics: {{urdf: {{base: world_base, tip: tool0}}}}\n");
     let urdf = reference(&format!("{name}.urdf"));
-    let urdf = Text { label: "arm.urdf", text: &urdf };
-    read_calib(Text { label: "robot.yaml", text: &text }, Some(urdf)).unwrap_or_else(|e| panic!("{name}: {e}")).robot
+    let urdf = RobotFileText { label: "arm.urdf", text: &urdf };
+    read_calib(RobotFileText { label: "robot.yaml", text: &text }, Some(urdf)).unwrap_or_else(|e| panic!("{name}: {e}")).robot
 }
 
 fn all_forms(arm: &Arm) -> Vec<(&'static str, RobotDescription)> {
@@ -183,7 +183,7 @@ fn a_practice_robot_is_read_in_its_units() {
     let text = r#"{"name": "two", "axes": [[0, 0, 1], [0, -2, 0]], "points": [[0, 0, 0], [312.0, 0, 0]], "tool": [1854, 0, 1310],
 	"mass": [350, null], "com": [[150, 0, -120], null], "ratio": [213, 214], "kt": [1.3, 1.3], "payload": 210.0,
 	"payload_com": [180, 40, 60], "coupling": [[1, 0]], "colour": "orange"}"#;
-    let Imported { robot, notes } = read_case(Text { label: "robot.json", text }).expect("readable");
+    let Imported { robot, notes } = read_case(RobotFileText { label: "robot.json", text }).expect("readable");
     assert_eq!(robot.joints[1].axis, [0.0, -1.0, 0.0]);
     assert_eq!(robot.joints[1].point, [0.312, 0.0, 0.0]);
     assert_eq!((robot.joints[0].mass, robot.joints[1].mass, robot.joints[1].centre), (Some(350.0), None, None));

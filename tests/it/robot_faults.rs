@@ -1,6 +1,6 @@
 //! What a faulty robot file says: every fault at once, each with its place and what is allowed.
 
-use calib::robot::import::{Text, read_calib, read_case};
+use calib::robot::import::{RobotFileText, read_calib, read_case};
 
 const GOOD: &str = "calib_robot: 1
 units: {length: mm, angle: deg}
@@ -12,7 +12,7 @@ tool: {point: [900, 0, 0]}
 ";
 
 fn calib(text: &str) -> String {
-    match read_calib(Text { label: "robot.yaml", text }, None) {
+    match read_calib(RobotFileText { label: "robot.yaml", text }, None) {
         Ok(_) => "no fault".into(),
         Err(error) => {
             assert_eq!(error.exit_code(), 2);
@@ -33,8 +33,9 @@ fn added(text: &str) -> String {
 
 fn urdf(text: &str, base: &str, tip: &str) -> String {
     let file = format!("calib_robot: 1\nunits: {{length: mm, angle: deg}}\nkinematics: {{urdf: {{base: {base}, tip: {tip}}}}}\n");
-    let urdf = Text { label: "arm.urdf", text };
-    read_calib(Text { label: "robot.yaml", text: &file }, Some(urdf)).map_or_else(|e| e.to_string(), |_| "no fault".into())
+    let urdf = RobotFileText { label: "arm.urdf", text };
+    read_calib(RobotFileText { label: "robot.yaml", text: &file }, Some(urdf))
+        .map_or_else(|e| e.to_string(), |_| "no fault".into())
 }
 
 #[test]
@@ -233,7 +234,8 @@ fn a_name_stands_for_one_joint() {
 
 #[test]
 fn a_practice_robot_is_checked_too() {
-    let case = |text: &str| read_case(Text { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
+    let case =
+        |text: &str| read_case(RobotFileText { label: "robot.json", text }).map_or_else(|e| e.to_string(), |_| "no fault".into());
     assert_eq!(
         case(r#"{"axes": [[0, 0, 1], [0, 0, 0]], "points": [[0, 0, 0]], "mass": [1, -2], "coupling": [[2, 0]]}"#),
         "robot.json:1:44: points: 1 entries for 2 joints; expected one per joint\n\
@@ -283,7 +285,7 @@ fn a_number_that_no_robot_has_is_refused_at_its_place() {
          robot.yaml:5:23: kinematics.dh[0].d: 1e308 m is more than 1e9 m; is it in another unit?"
     );
     let case = r#"{"axes": [[0, 0, 1]], "points": [[0, 0, 1e308]], "tool": [0, 0, 0], "mass": [1e9]}"#;
-    let told = read_case(Text { label: "robot.json", text: case }).unwrap_err().to_string();
+    let told = read_case(RobotFileText { label: "robot.json", text: case }).unwrap_err().to_string();
     assert_eq!(
         told.lines().collect::<Vec<_>>(),
         [

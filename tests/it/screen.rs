@@ -1,7 +1,7 @@
 //! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
 
 use crate::fixture;
-use calib::effect::{EffectStack, Load, Setting, whole};
+use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
@@ -29,7 +29,7 @@ fn direction(dice: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 fn model(robot: &RobotModel, base: Pose) -> Model {
-    let setting = Setting { base, load: Load::GravityTorque };
+    let setting = EffectContext { base, load: Load::GravityTorque };
     let made = EFFECTS.iter().map(|name| whole(name, &setting).expect("registered")).collect();
     Model::nominal(robot.clone(), EffectStack::new(robot, base, made))
 }
@@ -81,11 +81,11 @@ impl Trial {
     }
 
     fn screen(&self) -> (Model, Screening) {
-        let mut model = self.start();
-        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let start = self.start();
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
         let set: Vec<usize> = (0..self.rows()).map(|row| usize::from(row % 4 == 3)).collect();
         let rows = self.fit_rows();
-        let (_, screening) = fit_screened(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
+        let (model, _, screening) = fit_screened(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }, &set);
         (model, screening)
     }
 
@@ -96,11 +96,10 @@ impl Trial {
     }
 
     fn plain(&self) -> Model {
-        let mut model = self.start();
-        let candidates: Vec<usize> = (0..model.x.len()).collect();
+        let start = self.start();
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
         let rows = self.fit_rows();
-        fit(&mut model, &self.data, &FitOptions { rows: &rows, candidates: &candidates });
-        model
+        fit(&start, &self.data, &FitOptions { rows: &rows, candidates: &candidates }).0
     }
 
     /// `count` different rows.

@@ -3,7 +3,7 @@
 use arrow::array::{ArrayRef, Float64Array, Int64Array, StringArray};
 use calib::error::{Error, Result};
 use calib::store::frame::{Frame, FrameBuilder};
-use calib::store::{Account, KEY_FORMAT, Lookup, Product, Published, StageKey, Store, TableHash, TableRef};
+use calib::store::{Account, KEY_FORMAT, Lookup, PendingTable, Published, StageKey, Store, TableHash, TableRef};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -39,7 +39,7 @@ pub(super) fn split(keys: std::ops::Range<i64>) -> Frame {
 }
 
 pub(super) fn publish(store: &Store, key: &StageKey, frame: &Frame) -> Result<Published> {
-    store.publish(key, vec![("out".into(), Product::Frame(frame.clone()))], Account::default())
+    store.publish(key, vec![("out".into(), PendingTable::Frame(frame.clone()))], Account::default())
 }
 
 fn place() -> (tempfile::TempDir, Store) {
@@ -143,7 +143,7 @@ fn looking_leaves_no_trace_and_publishing_makes_a_stage_done() {
     assert_eq!(store.action(&key("split", 1)).unwrap(), Lookup::Absent);
     assert!(!store.root().exists());
     let account = Account { notes: vec!["rank 27".into()], wall_seconds: 0.5, ..Account::default() };
-    let products = vec![("out".to_string(), Product::Frame(split(0..9)))];
+    let products = vec![("out".to_string(), PendingTable::Frame(split(0..9)))];
     let record = store.publish(&key("split", 1), products, account.clone()).unwrap().record;
     let Lookup::Done(found) = Store::open(store.root()).unwrap().action(&key("split", 1)).unwrap() else { panic!("not done") };
     assert_eq!((&*found, &found.account), (&record, &account));

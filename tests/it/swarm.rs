@@ -2,7 +2,7 @@
 
 use crate::desk::Desk;
 use calib::estimate::swarm::{
-    Algorithm, BeetleAntennae, BeetleSwarm, Bounds, Budget, Landscape, Method, Outcome, Stop, minimise,
+    Algorithm, BeetleAntennae, BeetleSwarm, Budget, Landscape, Method, SearchBox, SearchStop, SwarmResult, minimise,
 };
 use calib::stage::{Context, Optimise, OptimiseReads, Stage};
 use serde_json::json;
@@ -16,7 +16,7 @@ fn sphere(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-fn search<M: Method>(method: &M, f: fn(&[f64]) -> f64, bounds: &Bounds, seed: u64, jobs: usize) -> Outcome {
+fn search<M: Method>(method: &M, f: fn(&[f64]) -> f64, bounds: &SearchBox, seed: u64, jobs: usize) -> SwarmResult {
     let budget = Budget { generations: 200, evaluations: None, target: None, seed, jobs };
     minimise(method, &f, bounds, &budget, |_, _| {})
 }
@@ -58,7 +58,7 @@ fn settings_of_a_comparison_that_make_no_sense_are_named() {
 
 #[test]
 fn every_optimiser_keeps_within_its_budget_and_on_any_number_of_threads() {
-    let bounds = Bounds::cube(6, -1.0, 1.5);
+    let bounds = SearchBox::cube(6, -1.0, 1.5);
     for method in Algorithm::ALL {
         let generations = method.generations(20, 3000);
         assert!(method.evaluations(20, generations) <= 3000 && method.evaluations(20, generations + 1) > 3000, "{method:?}");
@@ -94,26 +94,26 @@ fn the_landscapes_have_their_minima_where_the_literature_says() {
 
 #[test]
 fn the_minimum_lies_where_the_paper_says() {
-    let outcome = search(&BeetleSwarm::default(), michalewicz, &Bounds::cube(2, 0.0, PI), 1, 1);
+    let outcome = search(&BeetleSwarm::default(), michalewicz, &SearchBox::cube(2, 0.0, PI), 1, 1);
     assert!((outcome.value - -1.8013).abs() < 1e-4, "{}", outcome.value);
     assert!((outcome.position[0] - 2.20).abs() < 0.01 && (outcome.position[1] - 1.57).abs() < 0.01, "{:?}", outcome.position);
 }
 
 #[test]
 fn the_sphere_is_descended_to_its_bottom() {
-    let bounds = Bounds::cube(5, -3.0, 4.0);
+    let bounds = SearchBox::cube(5, -3.0, 4.0);
     for seed in 0..10 {
         let outcome = search(&BeetleSwarm::default(), sphere, &bounds, seed, 1);
         assert!(outcome.value < 1e-6, "seed {seed}: {}", outcome.value);
     }
     // One beetle's steps sum to at most 10 and die out: it comes near, not there.
-    let outcome = search(&BeetleAntennae::default(), sphere, &Bounds::cube(2, -3.0, 4.0), 3, 1);
+    let outcome = search(&BeetleAntennae::default(), sphere, &SearchBox::cube(2, -3.0, 4.0), 3, 1);
     assert!(outcome.value < 0.05 && outcome.value > 0.0, "{}", outcome.value);
 }
 
 #[test]
 fn two_threads_give_the_bits_of_one_and_a_seed_gives_its_search_again() {
-    let bounds = Bounds::cube(6, -1.0, 1.0);
+    let bounds = SearchBox::cube(6, -1.0, 1.0);
     let method = BeetleSwarm { beetles: 17, ..BeetleSwarm::default() };
     let one = search(&method, sphere, &bounds, 5, 1);
     for jobs in [1, 2, 3, 64] {
@@ -127,14 +127,14 @@ fn the_history_falls_counts_every_evaluation_and_is_observed() {
     let method = BeetleSwarm { beetles: 10, ..BeetleSwarm::default() };
     let mut seen = Vec::new();
     let budget = Budget { generations: 40, evaluations: Some(910), target: None, seed: 2, jobs: 2 };
-    let outcome = minimise(&method, &michalewicz, &Bounds::cube(2, 0.0, PI), &budget, |generation, best| {
+    let outcome = minimise(&method, &michalewicz, &SearchBox::cube(2, 0.0, PI), &budget, |generation, best| {
         assert_eq!(michalewicz(best), generation.best);
         seen.push(generation.clone());
     });
     assert_eq!(seen, outcome.history);
     assert!(seen.windows(2).all(|pair| pair[1].best <= pair[0].best && pair[1].evaluations == pair[0].evaluations + 30));
     assert!(seen.iter().all(|generation| generation.mean >= generation.best));
-    assert_eq!((outcome.stop, outcome.evaluations), (Stop::Evaluations, 910));
+    assert_eq!((outcome.stop, outcome.evaluations), (SearchStop::Evaluations, 910));
     assert!(outcome.elite.windows(2).all(|pair| pair[0].0 <= pair[1].0) && outcome.elite[0].0 == outcome.value);
 }
 
@@ -145,7 +145,7 @@ fn the_bounds_hold_and_a_value_that_is_no_number_is_never_best() {
         if x[0] < 0.0 { f64::NAN } else { (x[0] - 2.0).abs() + x[1].abs() }
     };
     let budget = Budget { generations: 100, evaluations: None, target: None, seed: 9, jobs: 2 };
-    let bounds = Bounds::cube(2, -1.0, 2.0);
+    let bounds = SearchBox::cube(2, -1.0, 2.0);
     let swarm = minimise(&BeetleSwarm::default(), &f, &bounds, &budget, |_, _| {});
     let beetle = minimise(&BeetleAntennae::default(), &f, &bounds, &budget, |_, _| {});
     assert!(swarm.value < 1e-3 && beetle.value.is_finite(), "{} {}", swarm.value, beetle.value);

@@ -3,7 +3,7 @@
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
 use calib::store::frame::{Frame, FrameBuilder};
 use calib::store::schema::{self, ColumnType, FieldSchema};
-use calib::store::{Account, Product, Store};
+use calib::store::{Account, PendingTable, Store};
 use calib::table::{self, Table};
 use std::sync::Arc;
 
@@ -83,7 +83,7 @@ fn round_trip<T: Table>() {
     let cases: [&[Extreme]; 4] = [&[], &[Extreme::Lowest], &[Extreme::Highest], &[Extreme::Least]];
     for (case, rows) in cases.into_iter().enumerate() {
         let written = frame(T::KIND, rows);
-        let products = vec![("out".to_string(), Product::Frame(written.clone()))];
+        let products = vec![("out".to_string(), PendingTable::Frame(written.clone()))];
         let record = store.publish(&key(T::KIND, case as u64), products, Account::default()).unwrap().record;
         let table = &record.tables["out"];
         let read = store.load(table).unwrap();
@@ -190,7 +190,7 @@ fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
     let store = Store::open(folder.path()).unwrap();
     for (case, rows) in [("empty", &[][..]), ("extreme", &[Extreme::Lowest, Extreme::Highest, Extreme::Least])].into_iter() {
         for kind in KINDS {
-            let products = vec![("out".to_string(), Product::Frame(frame(kind, rows)))];
+            let products = vec![("out".to_string(), PendingTable::Frame(frame(kind, rows)))];
             let record = store.publish(&key(&format!("{case} {kind}"), 0), products, Account::default()).unwrap().record;
             store.expose(case, kind, "out", &record.tables["out"]).unwrap();
         }

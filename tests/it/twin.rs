@@ -2,8 +2,8 @@
 
 use calib::error::Result;
 use calib::robot::description::{JointDescription, JointKind, RobotDescription};
-use calib::robot::import::{Text, read_calib};
-use calib::stage::{Context, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Source, Stage};
+use calib::robot::import::{RobotFileText, read_calib};
+use calib::stage::{Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Stage};
 use calib::table::Robot;
 use calib::twin::arm::Arm;
 use calib::twin::effect::{Backlash, BaseCompliance, GearCyclic, JointCompliance, LinkCompliance, Physical};
@@ -20,7 +20,7 @@ const ARCSEC: f64 = PI / 648_000.0;
 fn sr210d() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let text = std::fs::read_to_string(&path).expect("the pipeline's robot file");
-    read_calib(Text { label: "robot.yaml", text: &text }, None).expect("a good robot file").robot
+    read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).expect("a good robot file").robot
 }
 
 /// One joint with axis -y at the origin and 2 m of massless arm along x, 100 kg at its end: a weight turns it by -m g r cos q.
@@ -212,7 +212,7 @@ fn a_directional_tracker_errs_across_the_beam_more_than_along_it() {
 
 struct Quiet;
 impl Services for Quiet {
-    fn open(&self, _file: &RawFile) -> Result<Source> {
+    fn open(&self, _file: &RawFile) -> Result<OpenedInput> {
         panic!("simulate opens no file")
     }
     fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {

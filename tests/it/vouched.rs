@@ -1,7 +1,7 @@
 //! What reaches a robot is what was identified: tables with a changed bit are refused, or change nothing.
 
 use crate::compensate::{calib, cell};
-use calib::identified::{Files, Identified};
+use calib::identified::{Files, IdentifiedModel};
 use calib::pipeline::{Manifest, find_run};
 use calib::store::Store;
 use calib::table::{Parameters, Table, from_file};
@@ -49,21 +49,21 @@ fn flips(path: &Path, bits: usize, seed: u64) -> impl Iterator<Item = (usize, Ve
 }
 
 /// All that a robot is moved by, digit by digit.
-fn numbers(identified: &Identified) -> String {
+fn numbers(identified: &IdentifiedModel) -> String {
     format!("{:?} {:?} {:?}", identified.robot, identified.parameters, identified.model.x)
 }
 
 #[test]
 fn a_changed_bit_of_a_table_is_refused_or_changes_no_number() {
     let folder = taken_along();
-    let sound = numbers(&Identified::of_files(&files(folder.path())).unwrap_or_else(|error| panic!("{error}")));
+    let sound = numbers(&IdentifiedModel::of_files(&files(folder.path())).unwrap_or_else(|error| panic!("{error}")));
     let mut refused = 0;
     for (name, seed) in [(PARAMETERS, 4), (ROBOT, 5)] {
         let path = folder.path().join(name);
         let whole = std::fs::read(&path).unwrap();
         for (bit, flipped) in flips(&path, 400, seed) {
             std::fs::write(&path, flipped).unwrap();
-            match Identified::of_files(&files(folder.path())) {
+            match IdentifiedModel::of_files(&files(folder.path())) {
                 Ok(found) => assert_eq!(numbers(&found), sound, "bit {bit} of {name}"),
                 Err(error) => {
                     assert_eq!((error.exit_code(), error.to_string().contains(name)), (10, true), "bit {bit} of {name}: {error}");
@@ -154,7 +154,7 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
     copied(&cell().join(".calib"), folder.path());
     let store = Store::open(folder.path()).unwrap();
     let manifest = Manifest::of(&store, &find_run(&store, "HEAD").unwrap()).unwrap();
-    let sound = numbers(&Identified::of_run(&store, &manifest, None).unwrap_or_else(|error| panic!("{error}")));
+    let sound = numbers(&IdentifiedModel::of_run(&store, &manifest, None).unwrap_or_else(|error| panic!("{error}")));
     let read = ["parameters", "robot", "recording"];
     let outputs = manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(|output| read.contains(&output.kind.as_str()));
     let objects: Vec<PathBuf> = outputs.map(|output| store.object_path(&output.table)).collect();
@@ -163,7 +163,7 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
         let whole = std::fs::read(&path).unwrap();
         for (bit, flipped) in flips(&path, 100, 7) {
             std::fs::write(&path, flipped).unwrap();
-            match Identified::of_run(&store, &manifest, None) {
+            match IdentifiedModel::of_run(&store, &manifest, None) {
                 Ok(found) => assert_eq!(numbers(&found), sound, "bit {bit} of {}", path.display()),
                 Err(error) => {
                     let said = error.to_string();
@@ -174,5 +174,5 @@ fn a_changed_bit_in_the_store_is_refused_or_changes_no_number() {
         }
         std::fs::write(&path, whole).unwrap();
     }
-    assert_eq!(numbers(&Identified::of_run(&store, &manifest, None).unwrap()), sound);
+    assert_eq!(numbers(&IdentifiedModel::of_run(&store, &manifest, None).unwrap()), sound);
 }

@@ -5,11 +5,11 @@ use std::borrow::Cow;
 
 /// The rows that a query gave.
 #[derive(Debug)]
-pub struct Answer(DataFrame);
+pub struct QueryResult(DataFrame);
 
 /// One value of an answer.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value<'a> {
+pub enum QueryValue<'a> {
     Null,
     Boolean(bool),
     Integer(i128),
@@ -17,7 +17,7 @@ pub enum Value<'a> {
     Text(Cow<'a, str>),
 }
 
-impl Answer {
+impl QueryResult {
     pub(super) fn new(frame: DataFrame) -> Self {
         Self(frame)
     }
@@ -31,36 +31,36 @@ impl Answer {
     }
 
     /// The values of a row, counted from 0, in the order of the names.
-    pub fn row(&self, row: usize) -> impl Iterator<Item = Value<'_>> {
+    pub fn row(&self, row: usize) -> impl Iterator<Item = QueryValue<'_>> {
         self.0.columns().iter().map(move |column| value(column, row))
     }
 
     /// The first `rows` values of every column.
-    pub fn columns(&self, rows: usize) -> impl Iterator<Item = Vec<Value<'_>>> {
+    pub fn columns(&self, rows: usize) -> impl Iterator<Item = Vec<QueryValue<'_>>> {
         let rows = rows.min(self.rows());
         self.0.columns().iter().map(move |column| (0..rows).map(|row| value(column, row)).collect())
     }
 }
 
-fn value(column: &Column, row: usize) -> Value<'_> {
-    let Ok(value) = column.get(row) else { return Value::Null };
+fn value(column: &Column, row: usize) -> QueryValue<'_> {
+    let Ok(value) = column.get(row) else { return QueryValue::Null };
     match value {
-        AnyValue::Null => Value::Null,
-        AnyValue::Boolean(truth) => Value::Boolean(truth),
-        AnyValue::String(text) => Value::Text(text.into()),
-        AnyValue::StringOwned(text) => Value::Text(text.to_string().into()),
-        AnyValue::Float64(number) => Value::Number(number),
-        AnyValue::Float32(number) => Value::Number(number.into()),
-        AnyValue::Int8(number) => Value::Integer(number.into()),
-        AnyValue::Int16(number) => Value::Integer(number.into()),
-        AnyValue::Int32(number) => Value::Integer(number.into()),
-        AnyValue::Int64(number) => Value::Integer(number.into()),
-        AnyValue::Int128(number) => Value::Integer(number),
-        AnyValue::UInt8(number) => Value::Integer(number.into()),
-        AnyValue::UInt16(number) => Value::Integer(number.into()),
-        AnyValue::UInt32(number) => Value::Integer(number.into()),
-        AnyValue::UInt64(number) => Value::Integer(number.into()),
+        AnyValue::Null => QueryValue::Null,
+        AnyValue::Boolean(truth) => QueryValue::Boolean(truth),
+        AnyValue::String(text) => QueryValue::Text(text.into()),
+        AnyValue::StringOwned(text) => QueryValue::Text(text.to_string().into()),
+        AnyValue::Float64(number) => QueryValue::Number(number),
+        AnyValue::Float32(number) => QueryValue::Number(number.into()),
+        AnyValue::Int8(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int16(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int32(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int64(number) => QueryValue::Integer(number.into()),
+        AnyValue::Int128(number) => QueryValue::Integer(number),
+        AnyValue::UInt8(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt16(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt32(number) => QueryValue::Integer(number.into()),
+        AnyValue::UInt64(number) => QueryValue::Integer(number.into()),
         // Dates, lists and what else a query may make: as polars writes them.
-        other => Value::Text(other.to_string().into()),
+        other => QueryValue::Text(other.to_string().into()),
     }
 }

@@ -10,7 +10,7 @@ mod size;
 mod statement;
 mod tables;
 
-pub use answer::{Answer, Value};
+pub use answer::{QueryResult, QueryValue};
 pub use tables::{QueryColumn, QueryTable, QueryTables};
 
 use polars::prelude::{DataFrame, LazyFrame, PlRefPath, PolarsResult, ScanArgsParquet};
@@ -22,7 +22,7 @@ use crate::store::Store;
 use statement::Statement;
 
 /// Answers one SELECT over the tables of a run; whatever is wrong with it is the asker's to mend.
-pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<Answer> {
+pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<QueryResult> {
     let statement = Statement::read(sql, tables)?;
     let context = SQLContext::new();
     let mut columns = Vec::new();
@@ -34,7 +34,7 @@ pub fn query(store: &Store, tables: &QueryTables, sql: &str) -> Result<Answer> {
     // What a parser lets through may still be more than polars is ready for.
     let answer = catch_unwind(AssertUnwindSafe(|| collect(context, &statement.text)));
     let frame = answer.map_err(|_| Error::spec("SQL", "polars cannot answer this; put it in other words"))?;
-    Ok(Answer::new(frame.map_err(|error| fault::of(&error, &columns))?))
+    Ok(QueryResult::new(frame.map_err(|error| fault::of(&error, &columns))?))
 }
 
 fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {

@@ -1,7 +1,7 @@
 //! Robots on a cluster: what is asked of it, and the wait for their records.
 
 use crate::error::{Error, Fault, Result, counted};
-use crate::fleet::cluster::Wishes;
+use crate::fleet::cluster::ClusterOptions;
 use crate::fleet::ledger::RunNote;
 use crate::fleet::slurm::{self, Waited};
 use crate::fleet::{Ending, Workshop};
@@ -39,10 +39,10 @@ pub(super) struct ClusterArguments {
 
 impl ClusterArguments {
     /// What to ask of the cluster; paths as all nodes know them.
-    pub(super) fn wishes(&self, store: &std::path::Path) -> Result<Wishes> {
+    pub(super) fn wishes(&self, store: &std::path::Path) -> Result<ClusterOptions> {
         let fault = |error: std::io::Error| Error::store("--store", error.to_string());
         let program: PathBuf = std::env::current_exe().map_err(fault)?;
-        Ok(Wishes {
+        Ok(ClusterOptions {
             program,
             store: std::path::absolute(store).map_err(fault)?,
             partition: self.partition.clone(),
@@ -135,6 +135,6 @@ pub(super) fn on_slurm(
     Ok(Some(at_first.len() - left.len()))
 }
 
-fn log_folder(wishes: &Wishes, note: &RunNote) -> String {
+fn log_folder(wishes: &ClusterOptions, note: &RunNote) -> String {
     crate::fleet::cluster::logs(&wishes.store, &note.fleet).display().to_string()
 }

@@ -8,7 +8,7 @@ mod status;
 
 use super::surroundings::{bucket, default_store};
 use crate::error::{Error, Fault, Result, counted, visible};
-use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop};
+use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop};
 use crate::pipeline::Surroundings;
 use crate::store::Store;
 use clap::{Args, Subcommand};
@@ -36,7 +36,7 @@ enum FleetVerb {
 
 /// What all verbs need.
 #[derive(Args)]
-struct Place {
+struct FleetLocation {
     /// The fleet's YAML file
     #[arg(value_name = "FLEET")]
     fleet: PathBuf,
@@ -45,7 +45,7 @@ struct Place {
     store: Option<PathBuf>,
 }
 
-impl Place {
+impl FleetLocation {
     fn store(&self) -> Result<Store> {
         folder(&self.store.clone().unwrap_or_else(default_store))
     }
@@ -78,7 +78,7 @@ fn workshop<'a>(fleet: &'a Fleet, store: &'a Store, surroundings: &'a (dyn Fn() 
 }
 
 /// The records of all robots as they are; none where a robot has none for its settings and data.
-fn records(workshop: &Workshop) -> Result<Vec<Option<Record>>> {
+fn records(workshop: &Workshop) -> Result<Vec<Option<RobotRecord>>> {
     workshop.fleet.roster.0.par_iter().map(|robot| workshop.record(robot)).collect()
 }
 
@@ -86,9 +86,9 @@ fn records(workshop: &Workshop) -> Result<Vec<Option<Record>>> {
 const NAMED: usize = 20;
 
 /// Nothing where all robots are done; else the worst of how they ended, with reasons.
-fn verdict(fleet: &Fleet, records: &[Option<Record>]) -> Result<()> {
+fn verdict(fleet: &Fleet, records: &[Option<RobotRecord>]) -> Result<()> {
     let bad = |ending: Ending| records.iter().flatten().filter(move |record| record.ending == ending);
-    let line = |record: &Record| {
+    let line = |record: &RobotRecord| {
         let reason = record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default();
         Fault::new(visible(&record.robot), format!("{}: {}", record.ending.name(), visible(reason)))
     };

@@ -3,7 +3,7 @@
 use super::super::emit;
 use super::super::surroundings::surroundings;
 use super::cluster::ClusterArguments;
-use super::{Place, records, run, workshop};
+use super::{FleetLocation, records, run, workshop};
 use crate::error::{Error, Result};
 use crate::fleet::{Fleet, cluster};
 use clap::{Args, ValueEnum};
@@ -16,7 +16,7 @@ use std::ffi::OsString;
   calib fleet render FLEET.yaml --engine k8s --store /store --image calib:0.1 --claim robots > job.yaml")]
 pub(super) struct RenderArguments {
     #[command(flatten)]
-    place: Place,
+    place: FleetLocation,
     #[arg(long, value_enum)]
     engine: Scheduler,
     #[command(flatten)]

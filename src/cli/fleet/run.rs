@@ -3,10 +3,10 @@
 use super::super::surroundings::{cores, surroundings};
 use super::super::{emit, emit_json};
 use super::cluster::{ClusterArguments, on_slurm};
-use super::{Place, records, verdict, workshop};
+use super::{FleetLocation, records, verdict, workshop};
 use crate::error::{Error, Result, counted, visible};
 use crate::fleet::ledger::{Member, RunNote};
-use crate::fleet::{Ending, Fleet, Ledger, Record, Workshop, local, tables};
+use crate::fleet::{Ending, Fleet, Ledger, RobotRecord, Workshop, local, tables};
 use crate::progress::{FleetProgress, Verbosity};
 use crate::store::Store;
 use clap::{Args, ValueEnum};
@@ -22,13 +22,13 @@ use std::time::Instant;
 #[command(after_help = EXAMPLES)]
 pub(super) struct FleetRunArguments {
     #[command(flatten)]
-    pub(super) place: Place,
+    pub(super) place: FleetLocation,
     #[command(flatten)]
-    pub(super) how: How,
+    pub(super) how: FleetRunOptions,
 }
 
 #[derive(Args)]
-pub(super) struct How {
+pub(super) struct FleetRunOptions {
     /// Only these robots, by name; may be given several times
     #[arg(long, value_name = "NAME")]
     robot: Vec<String>,
@@ -63,12 +63,12 @@ pub(super) enum Engine {
 #[derive(Args)]
 pub(super) struct RetryArguments {
     #[command(flatten)]
-    place: Place,
+    place: FleetLocation,
     /// Those that are not done; the only choice so far
     #[arg(long)]
     failed: bool,
     #[command(flatten)]
-    how: How,
+    how: FleetRunOptions,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -98,7 +98,7 @@ pub(super) fn retry(arguments: &RetryArguments, command_line: &[OsString]) -> Re
     run(&fleet, &store, &arguments.place, &arguments.how, command_line)
 }
 
-fn run(fleet: &Fleet, store: &Store, place: &Place, how: &How, command_line: &[OsString]) -> Result<()> {
+fn run(fleet: &Fleet, store: &Store, place: &FleetLocation, how: &FleetRunOptions, command_line: &[OsString]) -> Result<()> {
     let begun = Instant::now();
     let fresh = || surroundings(command_line);
     let workshop = workshop(fleet, store, &fresh);
@@ -143,7 +143,7 @@ fn run(fleet: &Fleet, store: &Store, place: &Place, how: &How, command_line: &[O
     } else {
         emit(&text(&all, computed, seconds, &told))?;
     }
-    let asked: Vec<Option<Record>> = chosen.iter().map(|index| all[*index].clone()).collect();
+    let asked: Vec<Option<RobotRecord>> = chosen.iter().map(|index| all[*index].clone()).collect();
     verdict(fleet, &asked)
 }
 
@@ -173,10 +173,10 @@ fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
 }
 
 /// The run as engines and later campaigns find it.
-pub(super) fn note(fleet: &Fleet, place: &Place, run: &str) -> Result<RunNote> {
+pub(super) fn note(fleet: &Fleet, place: &FleetLocation, run: &str) -> Result<RunNote> {
     let file = std::path::absolute(&place.fleet);
     let file = file.map_err(|error| Error::store(place.fleet.display().to_string(), error.to_string()))?;
-    let member = |robot: &crate::fleet::Robot| Member { name: robot.name.clone(), groups: robot.groups.clone(), key: None };
+    let member = |robot: &crate::fleet::FleetRobot| Member { name: robot.name.clone(), groups: robot.groups.clone(), key: None };
     Ok(RunNote {
         run: run.into(),
         fleet: fleet.name().into(),
@@ -188,11 +188,11 @@ pub(super) fn note(fleet: &Fleet, place: &Place, run: &str) -> Result<RunNote> {
     })
 }
 
-pub(super) fn count(records: &[Option<Record>], ending: Ending) -> usize {
+pub(super) fn count(records: &[Option<RobotRecord>], ending: Ending) -> usize {
     records.iter().flatten().filter(|record| record.ending == ending).count()
 }
 
-fn text(records: &[Option<Record>], computed: usize, seconds: f64, told: &tables::Told) -> String {
+fn text(records: &[Option<RobotRecord>], computed: usize, seconds: f64, told: &tables::FleetSummary) -> String {
     let mut text = String::new();
     for row in told.fleet.0.iter().filter(|row| row.flags.is_some()) {
         text.push_str(&format!("{}: {}\n", visible(&row.robot), visible(row.flags.as_deref().unwrap_or_default())));
@@ -214,10 +214,10 @@ fn text(records: &[Option<Record>], computed: usize, seconds: f64, told: &tables
 fn document(
     fleet: &Fleet,
     run: &str,
-    records: &[Option<Record>],
+    records: &[Option<RobotRecord>],
     computed: usize,
     seconds: f64,
-    told: &tables::Told,
+    told: &tables::FleetSummary,
 ) -> serde_json::Value {
     let robots = fleet.roster.0.iter().zip(records).zip(&told.fleet.0).map(|((robot, record), row)| {
         json!({

@@ -3,9 +3,9 @@
 use super::super::surroundings::surroundings;
 use super::super::{emit, emit_json};
 use super::run::{count, ledger};
-use super::{Place, records, workshop};
+use super::{FleetLocation, records, workshop};
 use crate::error::{Error, Result, counted, visible};
-use crate::fleet::{Ending, Fleet, FleetFile, Record, slurm};
+use crate::fleet::{Ending, Fleet, FleetFile, RobotRecord, slurm};
 use clap::Args;
 use serde_json::json;
 use std::ffi::OsString;
@@ -17,7 +17,7 @@ use std::ffi::OsString;
   calib fleet status FLEET.yaml --robot r7")]
 pub(super) struct StatusArguments {
     #[command(flatten)]
-    place: Place,
+    place: FleetLocation,
     /// One robot, in detail
     #[arg(long, value_name = "NAME")]
     robot: Option<String>,
@@ -30,7 +30,7 @@ pub(super) struct StatusArguments {
 #[derive(Args)]
 pub(super) struct CancelArguments {
     #[command(flatten)]
-    place: Place,
+    place: FleetLocation,
 }
 
 pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Result<()> {
@@ -74,11 +74,11 @@ pub(super) fn main(arguments: &StatusArguments, command_line: &[OsString]) -> Re
     emit(&text)
 }
 
-fn first_line(record: &Record) -> String {
+fn first_line(record: &RobotRecord) -> String {
     visible(record.reason.as_deref().and_then(|reason| reason.lines().next()).unwrap_or_default())
 }
 
-fn detail(record: &Record, store: &crate::store::Store, fleet: &str) -> String {
+fn detail(record: &RobotRecord, store: &crate::store::Store, fleet: &str) -> String {
     let mut text = format!("{}: {}\n", visible(&record.robot), record.ending.name());
     for line in record.reason.iter().flat_map(|reason| reason.lines()) {
         text.push_str(&format!("  {}\n", visible(line)));

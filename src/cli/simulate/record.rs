@@ -3,7 +3,7 @@
 use super::super::surroundings::{cores, open_store, surroundings};
 use super::super::{emit, emit_json};
 use crate::error::{Error, Result, counted};
-use crate::pipeline::{Outcome, Override, Plan, Purpose, RunOptions, Selection, run};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
 use crate::progress::{Progress, Verbosity};
 use crate::proof::{recorded, vacant};
 use crate::stage::{STAGES, Simulate, Stage};
@@ -73,7 +73,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     emit(&format!("{}, {}: {}\n", counted(rows, "point"), counted(truth.0.len(), "true number"), arguments.out.display()))
 }
 
-fn table<T: Table>(outcome: &Outcome, store: &Store) -> Result<T> {
+fn table<T: Table>(outcome: &CompletedRun, store: &Store) -> Result<T> {
     let last = outcome.tables(T::KIND).last();
     let output = last.ok_or_else(|| Error::Bug(format!("a simulation without a table {}", T::KIND)))?;
     T::from_frame(&store.load(&output.table)?)

@@ -111,7 +111,7 @@ mod tests {
     use crate::diagnose::whitened::WhitenedProblem;
     use crate::effect::{EffectStack, Form, GearCyclic, Survey, hypotheses};
     use crate::estimate::Model;
-    use crate::robot::import::{Text, read_calib};
+    use crate::robot::import::{RobotFileText, read_calib};
     use crate::robot::{Measurements, RobotModel};
     use crate::spatial::Pose;
     use nalgebra::Vector3;
@@ -164,7 +164,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
 
     /// What stays of the chosen causes, and what is said of the others.
     fn left(passing: f64, keys: &[&str]) -> (Vec<String>, Vec<String>) {
-        let text = Text { label: "robot.yaml", text: ROBOT };
+        let text = RobotFileText { label: "robot.yaml", text: ROBOT };
         let robot = RobotModel::new(read_calib(text, None).expect("a robot").robot);
         let data = recorded(&robot, passing);
         let rows: Vec<usize> = (0..ROWS).collect();

@@ -2,7 +2,7 @@
 
 use super::hypotheses::HypothesisSet;
 use super::solve::Solution;
-use crate::effect::{Effect, Hypothesis};
+use crate::effect::Hypothesis;
 
 /// Explanations whose criterion is this close fit equally well (Kass and Raftery, 1995).
 pub(crate) const EQUIVALENT: f64 = 6.0;
@@ -18,7 +18,7 @@ pub(super) fn fall(n: f64, square: f64, gain: f64, rank: usize, prior_penalty: f
 impl HypothesisSet<'_> {
     /// Whether all members of a set make sense together.
     pub(super) fn is_sound(&self, set: &[usize]) -> bool {
-        let yields = |k: &usize| matches!(self.hypotheses[*k].form.name(), "joint_compliance" | "joint_hardening");
+        let yields = |k: &usize| self.hypotheses[*k].form.cause().yields_to_torque();
         !set.iter().any(|k| self.of_torque_model[*k]) || set.iter().any(yields)
     }
 

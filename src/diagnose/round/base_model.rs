@@ -1,7 +1,7 @@
 //! The model that the user's simulation has: the nominal robot, aligned, with the corrections that every calibration makes.
 
 use super::reversed_joints::{REVERSED, reverse, reversed};
-use crate::effect::{Effect, EffectStack, Load, ReductionRatio, Setting, identified};
+use crate::effect::{Effect, EffectContext, EffectStack, Load, Place, ReductionRatio, identified};
 use crate::estimate::{Model, align};
 use crate::robot::{Measurements, RobotModel};
 
@@ -13,7 +13,7 @@ pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]
     let reversed = reversed(robot, data, rows);
     let mut turned = data.clone();
     reversed.iter().for_each(|joint| reverse(&mut turned, *joint));
-    let setting = Setting { base: align(robot, &turned, rows), load: Load::GravityTorque };
+    let setting = EffectContext { base: align(robot, &turned, rows), load: Load::GravityTorque };
     let effects: Vec<Box<dyn Effect>> = identified()
         .filter(|cause| BASE.contains(&cause.name()))
         .filter_map(|cause| cause.whole(&setting))
@@ -21,8 +21,9 @@ pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]
         .collect();
     let mut model = Model::nominal(robot.clone(), EffectStack::new(robot, setting.base, effects));
     for joint in reversed {
-        let name = format!("{}.j{}", ReductionRatio::NAME, joint + 1);
-        if let Some(k) = model.stack.specs().iter().position(|spec| spec.name == name) {
+        let stack = &model.stack;
+        let ratio = stack.parameters_of(ReductionRatio::NAME).find(|k| stack.specs()[*k].place == Place::Joint(joint));
+        if let Some(k) = ratio {
             model.x[k] = REVERSED;
         }
     }

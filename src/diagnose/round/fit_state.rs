@@ -4,7 +4,7 @@ use super::base_model::base_model;
 use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{Memory, WhitenedProblem};
-use crate::effect::{BaseFrame, Effect, EffectStack, Form, Load, ParameterSpec, Setting, Term, whole};
+use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
@@ -154,13 +154,13 @@ impl<'a> Fitter<'a> {
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.
     pub fn fit(&self, from: &Model, causes: Vec<EstimatedCause>) -> FitState {
-        let (mut model, ranges) = with_causes(from, &causes);
-        let first = ranges.first().map_or(model.x.len(), |range| range.start);
+        let (start, ranges) = with_causes(from, &causes);
+        let first = ranges.first().map_or(start.x.len(), |range| range.start);
         let all: Vec<usize> = (0..first).collect();
         let base = self.free.as_ref().unwrap_or(&all);
-        let candidates: Vec<usize> = base.iter().copied().chain(first..model.x.len()).collect();
+        let candidates: Vec<usize> = base.iter().copied().chain(first..start.x.len()).collect();
         let options = FitOptions { rows: self.question.fit, candidates: &candidates };
-        let (fitted, screening) = fit_screened(&mut model, &self.data, &options, self.question.set);
+        let (model, fitted, screening) = fit_screened(&start, &self.data, &options, self.question.set);
         let estimated = |(cause, range): (EstimatedCause, &Range<usize>)| EstimatedCause {
             coefficients: model.x[range.clone()].to_vec(),
             ..cause
@@ -173,7 +173,7 @@ impl<'a> Fitter<'a> {
 /// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.
 fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Vec<Range<usize>>) {
     // The base starts where it was found, so that its correction is too small to matter to what else moves it.
-    let setting = Setting { base: from.base(), load: Load::GravityTorque };
+    let setting = EffectContext { base: from.base(), load: Load::GravityTorque };
     let base = || from.stack.effects().filter(|(effect, _)| effect.form().is_none());
     let again = base().filter_map(|(effect, _)| whole(effect.name(), &setting));
     let own = causes.iter().map(|cause| Box::new(cause.form.clone()) as Box<dyn Effect>);

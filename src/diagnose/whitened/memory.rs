@@ -50,14 +50,14 @@ impl Memory {
             variance = self.share + decay * decay * (variance - self.share);
             let whole = variance + 1.0 - self.share;
             let gain = variance / whole;
-            steps.push(Step { decay, gain, whole });
+            steps.push(FilterStep { decay, gain, whole });
             variance *= 1.0 - gain;
         }
         Innovations(steps)
     }
 }
 
-struct Step {
+struct FilterStep {
     decay: f64,
     gain: f64,
     /// Variance of the innovation.
@@ -65,7 +65,7 @@ struct Step {
 }
 
 /// What each row says beyond the rows before it.
-pub(crate) struct Innovations(Vec<Step>);
+pub(crate) struct Innovations(Vec<FilterStep>);
 
 impl Innovations {
     /// Takes a column, three numbers a row, to its innovations in standard deviations.

@@ -10,9 +10,9 @@ use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::{Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
-use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, Verdict};
+use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::effect::Unknown;
-use crate::estimate::cross_validate;
+use crate::estimate::{Session, cross_validate};
 use nalgebra::Vector3;
 
 /// With structure left, a residual this much larger than the noise is not explained.
@@ -41,7 +41,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(fitter.memory.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
-    let folds = cross_validate(&state.model, data, &state.screening.kept, &state.fitted, FOLDS, fitter.question.seed);
+    let folds = cross_validate(
+        &Session { data, rows: &state.screening.kept, model: &state.model, fitted: &state.fitted },
+        FOLDS,
+        fitter.question.seed,
+    );
     Diagnosis {
         verdict,
         noise_floor: misfit.noise_floor,
@@ -78,16 +82,16 @@ fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
     findings.into_iter().partition(small)
 }
 
-fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> Verdict {
+fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
     let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
     let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
     let only_unknown = physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME);
     if blind || something_left || only_unknown {
-        Verdict::Unexplained
+        VerdictKind::Unexplained
     } else if findings.is_empty() {
-        Verdict::NothingMissing
+        VerdictKind::NothingMissing
     } else {
-        Verdict::Explained
+        VerdictKind::Explained
     }
 }
 

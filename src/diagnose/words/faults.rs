@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, REVERSED};
 use crate::diagnose::types::{Finding, Probabilities};
-use crate::effect::{JointLogLag, ParameterEstimate, ParameterSpec, Place, ReductionRatio};
+use crate::effect::{JointLogLag, ParameterEstimate, Place, ReductionRatio};
 use crate::error::counted;
 use crate::estimate::{ParameterStatus, Screening, Suspect, SuspectKind};
 
@@ -17,15 +17,15 @@ pub(super) fn rows_apart(offset: i64) -> Finding {
 
 /// Joints that turn the other way than the robot file says.
 pub(super) fn reversals(last: &FitState) -> Vec<Finding> {
-    let specs = last.model.stack.specs().iter().zip(&last.model.x).zip(&last.fitted.statuses);
-    let reversed =
-        specs.filter(|((spec, x), _)| spec.name.starts_with(ReductionRatio::NAME) && (*x - REVERSED).abs() < REVERSED_WITHIN);
-    let one = |((spec, x), status): ((&ParameterSpec, &f64), &ParameterStatus)| {
-        let sigma = if let ParameterStatus::Free(sigma) = status { Some(*sigma) } else { None };
-        let place = spec.place;
+    let FitState { model, fitted, .. } = last;
+    let ratios = model.stack.parameters_of(ReductionRatio::NAME);
+    let reversed = ratios.filter(|k| (model.x[*k] - REVERSED).abs() < REVERSED_WITHIN);
+    let one = |k: usize| {
+        let sigma = if let ParameterStatus::Free(sigma) = fitted.statuses[k] { Some(sigma) } else { None };
+        let place = model.stack.specs()[k].place;
         let statement =
             format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
-        let parameters = vec![ParameterEstimate { name: "k".into(), value: 1.0 + x, unit: "1", sigma }];
+        let parameters = vec![ParameterEstimate { name: "k".into(), form: 0, value: 1.0 + model.x[k], unit: "1", sigma }];
         Finding { place, parameters, ..of_the_recording(ReductionRatio::NAME, statement) }
     };
     reversed.map(one).collect()

@@ -115,7 +115,7 @@ const FIRM: f64 = 2.0;
 
 /// The fitted parameters of some causes, as people read them.
 fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
-    let one = |k: usize| {
+    let one = |(form, k): (usize, usize)| {
         let spec = &state.model.stack.specs()[k];
         let sigma = match state.fitted.statuses[k] {
             ParameterStatus::Free(sigma) => Some(sigma),
@@ -125,12 +125,13 @@ fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<Paramete
         let name = spec.name.strip_prefix(effect).unwrap_or(&spec.name).trim_start_matches('.');
         ParameterEstimate {
             name: name.to_string(),
+            form,
             value: unit.from_si(state.model.x[k]),
             unit: symbol,
             sigma: sigma.map(|sigma| unit.from_si(sigma)),
         }
     };
-    members.iter().flat_map(|i| state.ranges[*i].clone()).map(one).collect()
+    members.iter().enumerate().flat_map(|(form, i)| state.ranges[*i].clone().map(move |k| (form, k))).map(one).collect()
 }
 
 /// Joint and range over which the errors of a joint hold.

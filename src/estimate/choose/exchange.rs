@@ -4,7 +4,7 @@
 //! round: determinants change by a constant only, and no digits are lost to ill-scaled parameters.
 
 use super::point_jacobian::{PointJacobian, factor, product};
-use crate::estimate::factor::Factor;
+use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::estimate::triangle::axpy;
 use crate::robot::Measurements;
@@ -20,7 +20,7 @@ const PASSES: usize = 4;
 const WORTH: f64 = 1e-6;
 
 /// A weighted log determinant.
-pub(super) struct Term {
+pub(super) struct DesignTerm {
     weight: f64,
     jacobian: PointJacobian,
     /// Upper triangular: makes the random candidates round, or what is known before.
@@ -31,10 +31,10 @@ pub(super) struct Term {
 
 /// What chosen poses make as large as possible.
 pub(super) struct Criterion {
-    pub terms: Vec<Term>,
+    pub terms: Vec<DesignTerm>,
 }
 
-impl Term {
+impl DesignTerm {
     /// `None` where the candidates do not tell the parameters.
     pub fn new(weight: f64, jacobian: PointJacobian, model: &Model, drawn: &Measurements) -> Option<Self> {
         let scale = (drawn.rows() as f64).sqrt();
@@ -44,7 +44,7 @@ impl Term {
     }
 
     /// Beside what is known before: the factor of its rows. `None` where that leaves a direction free.
-    pub fn beside(weight: f64, jacobian: PointJacobian, known: &Factor) -> Option<Self> {
+    pub fn beside(weight: f64, jacobian: PointJacobian, known: &TriangularFactor) -> Option<Self> {
         let inverse = known.inverse()?;
         let round = Mat::from_fn(inverse.size(), inverse.size(), |i, j| inverse.at(i, j));
         Some(Self { weight, jacobian, round, ridge: 1.0 })

@@ -14,12 +14,12 @@ mod visit_order;
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
-pub use tell::{Contest, Proposed, Side, TOLD, Told, tell};
+pub use tell::{Alternative, Contest, Discrimination, Proposed, TOLD, tell};
 
 use super::model::Model;
 use crate::robot::{Measurements, Named};
 use crate::statistics::nearest;
-use exchange::{Criterion, Term};
+use exchange::{Criterion, DesignTerm};
 use point_jacobian::gather;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -36,7 +36,7 @@ pub enum Aim {
 
 /// What is asked for.
 #[derive(Debug, Clone)]
-pub struct Wish {
+pub struct DesignRequest {
     pub aim: Aim,
     /// Poses to propose.
     pub count: usize,
@@ -86,7 +86,7 @@ const WORKSPACE: usize = 500;
 const STEPS: [f64; 3] = [0.5, 0.2, 0.06];
 
 /// Proposes poses for a model; fails with a sentence when no such poses are possible.
-pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, String> {
+pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Proposal, String> {
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
     let workspace = site.draw(&model.robot, WORKSPACE.div_ceil(site.payloads.len()), wish.sigma, wish.seed ^ WORKSPACE as u64)?;
     if drawn.rows() < 2 * wish.count {
@@ -106,7 +106,7 @@ pub fn propose(model: Model, site: &Site, wish: &Wish) -> Result<Proposal, Strin
         orders.iter().map(|(weight, order)| (*weight, PointJacobian::of(&model, &drawn, order))).collect();
     let Some((_, whole)) = jacobians.first() else { return Err("nothing to choose for".into()) };
     check(wish, &jacobians, whole)?;
-    let terms = jacobians.iter().map(|(weight, jacobian)| Term::new(*weight, jacobian.clone(), &model, &drawn));
+    let terms = jacobians.iter().map(|(weight, jacobian)| DesignTerm::new(*weight, jacobian.clone(), &model, &drawn));
     let criterion = Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidates do not tell the parameters apart")? };
 
     let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
@@ -139,7 +139,7 @@ fn parameters(model: &Model, name: &str) -> Result<Vec<usize>, String> {
     found.map(|(_, range)| range.collect()).ok_or_else(|| format!("`{name}` is not among the effects of this model"))
 }
 
-fn check(wish: &Wish, jacobians: &[(f64, PointJacobian)], whole: &PointJacobian) -> Result<(), String> {
+fn check(wish: &DesignRequest, jacobians: &[(f64, PointJacobian)], whole: &PointJacobian) -> Result<(), String> {
     let parameters = whole.free().len();
     if parameters == 0 {
         return Err("no parameter of these effects shows at the allowed poses".into());

@@ -1,6 +1,6 @@
 //! What poses would tell: the seen parameters, rows of their whitened Jacobian, and what would follow for the estimate.
 
-use crate::estimate::factor::{Factor, Tall};
+use crate::estimate::factor::{StackedRows, TriangularFactor};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::problem::Problem;
@@ -160,9 +160,9 @@ pub(super) fn gather(rows: &Mat<f64>, poses: &[usize]) -> Mat<f64> {
 }
 
 /// The factor of such rows; the right-hand side is zero.
-pub(super) fn factor(rows: &Mat<f64>) -> Factor {
+pub(super) fn factor(rows: &Mat<f64>) -> TriangularFactor {
     let p = rows.ncols();
-    let mut tall = Tall::new(p + 1, rows.nrows().min(CHUNK));
+    let mut tall = StackedRows::new(p + 1, rows.nrows().min(CHUNK));
     for start in (0..rows.nrows()).step_by(CHUNK) {
         let height = CHUNK.min(rows.nrows() - start);
         for (j, column) in tall.chunk(height).into_iter().take(p).enumerate() {

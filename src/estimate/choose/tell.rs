@@ -4,11 +4,11 @@
 //! place: over the recorded rows and the new ones together (T-optimality, Atkinson and Fedorov 1975). Poses make the sum of both
 //! ln(1 + L) as large as possible.
 
-use super::exchange::{Criterion, Term};
+use super::exchange::{Criterion, DesignTerm};
 use super::point_jacobian::{PointJacobian, factor, gather};
 use super::site::{Circumstances, Site};
-use super::{STEPS, Wish, median, random_sets, subset, visit_order};
-use crate::estimate::factor::Factor;
+use super::{DesignRequest, STEPS, median, random_sets, subset, visit_order};
+use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
 use crate::robot::Measurements;
 use faer::Mat;
@@ -22,18 +22,18 @@ pub struct Contest {
     pub model: Model,
     /// Positions in the stack of what is estimated whichever is true.
     pub nuisances: Vec<usize>,
-    pub sides: [Side; 2],
+    pub sides: [Alternative; 2],
 }
 
 /// An explanation: its parameters' positions in the stack, and their values, SI.
 #[derive(Debug, Clone)]
-pub struct Side {
+pub struct Alternative {
     pub parameters: Vec<usize>,
     pub sizes: Vec<f64>,
 }
 
 /// What poses would tell; of each pair the first is L where the first explanation is true.
-pub struct Told {
+pub struct Discrimination {
     /// Of the recorded rows alone.
     pub before: [f64; 2],
     /// Whether the other does the same at every allowed pose.
@@ -66,7 +66,7 @@ struct View {
     jacobian: PointJacobian,
     /// The same without the true one's column.
     rest: PointJacobian,
-    known: Factor,
+    known: TriangularFactor,
 }
 
 impl View {
@@ -91,10 +91,10 @@ impl View {
     }
 
     /// The two terms whose sum is ln(1 + L).
-    fn terms(&self) -> Option<[Term; 2]> {
+    fn terms(&self) -> Option<[DesignTerm; 2]> {
         let all: Vec<usize> = (0..self.known.parameters() - 1).collect();
         let rest = self.known.select(&all);
-        Some([Term::beside(1.0, self.jacobian.clone(), &self.known)?, Term::beside(-1.0, self.rest.clone(), &rest)?])
+        Some([DesignTerm::beside(1.0, self.jacobian.clone(), &self.known)?, DesignTerm::beside(-1.0, self.rest.clone(), &rest)?])
     }
 }
 
@@ -104,8 +104,8 @@ pub fn tell(
     contest: &Contest,
     (data, rows): (&Measurements, &[usize]),
     (site, circumstances): (&Site, &Circumstances),
-    wish: &Wish,
-) -> Result<Told, String> {
+    wish: &DesignRequest,
+) -> Result<Discrimination, String> {
     let model = &contest.model;
     let mut draw = ChaCha8Rng::seed_from_u64(wish.seed.wrapping_add(1));
     let mut drawn = site.draw(&model.robot, wish.candidates, wish.sigma, wish.seed)?;
@@ -122,10 +122,10 @@ pub fn tell(
         before[truth] < TOLD && views[truth].separation(&all[truth]) <= NOTHING * (whole(&all[truth]) + whole(&seen))
     });
     if alike == [true; 2] {
-        return Ok(Told { before, alike, proposed: None });
+        return Ok(Discrimination { before, alike, proposed: None });
     }
     let terms = views.iter().zip(alike).filter(|(_, alike)| !alike).map(|(view, _)| view.terms());
-    let terms: Option<Vec<[Term; 2]>> = terms.collect();
+    let terms: Option<Vec<[DesignTerm; 2]>> = terms.collect();
     let terms = terms.ok_or("the recording leaves the parameters undefined")?;
     let criterion = Criterion { terms: terms.into_iter().flatten().collect() };
     let mut poses = subset(&drawn, &criterion.exchange(model, &drawn, &[], wish.count));
@@ -149,7 +149,7 @@ pub fn tell(
     let sets = random_sets(&drawn, wish.count, wish.seed);
     let random = [0, 1].map(|k| median(sets.par_iter().map(|set| views[k].separation(&gather(&all[k], set))).collect()));
     let direction = poses.direction.clone().unwrap_or_default();
-    Ok(Told { before, alike, proposed: Some(Proposed { poses, direction, approach_seen, after, random }) })
+    Ok(Discrimination { before, alike, proposed: Some(Proposed { poses, direction, approach_seen, after, random }) })
 }
 
 fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {

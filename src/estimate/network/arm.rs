@@ -20,7 +20,7 @@ pub struct Hinge {
 
 /// Screws, measured point (m) and the direction of gravity at the zero pose, tracker frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Arm {
+pub struct ScrewArm {
     pub hinges: Vec<Hinge>,
     pub tool: [f64; 3],
     pub down: [f64; 3],
@@ -35,7 +35,7 @@ pub struct Stance {
     down: Vector3<f64>,
 }
 
-impl Arm {
+impl ScrewArm {
     /// The nominal robot, its base standing at `base` in the tracker's frame.
     pub fn of(robot: &RobotModel, base: &Pose) -> Self {
         let hinges = (0..robot.joints()).map(|joint| Hinge {

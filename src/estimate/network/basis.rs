@@ -3,11 +3,11 @@
 //! Two dictionaries: [`harmonics`] moves the point along the tracker's axes (ridge on harmonics), [`curves`] turns each joint by a
 //! smooth curve of its own angle, tilts and shifts the stations between, and winds joints up by the weight of what they carry.
 
-use super::arm::{Arm, Stance};
+use super::arm::{ScrewArm, Stance};
 
 /// How the point moves. Joints, stations and axes from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum OutputMotion {
     /// Along an axis of the tracker's frame.
     Along(usize),
     /// As this joint would move it.
@@ -33,7 +33,7 @@ pub enum Wave {
 /// A way times the product of its waves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BasisTerm {
-    pub way: Way,
+    pub way: OutputMotion,
     pub waves: Vec<Wave>,
 }
 
@@ -64,14 +64,14 @@ pub fn harmonics(prismatic: &[bool]) -> Vec<Vec<BasisTerm>> {
         }
     }
     groups.push(pairs);
-    let along = |waves: Vec<Wave>| (0..3).map(move |axis| BasisTerm { way: Way::Along(axis), waves: waves.clone() });
+    let along = |waves: Vec<Wave>| (0..3).map(move |axis| BasisTerm { way: OutputMotion::Along(axis), waves: waves.clone() });
     groups.into_iter().map(|group| group.into_iter().flat_map(along).collect()).collect()
 }
 
 /// Joint curves as fine as `rows` can show, small motions of all stations, and wind-up by weight.
-pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<BasisTerm>> {
+pub fn curves(arm: &ScrewArm, rows: usize) -> Vec<Vec<BasisTerm>> {
     let joints = arm.hinges.len();
-    let single = |way: Way, wave: Wave| BasisTerm { way, waves: vec![wave] };
+    let single = |way: OutputMotion, wave: Wave| BasisTerm { way, waves: vec![wave] };
     let mut groups: Vec<Vec<BasisTerm>> = Vec::new();
     for (joint, hinge) in arm.hinges.iter().enumerate() {
         let mut low = 1;
@@ -80,29 +80,29 @@ pub fn curves(arm: &Arm, rows: usize) -> Vec<Vec<BasisTerm>> {
                 break;
             }
             let waves = (low..=high).flat_map(|order| [Wave::Sin(joint, order), Wave::Cos(joint, order)]);
-            groups.push(waves.map(|wave| single(Way::Turn(joint), wave)).collect());
+            groups.push(waves.map(|wave| single(OutputMotion::Turn(joint), wave)).collect());
             low = high + 1;
         }
     }
-    let rigid =
-        (0..=joints).flat_map(|station| (0..3).flat_map(move |axis| [Way::Shift(station, axis), Way::Tilt(station, axis)]));
+    let rigid = (0..=joints)
+        .flat_map(|station| (0..3).flat_map(move |axis| [OutputMotion::Shift(station, axis), OutputMotion::Tilt(station, axis)]));
     groups.push(rigid.map(|way| BasisTerm { way, waves: Vec::new() }).collect());
-    let weights =
-        (0..joints).flat_map(|joint| (joint..joints).map(move |body| single(Way::Turn(joint), Wave::Torque(joint, body))));
+    let weights = (0..joints)
+        .flat_map(|joint| (joint..joints).map(move |body| single(OutputMotion::Turn(joint), Wave::Torque(joint, body))));
     groups.push(weights.collect());
     groups
 }
 
 /// Terms at a posture, with the memory that this takes.
 pub struct BasisFunctions<'a> {
-    arm: Option<&'a Arm>,
+    arm: Option<&'a ScrewArm>,
     terms: &'a [BasisTerm],
     /// Sines and cosines of the multiples of each joint's angle.
     multiples: Vec<Vec<[f64; 2]>>,
 }
 
 impl<'a> BasisFunctions<'a> {
-    pub fn new(arm: Option<&'a Arm>, terms: &'a [BasisTerm]) -> Self {
+    pub fn new(arm: Option<&'a ScrewArm>, terms: &'a [BasisTerm]) -> Self {
         let mut highest: Vec<usize> = Vec::new();
         for wave in terms.iter().flat_map(|term| &term.waves) {
             if let Wave::Sin(joint, order) | Wave::Cos(joint, order) = *wave {
@@ -139,12 +139,12 @@ impl<'a> BasisFunctions<'a> {
     }
 }
 
-fn direction(way: Way, stance: Option<&Stance>) -> [f64; 3] {
+fn direction(way: OutputMotion, stance: Option<&Stance>) -> [f64; 3] {
     match (way, stance) {
-        (Way::Along(axis), _) => std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 }),
+        (OutputMotion::Along(axis), _) => std::array::from_fn(|k| if k == axis { 1.0 } else { 0.0 }),
         (_, None) => [0.0; 3],
-        (Way::Turn(joint), Some(stance)) => stance.turn(joint).into(),
-        (Way::Shift(station, axis), Some(stance)) => stance.shift(station, axis).into(),
-        (Way::Tilt(station, axis), Some(stance)) => stance.tilt(station, axis).into(),
+        (OutputMotion::Turn(joint), Some(stance)) => stance.turn(joint).into(),
+        (OutputMotion::Shift(station, axis), Some(stance)) => stance.shift(station, axis).into(),
+        (OutputMotion::Tilt(station, axis), Some(stance)) => stance.tilt(station, axis).into(),
     }
 }

@@ -3,9 +3,9 @@
 //! Inside the region that the training saw it is what was learnt; outside, sources are held at its edge and it fades to nothing
 //! (see [`Region`]).
 
-use super::arm::Arm;
+use super::arm::ScrewArm;
 use super::linear::Linear;
-use super::perceptron::{OUTPUTS, Shape};
+use super::perceptron::{LayerSizes, OUTPUTS};
 use super::process::Process;
 use super::region::Region;
 
@@ -73,14 +73,14 @@ impl Scaling {
 
 /// Inputs and outputs with their scaling.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Dress {
+pub struct NetworkScaling {
     pub features: Vec<Feature>,
     pub inputs: Vec<Scaling>,
     /// m.
     pub outputs: [Scaling; OUTPUTS],
 }
 
-impl Dress {
+impl NetworkScaling {
     /// Standardised inputs at `sources`.
     pub fn scaled(&self, sources: &[f64]) -> Vec<f64> {
         self.features.iter().zip(&self.inputs).map(|(f, scaling)| scaling.scaled(f.of(sources))).collect()
@@ -98,7 +98,7 @@ impl Dress {
 /// Outputs that are motions of the joints, which move the point through the arm's Jacobian.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointMotion {
-    pub arm: Arm,
+    pub arm: ScrewArm,
     /// Motion of each joint per unit of output, rad or m.
     pub scales: Vec<f64>,
 }
@@ -114,7 +114,7 @@ impl JointMotion {
 /// Equal networks whose mean is the correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Networks {
-    pub shape: Shape,
+    pub shape: LayerSizes,
     /// `None`: outputs are the axes.
     pub joints: Option<JointMotion>,
     /// Parameters of each network.
@@ -131,8 +131,8 @@ impl Networks {
 /// What was learnt.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
-    Networks(Dress, Networks),
-    Process(Dress, Process),
+    Networks(NetworkScaling, Networks),
+    Process(NetworkScaling, Process),
     Linear(Linear),
 }
 
@@ -147,7 +147,7 @@ pub struct Correction {
 
 /// A correction as it applies at one pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Applied {
+pub struct AppliedCorrection {
     /// What to add to the predicted position, m.
     pub delta: [f64; 3],
     /// 1 inside the valid region, 0 where nothing is known and `delta` is zero, between on the margin.
@@ -160,14 +160,14 @@ impl Correction {
     /// The correction at `sources` (joints in rad or m, then payload in kg where it was known in training).
     ///
     /// A source that is missing or no number counts as outside the region: no correction.
-    pub fn at(&self, sources: &[f64]) -> Applied {
+    pub fn at(&self, sources: &[f64]) -> AppliedCorrection {
         let share = self.region.share(sources);
         if share == 0.0 {
-            return Applied { delta: [0.0; 3], share: 0.0, spread: None };
+            return AppliedCorrection { delta: [0.0; 3], share: 0.0, spread: None };
         }
         let (whole, doubt) = self.inside(&self.region.held(sources));
         let spread = (share == 1.0).then(|| doubt.hypot(self.left));
-        Applied { delta: whole.map(|value| share * value), share, spread }
+        AppliedCorrection { delta: whole.map(|value| share * value), share, spread }
     }
 
     /// The correction within the region, and how far it is in doubt per axis, m.

@@ -1,7 +1,7 @@
 //! Products of small matrices with columns of rows, in vectors of whatever width the machine has.
 //!
 //! Every number is added up in an order that is written out here, and products are never fused with sums: the same bits on any
-//! machine. What is worked on is a multiple of [`LANES`] rows of a [`Column`].
+//! machine. What is worked on is a multiple of [`LANES`] rows of a [`BlockColumn`].
 
 use pulp::Simd;
 
@@ -10,27 +10,27 @@ pub(super) const LANES: usize = 8;
 /// Rows of a block: what a core's first cache holds for all neurons at once.
 pub(super) const BLOCK: usize = 16 * LANES;
 /// A number of each row of a block.
-pub(super) type Column = [f64; BLOCK];
+pub(super) type BlockColumn = [f64; BLOCK];
 
 /// Rows of the small matrix that are worked on together: what sixteen registers hold with room for their factors.
 const TILE: usize = 4;
 
 /// A small matrix and the columns that it is multiplied by.
 #[derive(Clone, Copy)]
-pub(super) struct Product<'a> {
+pub(super) struct LaneProduct<'a> {
     /// Added to each row of the product; zero where it is empty.
     pub biases: &'a [f64],
     /// The matrix, column after column.
     pub weights: &'a [f64],
-    pub columns: &'a [Column],
+    pub columns: &'a [BlockColumn],
     /// Rows of each column to work on.
     pub length: usize,
 }
 
-impl Product<'_> {
+impl LaneProduct<'_> {
     /// Writes `out[m] = biases[m] + sum_k weights[m, k] columns[k]`, summed in this order.
     #[inline(always)]
-    pub fn write<S: Simd>(&self, simd: S, out: &mut [Column]) {
+    pub fn write<S: Simd>(&self, simd: S, out: &mut [BlockColumn]) {
         let (mut m, count) = (0, out.len());
         while m < count {
             match count - m {
@@ -45,7 +45,7 @@ impl Product<'_> {
 
     /// `M` columns of the product from `first` on.
     #[inline(always)]
-    fn tile<S: Simd, const M: usize>(&self, simd: S, first: usize, out: &mut [Column]) {
+    fn tile<S: Simd, const M: usize>(&self, simd: S, first: usize, out: &mut [BlockColumn]) {
         let vectors = LANES / S::F64_LANES;
         let mut start = [simd.splat_f64s(0.0); M];
         for (start, bias) in start.iter_mut().zip(self.biases.iter().skip(first)) {

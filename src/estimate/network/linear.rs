@@ -4,9 +4,9 @@
 //! `gamma = m - alpha tr C` well-determined ones and takes `alpha = gamma / |x|^2`. Rows far off count less (Huber). The matrix is
 //! summed in chunks of rows, so memory does not grow with the recording.
 
-use super::arm::Arm;
+use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
-use super::samples::Samples;
+use super::samples::TrainingSamples;
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::{DenseSolveCore, Llt};
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
@@ -29,7 +29,7 @@ pub const DRAWS: usize = 8;
 /// Terms and their coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linear {
-    pub arm: Option<Arm>,
+    pub arm: Option<ScrewArm>,
     pub terms: Vec<BasisTerm>,
     /// The most likely coefficients, then [`DRAWS`] draws from the posterior.
     pub members: Vec<Vec<f64>>,
@@ -39,7 +39,7 @@ pub struct Linear {
 
 impl Linear {
     /// Fits `groups` of terms. `None` where nothing moves or the matrix is singular.
-    pub fn fit(samples: &Samples, arm: Option<&Arm>, groups: &[Vec<BasisTerm>], seed: u64) -> Option<Self> {
+    pub fn fit(samples: &TrainingSamples, arm: Option<&ScrewArm>, groups: &[Vec<BasisTerm>], seed: u64) -> Option<Self> {
         let every = samples.rows().div_ceil(ROWS).max(1);
         let rows: Vec<usize> = (0..samples.rows()).step_by(every).collect();
         let (terms, group) = Self::lively(samples, &rows, arm, groups);
@@ -84,9 +84,9 @@ impl Linear {
 
     /// The terms that move the point anywhere with the root mean square of each, and the group of each.
     fn lively(
-        samples: &Samples,
+        samples: &TrainingSamples,
         rows: &[usize],
-        arm: Option<&Arm>,
+        arm: Option<&ScrewArm>,
         groups: &[Vec<BasisTerm>],
     ) -> ((Vec<BasisTerm>, Vec<f64>), Vec<usize>) {
         let all: Vec<BasisTerm> = groups.iter().flatten().cloned().collect();
@@ -121,9 +121,9 @@ impl Linear {
 
 /// The normal equations of scaled columns and of the residual in units of its root mean square.
 struct Sums<'a> {
-    samples: &'a Samples,
+    samples: &'a TrainingSamples,
     rows: &'a [usize],
-    arm: Option<&'a Arm>,
+    arm: Option<&'a ScrewArm>,
     terms: &'a [BasisTerm],
     scale: &'a [f64],
     unit: f64,
@@ -136,9 +136,9 @@ struct Sums<'a> {
 
 impl<'a> Sums<'a> {
     fn new(
-        samples: &'a Samples,
+        samples: &'a TrainingSamples,
         rows: &'a [usize],
-        arm: Option<&'a Arm>,
+        arm: Option<&'a ScrewArm>,
         terms: &'a [BasisTerm],
         scale: &'a [f64],
     ) -> Option<Self> {

@@ -5,8 +5,8 @@
 //! widest instructions of those that the machine and the compiler know; the result is the same with any.
 
 use super::activation::FARTHEST;
-use super::lanes::{BLOCK, Column, LANES, Product, dot, sum};
-use super::perceptron::{OUTPUTS, Shape};
+use super::lanes::{BLOCK, BlockColumn, LANES, LaneProduct, dot, sum};
+use super::perceptron::{LayerSizes, OUTPUTS};
 use crate::estimate::swarm::Objective;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -15,13 +15,13 @@ use pulp::{Arch, Simd, WithSimd};
 pub struct Batch {
     rows: usize,
     /// Of each block, a column per input.
-    inputs: Vec<Column>,
+    inputs: Vec<BlockColumn>,
     /// Largest size of each input.
     largest: Vec<f64>,
     /// Of each block, a column per axis.
-    targets: Vec<Column>,
+    targets: Vec<BlockColumn>,
     /// Of each block, for each output in turn what it does along each axis. Empty where outputs are the axes.
-    ways: Vec<Column>,
+    ways: Vec<BlockColumn>,
 }
 
 impl Batch {
@@ -53,7 +53,7 @@ impl Batch {
 }
 
 /// `width` numbers of each row, as columns of blocks; rows that there are not are zero.
-fn columns<T>(rows: &[T], width: usize, number: impl Fn(&T, usize) -> f64) -> Vec<Column> {
+fn columns<T>(rows: &[T], width: usize, number: impl Fn(&T, usize) -> f64) -> Vec<BlockColumn> {
     let mut out = Vec::with_capacity(width * rows.len().div_ceil(BLOCK));
     for block in rows.chunks(BLOCK) {
         for at in 0..width {
@@ -69,7 +69,7 @@ fn columns<T>(rows: &[T], width: usize, number: impl Fn(&T, usize) -> f64) -> Ve
 
 /// Memory for one block of rows, reused so that the inner loop allocates nothing.
 #[derive(Debug, Clone)]
-pub struct Scratch {
+pub struct LossBuffers {
     /// Weights and biases of the hidden layer times the activation's factor, and output weights, each column after column.
     hidden_weights: Vec<f64>,
     hidden_biases: Vec<f64>,
@@ -77,17 +77,17 @@ pub struct Scratch {
     /// The largest exponent that each neuron can see.
     farthest: Vec<f64>,
     /// Activations, and the loss's derivative by their sums.
-    hidden: Vec<Column>,
-    delta: Vec<Column>,
+    hidden: Vec<BlockColumn>,
+    delta: Vec<BlockColumn>,
     /// Outputs of the network, and the loss's derivative by them.
-    outputs: Vec<Column>,
-    back: Vec<Column>,
+    outputs: Vec<BlockColumn>,
+    back: Vec<BlockColumn>,
     /// `point - target` (the sign that makes the gradient plain) along each axis.
-    errors: [Column; OUTPUTS],
+    errors: [BlockColumn; OUTPUTS],
 }
 
-impl Scratch {
-    pub fn new(shape: Shape) -> Self {
+impl LossBuffers {
+    pub fn new(shape: LayerSizes) -> Self {
         let block = |count: usize| vec![[0.0; BLOCK]; count];
         Self {
             hidden_weights: vec![0.0; shape.inputs * shape.hidden],
@@ -106,7 +106,7 @@ impl Scratch {
 /// A shape, the rows it is trained on and the decay: what is minimised.
 #[derive(Debug, Clone, Copy)]
 pub struct Loss<'a> {
-    pub shape: Shape,
+    pub shape: LayerSizes,
     pub batch: &'a Batch,
     /// Weight of half the summed squared weights beside half the summed squared errors.
     pub decay: f64,
@@ -114,11 +114,11 @@ pub struct Loss<'a> {
 
 /// As the swarm sees it.
 impl Objective for Loss<'_> {
-    type Scratch = Scratch;
-    fn scratch(&self) -> Scratch {
-        Scratch::new(self.shape)
+    type Scratch = LossBuffers;
+    fn scratch(&self) -> LossBuffers {
+        LossBuffers::new(self.shape)
     }
-    fn value(&self, x: &[f64], scratch: &mut Scratch) -> f64 {
+    fn value(&self, x: &[f64], scratch: &mut LossBuffers) -> f64 {
         Loss::value(self, x, scratch)
     }
 }
@@ -129,7 +129,7 @@ struct Asked<'a> {
     parameters: &'a [f64],
     /// Where the gradient is to be written, if it is wanted.
     gradient: Option<&'a mut [f64]>,
-    scratch: &'a mut Scratch,
+    scratch: &'a mut LossBuffers,
 }
 
 impl WithSimd for Asked<'_> {
@@ -142,19 +142,19 @@ impl WithSimd for Asked<'_> {
 
 impl Loss<'_> {
     /// The loss; allocates nothing.
-    pub fn value(&self, parameters: &[f64], scratch: &mut Scratch) -> f64 {
+    pub fn value(&self, parameters: &[f64], scratch: &mut LossBuffers) -> f64 {
         let squares: f64 = self.mean_squares(parameters, scratch).iter().sum();
         0.5 * squares + 0.5 * self.decay * self.weight_squares(parameters) / self.batch.rows as f64
     }
 
     /// Mean squared error of each axis over the rows, without decay.
-    pub fn mean_squares(&self, parameters: &[f64], scratch: &mut Scratch) -> [f64; OUTPUTS] {
+    pub fn mean_squares(&self, parameters: &[f64], scratch: &mut LossBuffers) -> [f64; OUTPUTS] {
         let sums = Arch::new().dispatch(Asked { loss: self, parameters, gradient: None, scratch });
         sums.map(|sum| sum / self.batch.rows as f64)
     }
 
     /// The loss and the mean squared error of each axis; the loss's gradient is written to `gradient`. Allocates nothing.
-    pub fn gradient(&self, parameters: &[f64], gradient: &mut [f64], scratch: &mut Scratch) -> (f64, [f64; OUTPUTS]) {
+    pub fn gradient(&self, parameters: &[f64], gradient: &mut [f64], scratch: &mut LossBuffers) -> (f64, [f64; OUTPUTS]) {
         let per_row = 1.0 / self.batch.rows as f64;
         let squares = Arch::new().dispatch(Asked { loss: self, parameters, gradient: Some(gradient), scratch });
         for g in gradient.iter_mut() {
@@ -191,7 +191,7 @@ impl Loss<'_> {
         simd: S,
         parameters: &[f64],
         mut gradient: Option<&mut [f64]>,
-        scratch: &mut Scratch,
+        scratch: &mut LossBuffers,
     ) -> [f64; OUTPUTS] {
         if let Some(gradient) = gradient.as_deref_mut() {
             gradient.fill(0.0);
@@ -216,8 +216,8 @@ impl Loss<'_> {
 
     /// Puts the weights where the products want them; whether no exponent of any row can be too far for the activation.
     #[inline(always)]
-    fn lay_out(&self, parameters: &[f64], scratch: &mut Scratch) -> bool {
-        let Shape { inputs, hidden, outputs, activation } = self.shape;
+    fn lay_out(&self, parameters: &[f64], scratch: &mut LossBuffers) -> bool {
+        let LayerSizes { inputs, hidden, outputs, activation } = self.shape;
         let factor = activation.factor();
         let biases = scratch.hidden_biases.iter_mut().zip(&parameters[self.shape.hidden_biases()]);
         for ((bias, parameter), farthest) in biases.zip(&mut scratch.farthest) {
@@ -245,10 +245,10 @@ impl Loss<'_> {
 
     /// Activations, outputs and errors of the first `length` rows of a block.
     #[inline(always)]
-    fn forward<S: Simd>(&self, simd: S, parameters: &[f64], block: usize, length: usize, tame: bool, scratch: &mut Scratch) {
+    fn forward<S: Simd>(&self, simd: S, parameters: &[f64], block: usize, length: usize, tame: bool, scratch: &mut LossBuffers) {
         let inputs = self.shape.inputs;
         let columns = &self.batch.inputs[block * inputs..(block + 1) * inputs];
-        let first = Product { biases: &scratch.hidden_biases, weights: &scratch.hidden_weights, columns, length };
+        let first = LaneProduct { biases: &scratch.hidden_biases, weights: &scratch.hidden_weights, columns, length };
         first.write(simd, &mut scratch.hidden);
         for exponents in &mut scratch.hidden {
             let exponents = &mut exponents[..length];
@@ -258,7 +258,7 @@ impl Loss<'_> {
             self.shape.activation.apply(exponents);
         }
         let biases = &parameters[self.shape.output_biases()];
-        let second = Product { biases, weights: &scratch.output_weights, columns: &scratch.hidden, length };
+        let second = LaneProduct { biases, weights: &scratch.output_weights, columns: &scratch.hidden, length };
         second.write(simd, &mut scratch.outputs);
         let targets = &self.batch.targets[block * OUTPUTS..(block + 1) * OUTPUTS];
         for (k, (errors, targets)) in scratch.errors.iter_mut().zip(targets).enumerate() {
@@ -289,9 +289,9 @@ impl Loss<'_> {
         block: usize,
         length: usize,
         gradient: &mut [f64],
-        scratch: &mut Scratch,
+        scratch: &mut LossBuffers,
     ) {
-        let Shape { inputs, hidden, activation, .. } = self.shape;
+        let LayerSizes { inputs, hidden, activation, .. } = self.shape;
         for (j, back) in scratch.back.iter_mut().enumerate() {
             if self.batch.ways.is_empty() {
                 back[..length].copy_from_slice(&scratch.errors[j][..length]);
@@ -307,7 +307,7 @@ impl Loss<'_> {
         }
         let weights = self.shape.output_weights();
         // Row after row of the output weights is column after column of what leads back.
-        let product = Product { biases: &[], weights: &parameters[weights.clone()], columns: &scratch.back, length };
+        let product = LaneProduct { biases: &[], weights: &parameters[weights.clone()], columns: &scratch.back, length };
         product.write(simd, &mut scratch.delta);
         let columns = &self.batch.inputs[block * inputs..(block + 1) * inputs];
         for (h, (values, delta)) in scratch.hidden.iter().zip(&mut scratch.delta).enumerate() {
@@ -325,7 +325,7 @@ impl Loss<'_> {
 
     /// What output `j` does along axis `k`, of the rows of a block.
     #[inline(always)]
-    fn way(&self, block: usize, j: usize, k: usize) -> &Column {
+    fn way(&self, block: usize, j: usize, k: usize) -> &BlockColumn {
         &self.batch.ways[(block * self.shape.outputs + j) * OUTPUTS + k]
     }
 }

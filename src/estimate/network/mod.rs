@@ -21,9 +21,9 @@ pub mod samples;
 pub mod training;
 
 pub use activation::Activation;
-pub use arm::Arm;
-pub use correction::{Applied, Body, Correction, Feature, Map};
-pub use perceptron::{OUTPUTS, Shape};
-pub use rivals::{Judged, Rival, compare};
-pub use samples::Samples;
-pub use training::{Course, Phase, Recipe, Start, train};
+pub use arm::ScrewArm;
+pub use correction::{AppliedCorrection, Body, Correction, Feature, Map};
+pub use perceptron::{LayerSizes, OUTPUTS};
+pub use rivals::{JudgedRival, Rival, compare};
+pub use samples::TrainingSamples;
+pub use training::{Phase, Recipe, TrainingStart, TrainingStep, train};

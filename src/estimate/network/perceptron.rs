@@ -11,14 +11,14 @@ pub const OUTPUTS: usize = 3;
 
 /// Numbers of neurons; the parameters are kept apart from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shape {
+pub struct LayerSizes {
     pub inputs: usize,
     pub hidden: usize,
     pub outputs: usize,
     pub activation: Activation,
 }
 
-impl Shape {
+impl LayerSizes {
     pub fn parameters(&self) -> usize {
         self.output_biases().end
     }

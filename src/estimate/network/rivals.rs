@@ -3,14 +3,14 @@
 //! Rows are judged by corrections that did not see their pose. Folds are made of runs of neighbouring poses, each with all its targets,
 //! since a recording's neighbours are alike and a row must not be predicted from its twin. "No correction" is a rival: it stays unless the gain is clear.
 
-use super::arm::Arm;
+use super::arm::ScrewArm;
 use super::basis::{curves, harmonics};
 use super::correction::{Body, Correction};
 use super::linear::Linear;
 use super::process::Process;
 use super::region::Region;
-use super::samples::Samples;
-use super::training::{Course, Recipe, Start, dressed, train};
+use super::samples::TrainingSamples;
+use super::training::{Recipe, TrainingStart, TrainingStep, dressed, train};
 use crate::estimate::swarm::{Algorithm, Generation};
 use crate::estimate::threads::in_order;
 use std::sync::Mutex;
@@ -30,13 +30,13 @@ pub enum Rival {
     /// Joint curves, small motions of links and wind-up by weight, through the Jacobian.
     Curves,
     /// Multilayer perceptrons whose outputs move the point along the axes, by where their training starts.
-    Network(Start),
+    Network(TrainingStart),
     /// Multilayer perceptrons whose outputs are joint motions, through the Jacobian.
-    JointNetwork(Start),
+    JointNetwork(TrainingStart),
 }
 
 /// Kinds of networks: each has its decay and size of hidden layer chosen for itself, with random starts.
-const KINDS: [fn(Start) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
+const KINDS: [fn(TrainingStart) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
 
 impl Rival {
     pub fn name(self) -> &'static str {
@@ -44,16 +44,16 @@ impl Rival {
             Self::Ridge => "ridge",
             Self::Process => "gaussian_process",
             Self::Curves => "curves",
-            Self::Network(Start::Random) => "mlp_random",
-            Self::Network(Start::Swarm(algorithm)) => match algorithm {
+            Self::Network(TrainingStart::Random) => "mlp_random",
+            Self::Network(TrainingStart::Swarm(algorithm)) => match algorithm {
                 Algorithm::Bas => "mlp_bas",
                 Algorithm::Bso => "mlp_bso",
                 Algorithm::Pso => "mlp_pso",
                 Algorithm::Ga => "mlp_ga",
                 Algorithm::Abc => "mlp_abc",
             },
-            Self::JointNetwork(Start::Random) => "mlp_joints_random",
-            Self::JointNetwork(Start::Swarm(algorithm)) => match algorithm {
+            Self::JointNetwork(TrainingStart::Random) => "mlp_joints_random",
+            Self::JointNetwork(TrainingStart::Swarm(algorithm)) => match algorithm {
                 Algorithm::Bas => "mlp_joints_bas",
                 Algorithm::Bso => "mlp_joints_bso",
                 Algorithm::Pso => "mlp_joints_pso",
@@ -68,7 +68,7 @@ impl Rival {
         matches!(self, Self::Curves | Self::JointNetwork(_))
     }
 
-    fn start(self) -> Option<Start> {
+    fn start(self) -> Option<TrainingStart> {
         match self {
             Self::Network(start) | Self::JointNetwork(start) => Some(start),
             _ => None,
@@ -78,10 +78,10 @@ impl Rival {
 
 /// What is compared.
 #[derive(Debug, Clone)]
-pub struct CorrectionContest<'a> {
+pub struct RivalContest<'a> {
     pub rivals: Vec<Rival>,
     /// What joint curves and joint networks go through; without it they are no rivals.
-    pub arm: Option<&'a Arm>,
+    pub arm: Option<&'a ScrewArm>,
     pub prismatic: &'a [bool],
     /// How the kept correction is trained.
     pub recipe: Recipe,
@@ -95,7 +95,7 @@ pub struct CorrectionContest<'a> {
 
 /// What the cross-validation says of one rival.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Judged {
+pub struct JudgedRival {
     /// `None`: no correction.
     pub rival: Option<Rival>,
     /// Length of what is left of each row, m.
@@ -110,7 +110,7 @@ pub struct Judged {
     pub settings: Option<(usize, f64)>,
 }
 
-impl Judged {
+impl JudgedRival {
     pub fn mean(&self) -> f64 {
         mean(&self.left)
     }
@@ -128,8 +128,8 @@ impl Judged {
 
 /// Everything learnt from the samples: the rivals as judged, and the number of the one to keep (0: no correction).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Comparison {
-    pub judged: Vec<Judged>,
+pub struct RivalComparison {
+    pub judged: Vec<JudgedRival>,
     pub chosen: usize,
 }
 
@@ -148,14 +148,14 @@ struct Done {
 }
 
 /// How many fits [`compare`] makes.
-pub fn fits(contest: &CorrectionContest) -> usize {
+pub fn fits(contest: &RivalContest) -> usize {
     let grids = KINDS.iter().filter(|kind| contest.has(**kind)).count();
     (contest.rivals.len() + grids * contest.decays.len() * contest.hidden.len()) * contest.folds
 }
 
-impl CorrectionContest<'_> {
+impl RivalContest<'_> {
     /// Whether networks of a kind take part, from whatever start.
-    fn has(&self, kind: fn(Start) -> Rival) -> bool {
+    fn has(&self, kind: fn(TrainingStart) -> Rival) -> bool {
         self.rivals.iter().any(|rival| rival.start().is_some_and(|start| kind(start) == *rival))
     }
 }
@@ -163,7 +163,7 @@ impl CorrectionContest<'_> {
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(usize, &str) + Sync) -> Comparison {
+pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: impl Fn(usize, &str) + Sync) -> RivalComparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
     let poses = samples.poses();
@@ -186,7 +186,8 @@ pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(
         rivals.iter().flat_map(each).collect()
     };
     let before: Vec<f64> = samples.residual.iter().map(|r| length(*r)).collect();
-    let nothing = Judged { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
+    let nothing =
+        JudgedRival { rival: None, left: before.clone(), gain: 0.0, sigma: 0.0, numbers: 0, evaluations: 0, settings: None };
     let mut judged = vec![nothing];
     let trial = Recipe { jobs: 1, ..contest.trial.clone() };
     let mut entered: Vec<(Rival, Recipe)> = contest.rivals.iter().map(|rival| (*rival, trial.clone())).collect();
@@ -194,7 +195,7 @@ pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(
         let mut grid = Vec::new();
         for hidden in &contest.hidden {
             for decay in &contest.decays {
-                grid.push((kind(Start::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
+                grid.push((kind(TrainingStart::Random), Recipe { hidden: *hidden, decay: *decay, ..trial.clone() }));
             }
         }
         let results = run(&tasks(&grid));
@@ -209,21 +210,21 @@ pub fn compare(samples: &Samples, contest: &CorrectionContest, observe: impl Fn(
     for ((rival, recipe), folds) in entered.iter().zip(results.chunks(contest.folds)) {
         let settings = rival.start().is_some().then_some((recipe.hidden, recipe.decay));
         if let Some(row) = together(folds, &before, &poses) {
-            judged.push(Judged { rival: Some(*rival), settings, ..row });
+            judged.push(JudgedRival { rival: Some(*rival), settings, ..row });
         }
     }
     let helping = (0..judged.len()).filter(|j| judged[*j].helps());
     let chosen = helping.min_by(|a, b| judged[*a].mean().total_cmp(&judged[*b].mean())).unwrap_or(0);
-    Comparison { judged, chosen }
+    RivalComparison { judged, chosen }
 }
 
 /// The rival learnt from all samples, with the course of a network's training. `None` where it cannot be fitted.
 pub fn learn(
-    samples: &Samples,
-    contest: &CorrectionContest,
-    judged: &Judged,
+    samples: &TrainingSamples,
+    contest: &RivalContest,
+    judged: &JudgedRival,
     observe: impl FnMut(&Generation),
-) -> Option<(Correction, Vec<Course>)> {
+) -> Option<(Correction, Vec<TrainingStep>)> {
     let (hidden, decay) = judged.settings.unwrap_or((contest.recipe.hidden, contest.recipe.decay));
     let (mut correction, course) =
         fit(judged.rival?, samples, contest, &Recipe { hidden, decay, ..contest.recipe.clone() }, observe)?;
@@ -233,11 +234,11 @@ pub fn learn(
 
 fn fit(
     rival: Rival,
-    samples: &Samples,
-    contest: &CorrectionContest,
+    samples: &TrainingSamples,
+    contest: &RivalContest,
     recipe: &Recipe,
     observe: impl FnMut(&Generation),
-) -> Option<(Correction, Vec<Course>)> {
+) -> Option<(Correction, Vec<TrainingStep>)> {
     let region = || Region::of(&samples.sources, recipe.joints);
     let body = match rival {
         Rival::Network(start) => return Some(train(samples, &Recipe { start, through: None, ..recipe.clone() }, observe)),
@@ -257,7 +258,7 @@ fn fit(
 
 impl Task {
     /// `poses`: that of each row.
-    fn run(&self, samples: &Samples, poses: &[usize], contest: &CorrectionContest) -> Option<Done> {
+    fn run(&self, samples: &TrainingSamples, poses: &[usize], contest: &RivalContest) -> Option<Done> {
         let count = poses.iter().max()? + 1;
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);
@@ -275,7 +276,7 @@ impl Task {
 }
 
 /// All folds of one rival; `None` where one could not be fitted.
-fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<Judged> {
+fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<JudgedRival> {
     let mut left = before.to_vec();
     for fold in folds {
         for (row, value) in &fold.as_ref()?.left {
@@ -291,7 +292,7 @@ fn together(folds: &[Option<Done>], before: &[f64], poses: &[usize]) -> Option<J
     let (count, rows) = (off.len() as f64, gains.len() as f64);
     let sigma = (off.iter().map(|off| off * off).sum::<f64>() * count / (count - 1.0).max(1.0)).sqrt() / rows;
     let (numbers, evaluations) = (first.numbers, first.evaluations);
-    Some(Judged { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
+    Some(JudgedRival { rival: None, left, gain, sigma, numbers, evaluations, settings: None })
 }
 
 fn length(v: [f64; 3]) -> f64 {

@@ -7,12 +7,12 @@ const SAME: f64 = 1e-9;
 
 /// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
 #[derive(Debug, Clone, Default)]
-pub struct Samples {
+pub struct TrainingSamples {
     pub sources: Vec<Vec<f64>>,
     pub residual: Vec<[f64; OUTPUTS]>,
 }
 
-impl Samples {
+impl TrainingSamples {
     pub fn rows(&self) -> usize {
         self.residual.len()
     }

@@ -3,14 +3,14 @@
 //! All swarms may spend what a beetle swarm of the recipe's size does. Work is capped: the swarm judges beetles on at most [`SWARM_ROWS`] rows, so its cost does not grow with the recording.
 
 use super::activation::Activation;
-use super::arm::Arm;
-use super::correction::{Body, Correction, Dress, Feature, JointMotion, Networks, Scaling};
+use super::arm::ScrewArm;
+use super::correction::{Body, Correction, Feature, JointMotion, NetworkScaling, Networks, Scaling};
 use super::descent::{DescentIteration, descend};
-use super::loss::{Batch, Loss, Scratch};
-use super::perceptron::{OUTPUTS, Shape};
+use super::loss::{Batch, Loss, LossBuffers};
+use super::perceptron::{LayerSizes, OUTPUTS};
 use super::region::Region;
-use super::samples::Samples;
-use crate::estimate::swarm::{Algorithm, Bounds, Budget, Generation};
+use super::samples::TrainingSamples;
+use crate::estimate::swarm::{Algorithm, Budget, Generation, SearchBox};
 use crate::estimate::threads::in_order;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -22,13 +22,13 @@ const SWARM_BOUND: f64 = 1.0;
 
 /// Where the gradient training starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Start {
+pub enum TrainingStart {
     /// Weights drawn evenly from the box that swarms search.
     Random,
     Swarm(Algorithm),
 }
 
-impl Start {
+impl TrainingStart {
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -44,10 +44,10 @@ pub struct Recipe {
     pub joints: usize,
     pub features: Vec<Feature>,
     /// Outputs are motions of this arm's joints (Fig. 2 of the paper); without it, of the point.
-    pub through: Option<Arm>,
+    pub through: Option<ScrewArm>,
     pub hidden: usize,
     pub activation: Activation,
-    pub start: Start,
+    pub start: TrainingStart,
     pub beetles: usize,
     pub generations: usize,
     /// Most iterations of the gradient training.
@@ -70,7 +70,7 @@ pub enum Phase {
 
 /// One generation or iteration of the training.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Course {
+pub struct TrainingStep {
     pub phase: Phase,
     /// From 1; the swarm serves all members and has 0.
     pub member: usize,
@@ -83,7 +83,7 @@ pub struct Course {
 }
 
 /// Trains on all samples; `observe` sees each generation of the swarm. Panics without samples or features.
-pub fn train(samples: &Samples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<Course>) {
+pub fn train(samples: &TrainingSamples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<TrainingStep>) {
     assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
     let prepared = Prepared::new(samples, recipe);
     let (starts, mut course) = prepared.starts(observe);
@@ -99,28 +99,28 @@ pub fn train(samples: &Samples, recipe: &Recipe, observe: impl FnMut(&Generation
 /// Rows scaled and ready to be learnt.
 struct Prepared<'a> {
     recipe: &'a Recipe,
-    shape: Shape,
+    shape: LayerSizes,
     x: Vec<Vec<f64>>,
     y: Vec<[f64; OUTPUTS]>,
     joints: Option<JointMotion>,
     /// What each output does to the point at each row, in units of the scaled targets; empty without joints.
     ways: Vec<Vec<[f64; OUTPUTS]>>,
-    dress: Dress,
+    dress: NetworkScaling,
     region: Region,
 }
 
 /// Standardised inputs and outputs with their scaling.
-pub(super) fn dressed(samples: &Samples, features: &[Feature]) -> (Dress, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
+pub(super) fn dressed(samples: &TrainingSamples, features: &[Feature]) -> (NetworkScaling, Vec<Vec<f64>>, Vec<[f64; OUTPUTS]>) {
     let inputs = features.iter().map(|f| Scaling::of(samples.sources.iter().map(move |row| f.of(row)))).collect();
     let outputs: [Scaling; OUTPUTS] = std::array::from_fn(|k| Scaling::of(samples.residual.iter().map(move |r| r[k])));
-    let dress = Dress { features: features.to_vec(), inputs, outputs };
+    let dress = NetworkScaling { features: features.to_vec(), inputs, outputs };
     let x = samples.sources.iter().map(|row| dress.scaled(row)).collect();
     let y = samples.residual.iter().map(|r| std::array::from_fn(|k| outputs[k].scaled(r[k]))).collect();
     (dress, x, y)
 }
 
 /// Joint motions of such sizes that each alone would make the residual's root mean square, which is given too, m.
-fn motion(samples: &Samples, arm: &Arm) -> (JointMotion, f64) {
+fn motion(samples: &TrainingSamples, arm: &ScrewArm) -> (JointMotion, f64) {
     let count = (OUTPUTS * samples.rows()) as f64;
     let squares = |values: &[[f64; OUTPUTS]]| values.iter().flatten().map(|value| value * value).sum::<f64>();
     let size = (squares(&samples.residual) / count).sqrt();
@@ -139,7 +139,7 @@ fn motion(samples: &Samples, arm: &Arm) -> (JointMotion, f64) {
 }
 
 impl<'a> Prepared<'a> {
-    fn new(samples: &Samples, recipe: &'a Recipe) -> Self {
+    fn new(samples: &TrainingSamples, recipe: &'a Recipe) -> Self {
         let (mut dress, x, mut y) = dressed(samples, &recipe.features);
         let joints = recipe.through.as_ref().map(|arm| motion(samples, arm));
         let mut ways = Vec::new();
@@ -151,33 +151,33 @@ impl<'a> Prepared<'a> {
             ways = samples.sources.iter().map(|q| motion.ways(q).into_iter().map(scaled).collect()).collect();
         }
         let outputs = joints.as_ref().map_or(OUTPUTS, |(motion, _)| motion.scales.len());
-        let shape = Shape { inputs: recipe.features.len(), hidden: recipe.hidden, outputs, activation: recipe.activation };
+        let shape = LayerSizes { inputs: recipe.features.len(), hidden: recipe.hidden, outputs, activation: recipe.activation };
         let joints = joints.map(|(motion, _)| motion);
         Self { recipe, shape, x, y, joints, ways, dress, region: Region::of(&samples.sources, recipe.joints) }
     }
 
     /// Where members start, best first, and the course of the swarm; chance has none.
-    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<Course>) {
+    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let mut rng = self.rng(0);
-        let bounds = Bounds::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
+        let bounds = SearchBox::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
         match self.recipe.start {
-            Start::Random => ((0..self.recipe.members).map(|_| bounds.random(&mut rng)).collect(), Vec::new()),
-            Start::Swarm(algorithm) => self.swarm(algorithm, &bounds, &mut rng, observe),
+            TrainingStart::Random => ((0..self.recipe.members).map(|_| bounds.random(&mut rng)).collect(), Vec::new()),
+            TrainingStart::Swarm(algorithm) => self.swarm(algorithm, &bounds, &mut rng, observe),
         }
     }
 
     fn swarm(
         &self,
         algorithm: Algorithm,
-        bounds: &Bounds,
+        bounds: &SearchBox,
         rng: &mut ChaCha8Rng,
         mut observe: impl FnMut(&Generation),
-    ) -> (Vec<Vec<f64>>, Vec<Course>) {
+    ) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let rows = if self.y.len() > SWARM_ROWS { draw(rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
         let batch = self.batch(&rows);
         let loss = Loss { shape: self.shape, batch: &batch, decay: self.recipe.decay * rows.len() as f64 / self.y.len() as f64 };
-        let mut scratch = Scratch::new(self.shape);
-        let mut course: Vec<Course> = Vec::new();
+        let mut scratch = LossBuffers::new(self.shape);
+        let mut course: Vec<TrainingStep> = Vec::new();
         // A lone beetle knows one place: each member has a search of its own, at a share of the cost.
         let searches = if algorithm == Algorithm::Bas { self.recipe.members } else { 1 };
         let spent = Algorithm::Bso.evaluations(self.recipe.beetles, self.recipe.generations) / searches as u64;
@@ -199,7 +199,7 @@ impl<'a> Prepared<'a> {
                     Some(last) if last.best == generation.best => last.train_rms,
                     _ => self.rms(loss.mean_squares(best, &mut scratch)),
                 };
-                course.push(Course {
+                course.push(TrainingStep {
                     phase: Phase::Swarm,
                     member: 0,
                     index: generation.index,
@@ -215,7 +215,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Trains member `m` (from 0) from `start`.
-    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<Course>) {
+    fn member(&self, m: usize, start: Vec<f64>) -> (Vec<f64>, Vec<TrainingStep>) {
         let mut rng = self.rng(1 + m as u64);
         let back = (self.recipe.keep_back * self.y.len() as f64).round() as usize;
         let (kept_back, rest) = draw(&mut rng, self.y.len(), back.min(self.y.len() - 1));
@@ -224,14 +224,14 @@ impl<'a> Prepared<'a> {
         let decay = self.recipe.decay;
         let train = Loss { shape: self.shape, batch: &batch, decay };
         let check = (check.rows() > 0).then_some(Loss { shape: self.shape, batch: &check, decay });
-        let (mut scratch, mut beside) = (Scratch::new(self.shape), Scratch::new(self.shape));
+        let (mut scratch, mut beside) = (LossBuffers::new(self.shape), LossBuffers::new(self.shape));
         let descent = descend(
             |x, gradient| train.gradient(x, gradient, &mut scratch),
             |x| check.map(|check| check.mean_squares(x, &mut beside)),
             start,
             self.recipe.iterations,
         );
-        let course = |i: DescentIteration| Course {
+        let course = |i: DescentIteration| TrainingStep {
             phase: Phase::Gradient,
             member: m + 1,
             index: i.index,

@@ -27,9 +27,9 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
     for first in (0..predicted.len()).step_by(STEP) {
         let last = (first + STRETCH).min(predicted.len());
         let rows = last.saturating_sub(STRETCH)..last;
-        let Some(own) = Stretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > NOMINAL) else { continue };
+        let Some(own) = AlignedStretch::fit(data, predicted, rows.clone(), 0).filter(|own| own.left > NOMINAL) else { continue };
         let tried = (1..=MOST).flat_map(|k| [k, -k]);
-        let tried = tried.filter_map(|k| Stretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k)));
+        let tried = tried.filter_map(|k| AlignedStretch::fit(data, predicted, rows.clone(), k).map(|stretch| (stretch, k)));
         if let Some((stretch, offset)) = tried.min_by(|a, b| a.0.left.total_cmp(&b.0.left))
             && stretch.left < NOMINAL
             && BETTER * stretch.left < own.left
@@ -62,13 +62,13 @@ fn beyond_the_log(apart: &mut [i64]) {
 }
 
 /// Points of some rows brought onto the measured ones.
-struct Stretch {
+struct AlignedStretch {
     motion: Pose,
     /// Rms distance that remains, as a share of the stretch's size.
     left: f64,
 }
 
-impl Stretch {
+impl AlignedStretch {
     /// With the joints `offset` rows further on; `None` where too few rows have both.
     fn fit(data: &Measurements, predicted: &[Vector3<f64>], rows: Range<usize>, offset: i64) -> Option<Self> {
         let whole = rows.filter(|row| data.whole(*row));

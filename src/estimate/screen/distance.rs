@@ -7,12 +7,12 @@ use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
 use crate::estimate::term::{HUBER, ObservationTerm};
 use crate::estimate::triangle::Triangle;
-use crate::observation::{KINDS, Kind, noise};
+use crate::observation::{KINDS, MeasurementKind, noise};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 /// Where a row stands.
-pub(super) struct Standing {
+pub(super) struct LeaveOneOut {
     /// Predicted point, m.
     pub predicted: Vector3<f64>,
     /// Measured - predicted, m.
@@ -29,7 +29,7 @@ const SOLE: f64 = 0.98;
 const CHUNK: usize = 64;
 
 /// The standing of every row of the recording after a fit of `free` to the problem's rows.
-pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) -> Vec<Standing> {
+pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) -> Vec<LeaveOneOut> {
     let data = problem.data;
     let inverse = problem.evaluate(model, free).factor.inverse();
     let mut column = vec![usize::MAX; model.stack.specs().len()];
@@ -41,7 +41,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
         fitted[*row] = true;
     }
     let p = free.len();
-    let screened: Vec<&dyn Kind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
+    let screened: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
     (0..data.rows())
         .into_par_iter()
         .with_min_len(CHUNK)
@@ -50,7 +50,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
             |(scratch, jacobian), row| {
                 let mut placed = model.place(data, row, scratch);
                 let predicted = placed.point;
-                let away = |kind: &&'static dyn Kind| {
+                let away = |kind: &&'static dyn MeasurementKind| {
                     let (term, _) = ObservationTerm::of(*kind, data, row, &placed, problem.excess)?;
                     jacobian.fill(Vector3::zeros());
                     term.derivatives(&mut placed, |parameter, derivative| {
@@ -67,7 +67,7 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                     Some(distance(&term.error, leverage, weight))
                 };
                 let distance = screened.iter().filter_map(away).fold(0.0, f64::max);
-                Standing {
+                LeaveOneOut {
                     predicted,
                     residual: data.residual(row, &predicted),
                     sigma: noise(data, row).hypot(3f64.sqrt() * problem.excess.length) / 3f64.sqrt(),

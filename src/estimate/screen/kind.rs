@@ -1,6 +1,6 @@
 //! What a row that stands out is: exchanged, mislabelled, shifted, in another unit, a zero, part of an event, or none of these.
 
-use super::distance::Standing;
+use super::distance::LeaveOneOut;
 use crate::robot::Measurements;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,7 +45,7 @@ const ALIKE: f64 = 5.0;
 /// the arm moves: there the rows beside one are always near.
 pub(super) fn name(
     data: &Measurements,
-    standings: &[Standing],
+    standings: &[LeaveOneOut],
     flagged: &[usize],
     limit: f64,
     moving: bool,
@@ -96,7 +96,7 @@ struct Index {
 }
 
 impl Index {
-    fn new(standings: &[Standing]) -> Self {
+    fn new(standings: &[LeaveOneOut]) -> Self {
         let mut by_x: Vec<(f64, usize)> =
             standings.iter().enumerate().map(|(row, standing)| (standing.predicted.x, row)).collect();
         by_x.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -104,7 +104,7 @@ impl Index {
     }
 
     /// Rows whose joints fit the point of `row` far better than its own, with their distance (m).
-    fn fits(&self, data: &Measurements, standings: &[Standing], row: usize, limit: f64) -> Vec<(usize, f64)> {
+    fn fits(&self, data: &Measurements, standings: &[LeaveOneOut], row: usize, limit: f64) -> Vec<(usize, f64)> {
         let point = data.position[row];
         let own = &standings[row];
         let typical = median_sigma(standings, row);
@@ -122,7 +122,7 @@ impl Index {
 }
 
 /// The row's own standard deviation (m); its neighbour's where a wrong point makes it absurd.
-fn median_sigma(standings: &[Standing], row: usize) -> f64 {
+fn median_sigma(standings: &[LeaveOneOut], row: usize) -> f64 {
     let around = row.saturating_sub(2)..(row + 3).min(standings.len());
     let mut sigmas: Vec<f64> = standings[around].iter().map(|standing| standing.sigma).collect();
     sigmas.sort_by(f64::total_cmp);
@@ -205,7 +205,7 @@ fn beyond_the_log(run: &[usize], kinds: &Kinds, rows: usize) -> Option<i64> {
     (!run.iter().any(|row| logged(*row))).then_some(offset)
 }
 
-fn is_event(run: &[usize], standings: &[Standing]) -> bool {
+fn is_event(run: &[usize], standings: &[LeaveOneOut]) -> bool {
     let sizes = run.iter().map(|row| standings[*row].residual.norm());
     let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| (least.min(size), most.max(size)));
     run.len() >= LONG_RUN || run.len() >= RUN && most <= ALIKE * least

@@ -15,7 +15,7 @@ use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
-use distance::{Standing, leave_one_out};
+use distance::{LeaveOneOut, leave_one_out};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A row that does not belong to the rest.
@@ -74,10 +74,9 @@ const READMITTING: usize = 3;
 ///
 /// All rows of the recording are screened. `set[row]` numbers the set of a row: every set is measured by its own spread, since
 /// held-out rows may see physics that the fitted ones do not. Where more than half of the rows to fit would go, none goes.
-pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions, set: &[usize]) -> (Fitted, Screening) {
-    let start = model.x.clone();
+pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, set: &[usize]) -> (Model, Fitted, Screening) {
     // Whole blocks may be in metres, zero, or beside other joints: more than a robust loss can bear, and plain to see even from the nominal robot.
-    let predicted = model.predict(data);
+    let predicted = start.predict(data);
     // A stretch of a path looks like itself a little further on: there only the velocities tell.
     let moving = data.in_motion(options.rows);
     let apart = if moving { vec![0; data.rows()] } else { apart::apart(data, &predicted) };
@@ -93,30 +92,28 @@ pub fn fit_screened(model: &mut Model, data: &Measurements, options: &FitOptions
         slipped.clear();
     }
     let throughout = throughout(&apart);
-    let mut fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
+    let (mut model, mut fitted) = fit(start, data, &FitOptions { rows: &kept, ..*options });
     let mut aside = BTreeSet::new();
     for round in 0.. {
         let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
-        let Screened { suspects, crowd, reach } = screen(model, data, &kept, &fitted, set, &held, &slipped);
+        let Screened { suspects, crowd, reach } = screen(&model, data, &kept, &fitted, set, &held, &slipped);
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
         let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
         if next == kept {
-            return (fitted, Screening { kept, suspects, crowd, reach, apart: throughout });
+            return (model, fitted, Screening { kept, suspects, crowd, reach, apart: throughout });
         }
         if 2 * next.len() < options.rows.len() {
             break;
         }
         kept = next;
         // From the very start: which of two redundant parameters is kept must not depend on rows that are gone.
-        model.x.clone_from(&start);
-        fitted = fit(model, data, &FitOptions { rows: &kept, ..*options });
+        (model, fitted) = fit(start, data, &FitOptions { rows: &kept, ..*options });
     }
     if kept.len() < options.rows.len() {
-        model.x.clone_from(&start);
-        fitted = fit(model, data, options);
+        (model, fitted) = fit(start, data, options);
     }
     let kept = options.rows.to_vec();
-    (fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: GROSS, apart: throughout })
+    (model, fitted, Screening { kept, suspects: Vec::new(), crowd: aside.len(), reach: GROSS, apart: throughout })
 }
 
 /// The offset of more than half of the rows.
@@ -157,7 +154,7 @@ fn screen(
     let mut crowd = 0;
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
-        let Standing { residual, distance, .. } = &standings[row];
+        let LeaveOneOut { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
         if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row)
         {
@@ -179,7 +176,7 @@ fn screen(
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
-fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
+fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     for number in sets {
         let mut distances: Vec<f64> =
@@ -193,12 +190,12 @@ fn measure_by_set(standings: &mut [Standing], set: &[usize]) {
 }
 
 /// Where far outside the bulk begins.
-fn limit(standings: &[Standing]) -> f64 {
+fn limit(standings: &[LeaveOneOut]) -> f64 {
     (FAR * nearest(&mut bulk(standings), BULK).unwrap_or(0.0)).min(GROSS)
 }
 
 /// Distances of the rows that are not gross.
-fn bulk(standings: &[Standing]) -> Vec<f64> {
+fn bulk(standings: &[LeaveOneOut]) -> Vec<f64> {
     standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
 }
 

@@ -1,6 +1,6 @@
 //! The five optimisers by name, with the parameters of their papers.
 
-use super::{BeeColony, BeetleAntennae, BeetleSwarm, Bounds, Budget, Generation, Genetic, Method, Objective, Outcome};
+use super::{BeeColony, BeetleAntennae, BeetleSwarm, Budget, Generation, Genetic, Method, Objective, SearchBox, SwarmResult};
 use super::{ParticleSwarm, minimise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,10 +80,10 @@ impl Algorithm {
         self,
         population: usize,
         objective: &O,
-        bounds: &Bounds,
+        bounds: &SearchBox,
         budget: &Budget,
         observe: impl FnMut(&Generation, &[f64]),
-    ) -> Outcome {
+    ) -> SwarmResult {
         with!(self, population, |method| minimise(&method, objective, bounds, budget, observe))
     }
 }

@@ -3,7 +3,7 @@
 //! Michalewicz is Eq. 35 of Wang et al. (2020) with its sign, `-sum sin(x_i) sin(i x_i^2 / pi)^20` on `[0, pi]^n`; the others as in
 //! Jamil and Yang (2013), minimum 0.
 
-use super::Bounds;
+use super::SearchBox;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{E, PI};
@@ -49,14 +49,14 @@ impl Landscape {
     }
 
     /// The box that is searched.
-    pub fn bounds(self, dimensions: usize) -> Bounds {
+    pub fn bounds(self, dimensions: usize) -> SearchBox {
         let (lower, upper) = match self {
             Self::Michalewicz => (0.0, PI),
             Self::Rastrigin => (-5.12, 5.12),
             Self::Rosenbrock => (-2.048, 2.048),
             Self::Ackley => (-32.768, 32.768),
         };
-        Bounds::cube(dimensions, lower, upper)
+        SearchBox::cube(dimensions, lower, upper)
     }
 
     /// The smallest value, where it is known.

@@ -41,12 +41,12 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Objective for F {
 
 /// A box: every coordinate stays within `lower..=upper`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bounds {
+pub struct SearchBox {
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
 
-impl Bounds {
+impl SearchBox {
     /// The box between two corners. Panics where they differ in length, are not finite or are in the wrong order.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_eq!(lower.len(), upper.len(), "corners of one box");
@@ -103,7 +103,7 @@ pub struct Generation {
 
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
+pub enum SearchStop {
     Generations,
     Evaluations,
     Target,
@@ -111,14 +111,14 @@ pub enum Stop {
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct SwarmResult {
     pub position: Vec<f64>,
     pub value: f64,
     /// The best position of each individual with its value, best first.
     pub elite: Vec<(f64, Vec<f64>)>,
     pub history: Vec<Generation>,
     pub evaluations: u64,
-    pub stop: Stop,
+    pub stop: SearchStop,
 }
 
 /// A swarm optimiser: plain parameters, with the state of a search apart from them.
@@ -139,7 +139,7 @@ pub trait Method {
 /// A search under way, as a method sees it.
 pub struct Search<'a, O: Objective> {
     objective: &'a O,
-    bounds: &'a Bounds,
+    bounds: &'a SearchBox,
     rng: ChaCha8Rng,
     jobs: usize,
     /// Of the one thread that evaluates where there are no others.
@@ -200,10 +200,10 @@ fn remember(best: &mut [(f64, Vec<f64>)], positions: &[Vec<f64>], values: &[f64]
 pub fn minimise<M: Method, O: Objective>(
     method: &M,
     objective: &O,
-    bounds: &Bounds,
+    bounds: &SearchBox,
     budget: &Budget,
     mut observe: impl FnMut(&Generation, &[f64]),
-) -> Outcome {
+) -> SwarmResult {
     let mut search = Search {
         objective,
         bounds,
@@ -224,13 +224,13 @@ pub fn minimise<M: Method, O: Objective>(
         observe(&generation, &search.best.1);
         history.push(generation);
         if budget.target.is_some_and(|target| search.best.0 <= target) {
-            break Stop::Target;
+            break SearchStop::Target;
         }
         if search.generation >= budget.generations {
-            break Stop::Generations;
+            break SearchStop::Generations;
         }
         if budget.evaluations.is_some_and(|most| search.evaluations >= most) {
-            break Stop::Evaluations;
+            break SearchStop::Evaluations;
         }
         search.generation += 1;
         method.step(&mut state, &mut search);
@@ -238,5 +238,5 @@ pub fn minimise<M: Method, O: Objective>(
     let mut elite = method.elite(&state);
     elite.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (value, position) = search.best;
-    Outcome { position, value, elite, history, evaluations: search.evaluations, stop }
+    SwarmResult { position, value, elite, history, evaluations: search.evaluations, stop }
 }

@@ -3,9 +3,9 @@
 use super::Apart;
 use crate::diagnose::other_means;
 use crate::error::counted;
-use crate::estimate::choose::{TOLD, Told};
+use crate::estimate::choose::{Discrimination, TOLD};
 use crate::poses::show::closing;
-use crate::poses::{Answer, Drive, drive};
+use crate::poses::{Drive, PoseAnswer, drive};
 use serde_json::{Value, json};
 
 /// Nobody measures more poses than these.
@@ -21,7 +21,7 @@ impl Apart<'_> {
     fn conclusion(&self) -> Vec<String> {
         let [finding, rival] = self.names();
         let other = other_means(&self.finding.effect, &self.rival.0);
-        let Told { before, alike, proposed } = &self.told;
+        let Discrimination { before, alike, proposed } = &self.told;
         let Some(proposed) = proposed else {
             let means =
                 other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
@@ -54,7 +54,7 @@ impl Apart<'_> {
     }
 }
 
-impl Answer for Apart<'_> {
+impl PoseAnswer for Apart<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let proposed = self.told.proposed.as_ref()?;
         Some(Drive { robot: &self.robot, ranges: &self.ranges, poses: &proposed.poses, direction: &proposed.direction })
@@ -95,7 +95,7 @@ impl Answer for Apart<'_> {
 
     fn document(&self) -> Value {
         let names = self.names();
-        let Told { before, alike, proposed } = &self.told;
+        let Discrimination { before, alike, proposed } = &self.told;
         let separation = [0, 1].map(|k: usize| {
             json!({
                 "if": names[k], "fitted": names[1 - k], "recorded": before[k], "imitated": alike[k],
@@ -108,7 +108,7 @@ impl Answer for Apart<'_> {
             "run": self.run,
             "seed": self.request.seed,
             "finding": { "rank": self.finding.rank, "effect": self.finding.effect, "where": self.finding.place },
-            "rival": { "effect": self.rival.0, "where": self.rival.1, "form": self.form },
+            "rival": { "effect": self.rival.0, "where": self.rival.1.to_string(), "form": self.form },
             "sigma_mm": self.sigma,
             "temperature_c": self.circumstances.temperature,
             "points": self.rows,

@@ -1,7 +1,7 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
-use super::super::token::{Sort, Source, Token};
-use super::super::{Found, Literal, TargetKind, quoted};
+use super::super::token::{ProgramText, Token, TokenKind};
+use super::super::{Gathered, Literal, TargetKind, quoted};
 use super::line::opens;
 use std::ops::Range;
 
@@ -50,7 +50,7 @@ impl Type {
 
 /// The tokens of an aggregate, braces included.
 pub(super) struct Aggregate<'t> {
-    source: Source<'t>,
+    source: ProgramText<'t>,
     tokens: &'t [Token],
     prefix: Option<String>,
     /// Between the commas.
@@ -58,11 +58,11 @@ pub(super) struct Aggregate<'t> {
 }
 
 impl<'t> Aggregate<'t> {
-    pub fn new(source: Source<'t>, tokens: &'t [Token]) -> Self {
+    pub fn new(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut inner = &tokens[1..tokens.len() - 1];
         let mut prefix = None;
         if let [name, colon, rest @ ..] = inner
-            && name.sort == Sort::Word
+            && name.sort == TokenKind::Word
             && colon.is(b':')
         {
             (prefix, inner) = (Some(source.upper(name)), rest);
@@ -87,7 +87,7 @@ impl<'t> Aggregate<'t> {
         self.fields
             .iter()
             .filter_map(|field| field.first())
-            .filter(|token| token.sort == Sort::Word)
+            .filter(|token| token.sort == TokenKind::Word)
             .map(|token| self.source.upper(token))
     }
 
@@ -130,7 +130,7 @@ impl<'t> Aggregate<'t> {
     }
 
     /// Takes it as a target of type `kind`, or says everything that is wrong with it.
-    pub fn take(&self, kind: Type, found: &mut Found) {
+    pub fn take(&self, kind: Type, found: &mut Gathered) {
         let open = self.tokens[0].span.start;
         let before = found.faults.len();
         let mut numbers: Vec<(String, f64, Range<usize>)> = Vec::new();
@@ -167,9 +167,9 @@ impl<'t> Aggregate<'t> {
     }
 
     /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.
-    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Found) -> Option<(String, f64, Range<usize>)> {
+    fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Gathered) -> Option<(String, f64, Range<usize>)> {
         let bytes = self.source.bytes;
-        if first.sort != Sort::Word {
+        if first.sort != TokenKind::Word {
             found.fault(first.span.start, format!("{} has no name", quoted(bytes, self.source.over(field, 0))));
             return None;
         }
@@ -187,7 +187,7 @@ impl<'t> Aggregate<'t> {
         let span = self.value(field);
         // `T 'B101010'`: a bit pattern.
         if STATUS.contains(&name.as_str())
-            && matches!(value, [only] if only.sort == Sort::Text && bytes[only.span.start] == b'\'')
+            && matches!(value, [only] if only.sort == TokenKind::Text && bytes[only.span.start] == b'\'')
         {
             return Some((name, 0.0, span));
         }

@@ -1,11 +1,11 @@
 //! Frames of the system that a program sets, and what calib takes for granted where it does.
 
-use super::super::Found;
-use super::super::token::{Source, Token};
+use super::super::Gathered;
+use super::super::token::{ProgramText, Token};
 use super::line::member;
 
 /// What a line sets that calib takes for granted.
-pub(super) fn set(source: Source, line: &[Token], found: &mut Found) {
+pub(super) fn set(source: ProgramText, line: &[Token], found: &mut Gathered) {
     for (k, token) in line.iter().enumerate() {
         let names = ["$BASE", "$TOOL", "$IPO_MODE", "$ROBROOT"];
         if source.is_word(token, &names) && member(source, &line[k + 1..]).is_some_and(|(_, rest)| rest.is_some()) {
@@ -21,7 +21,7 @@ pub(super) fn set(source: Source, line: &[Token], found: &mut Found) {
 }
 
 /// The data of an inline form: which base its point is taught in.
-pub(super) fn of_point(source: Source, tokens: &[Token], found: &mut Found) {
+pub(super) fn of_point(source: ProgramText, tokens: &[Token], found: &mut Gathered) {
     let base = tokens.windows(2).find(|w| source.is_word(&w[0], &["BASE_NO"]));
     if base.and_then(|w| source.number(&w[1..])).is_some_and(|(number, _)| number != 0.0) {
         found.warn(tokens[0].span.start, assumed("$BASE"));

@@ -9,8 +9,8 @@ mod aggregate;
 mod frames;
 mod line;
 
-use super::token::{Sort, Source, Token, tokens};
-use super::{DEPTH, Found, Language, quoted};
+use super::token::{ProgramText, Token, TokenKind, tokens};
+use super::{DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,11 +32,11 @@ const KNOWN: [&str; 2] = ["FRAME", "INERTIA"];
 /// Frames of the system that are kept in files.
 const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
-pub(super) fn read(bytes: &[u8]) -> Found {
-    let mut found = Found::default();
-    let source = Source { bytes, language: Language::Krl };
+pub(super) fn read(bytes: &[u8]) -> Gathered {
+    let mut found = Gathered::default();
+    let source = ProgramText { bytes, language: Language::Krl };
     let tokens = tokens(source, &mut found);
-    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == Sort::LineEnd).filter(|line| !line.is_empty()).collect();
+    let lines: Vec<&[Token]> = tokens.split(|token| token.sort == TokenKind::LineEnd).filter(|line| !line.is_empty()).collect();
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for line in &lines {
         if let Some((kind, names)) = declared(source, line) {
@@ -57,12 +57,12 @@ pub(super) fn read(bytes: &[u8]) -> Found {
 }
 
 struct Reader<'p> {
-    source: Source<'p>,
+    source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
-    found: Found,
+    found: Gathered,
 }
 
 impl Reader<'_> {
@@ -179,8 +179,8 @@ impl Reader<'_> {
         let mut depth = 0;
         line.iter().filter(|_| !label && !heading).find_map(|token| {
             match token.sort {
-                Sort::Sign(b'{') => depth += 1,
-                Sort::Sign(b'}') => depth -= 1,
+                TokenKind::Sign(b'{') => depth += 1,
+                TokenKind::Sign(b'}') => depth -= 1,
                 _ => {}
             }
             (depth == 0 && token.is(b':')).then_some(token.span.start)

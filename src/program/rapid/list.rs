@@ -1,7 +1,7 @@
 //! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
 
-use super::super::token::{Source, Token};
-use super::super::{Found, Literal, TargetKind, quoted};
+use super::super::token::{ProgramText, Token};
+use super::super::{Gathered, Literal, TargetKind, quoted};
 use crate::error::counted;
 use std::ops::Range;
 
@@ -35,7 +35,7 @@ enum Item<'t> {
 
 /// A list that opens at the first of its tokens.
 pub(super) struct List<'t> {
-    source: Source<'t>,
+    source: ProgramText<'t>,
     span: Range<usize>,
     /// How many it has, brackets included.
     pub tokens: usize,
@@ -44,7 +44,7 @@ pub(super) struct List<'t> {
 
 impl<'t> List<'t> {
     /// Reads the list that opens at `tokens[0]`; its brackets match.
-    pub fn read(source: Source<'t>, tokens: &'t [Token]) -> Self {
+    pub fn read(source: ProgramText<'t>, tokens: &'t [Token]) -> Self {
         let mut items = Vec::new();
         let (mut k, mut from, mut round) = (1, 1, 0);
         let mut inner: Option<List> = None;
@@ -104,7 +104,7 @@ impl<'t> List<'t> {
     }
 
     /// Takes the targets in it, those of an array where that is allowed, or says everything that is wrong.
-    pub fn take(&self, want: Want, array: bool, found: &mut Found) {
+    pub fn take(&self, want: Want, array: bool, found: &mut Gathered) {
         let flat = |item: &Item| match item {
             Item::List(list) => list.lists().next().is_none(),
             Item::Leaf(_) => true,
@@ -123,7 +123,7 @@ impl<'t> List<'t> {
         }
     }
 
-    fn target(&self, want: Want, found: &mut Found) {
+    fn target(&self, want: Want, found: &mut Gathered) {
         let before = found.faults.len();
         let shape = want.shape();
         let mut numbers: Vec<Vec<(f64, Range<usize>)>> = Vec::new();
@@ -166,7 +166,7 @@ impl<'t> List<'t> {
         found.literals.push(Literal { kind, values, spans });
     }
 
-    fn numbers(&self, found: &mut Found) -> Vec<(f64, Range<usize>)> {
+    fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {
         let mut out = Vec::new();
         for item in &self.items {
             let (tokens, at) = match item {

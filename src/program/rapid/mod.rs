@@ -7,8 +7,8 @@
 
 mod list;
 
-use super::token::{Sort, Source, Token, tokens};
-use super::{DEPTH, Found, Language, quoted};
+use super::token::{ProgramText, Token, TokenKind, tokens};
+use super::{DEPTH, Gathered, Language, quoted};
 use list::{List, Want};
 use std::collections::BTreeMap;
 
@@ -54,9 +54,9 @@ const STORAGE: [&str; 3] = ["VAR", "PERS", "CONST"];
 /// Types whose literals may have the form of a target and are none.
 const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
 
-pub(super) fn read(bytes: &[u8]) -> Found {
-    let mut found = Found::default();
-    let source = Source { bytes, language: Language::Rapid };
+pub(super) fn read(bytes: &[u8]) -> Gathered {
+    let mut found = Gathered::default();
+    let source = ProgramText { bytes, language: Language::Rapid };
     let tokens = tokens(source, &mut found);
     let statements = statements(source, &tokens, &mut found);
     let mut types: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -77,7 +77,7 @@ pub(super) fn read(bytes: &[u8]) -> Found {
 
 /// The statements of a program, each without its `;` and without the heads of blocks before it. A value that no `;` ends before the
 /// next block is a fault: what follows would be read as a part of it, or the other way round.
-fn statements<'t>(source: Source, tokens: &'t [Token], found: &mut Found) -> Vec<&'t [Token]> {
+fn statements<'t>(source: ProgramText, tokens: &'t [Token], found: &mut Gathered) -> Vec<&'t [Token]> {
     let mut out: Vec<&[Token]> = Vec::new();
     let mut start = 0;
     let mut k = 0;
@@ -91,7 +91,7 @@ fn statements<'t>(source: Source, tokens: &'t [Token], found: &mut Found) -> Vec
             heading(source, &tokens[k..]).map(|length| (k + length, k + length))
         };
         let ends = token.is(b';') || token.is(b':') || source.is_word(token, &["THEN", "DO"]);
-        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == Sort::Pair(b':')) {
+        if end.is_some() && !ends && tokens[start..k].iter().any(|t| t.is(b'[') || t.sort == TokenKind::Pair(b':')) {
             let text = quoted(source.bytes, token.span.clone());
             found.fault(token.span.start, format!("`;` is missing before {text}"));
         }
@@ -107,7 +107,7 @@ fn statements<'t>(source: Source, tokens: &'t [Token], found: &mut Found) -> Vec
 }
 
 /// How many tokens the head of a module or a routine has; none where there is no such head.
-fn heading(source: Source, tokens: &[Token]) -> Option<usize> {
+fn heading(source: ProgramText, tokens: &[Token]) -> Option<usize> {
     let kind = &tokens[0];
     let mut length = if source.is_word(kind, &["MODULE", "PROC", "TRAP"]) {
         2
@@ -132,13 +132,13 @@ struct Declaration<'t> {
     stray: Option<&'t Token>,
 }
 
-fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration<'t>> {
+fn declaration<'t>(source: ProgramText, statement: &'t [Token]) -> Option<Declaration<'t>> {
     let scoped = statement.iter().take_while(|token| source.is_word(token, &["LOCAL", "TASK"])).count();
     let [storage, kind, name, rest @ ..] = &statement[scoped..] else { return None };
-    if !source.is_word(storage, &STORAGE) || kind.sort != Sort::Word || name.sort != Sort::Word {
+    if !source.is_word(storage, &STORAGE) || kind.sort != TokenKind::Word || name.sort != TokenKind::Word {
         return None;
     }
-    let assign = rest.iter().position(|token| token.sort == Sort::Pair(b':'));
+    let assign = rest.iter().position(|token| token.sort == TokenKind::Pair(b':'));
     let dimensions = rest.iter().take_while(|token| !token.is(b'}')).count();
     let named =
         if rest.first().is_some_and(|token| token.is(b'{')) { rest.get(dimensions + 1..).unwrap_or_default() } else { rest };
@@ -147,10 +147,10 @@ fn declaration<'t>(source: Source, statement: &'t [Token]) -> Option<Declaration
 }
 
 struct Reader<'p> {
-    source: Source<'p>,
+    source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
-    found: Found,
+    found: Gathered,
 }
 
 impl Reader<'_> {
@@ -172,7 +172,7 @@ impl Reader<'_> {
             self.found.fault(storage.span.start, "a declaration that is not understood; expected a type and a name");
             return;
         }
-        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == Sort::Pair(b':')) {
+        match depths(statement).position(|(token, depth)| depth == 0 && token.sort == TokenKind::Pair(b':')) {
             Some(k) if k > 0 && !statement[..k].iter().any(|token| token.is(b'\\') || token.is(b',')) => {
                 self.assignment(statement, k)
             }
@@ -362,11 +362,11 @@ impl Reader<'_> {
 fn depths(tokens: &[Token]) -> impl Iterator<Item = (&Token, i32)> {
     let mut depth = 0;
     tokens.iter().map(move |token| match token.sort {
-        Sort::Sign(b'[' | b'(' | b'{') => {
+        TokenKind::Sign(b'[' | b'(' | b'{') => {
             depth += 1;
             (token, depth - 1)
         }
-        Sort::Sign(b']' | b')' | b'}') => {
+        TokenKind::Sign(b']' | b')' | b'}') => {
             depth -= 1;
             (token, depth)
         }

@@ -1,8 +1,8 @@
 //! calib's own robot file: YAML with units, one kinematic format, and what is known of joints, links, payload and gravity.
 
-use super::dh::{self, Convention};
-use super::place::{Faults, Place};
-use super::{Chain, Imported, Text, screws, urdf};
+use super::dh::{self, DhConvention};
+use super::place::{DocumentNode, Faults};
+use super::{FrameChain, Imported, RobotFileText, screws, urdf};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
@@ -17,14 +17,14 @@ const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
 const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
 
 #[derive(Clone, Copy)]
-struct Units {
+struct FileUnits {
     length: Unit,
     angle: Unit,
 }
 
-pub(super) fn read(file: Text, urdf: Option<Text>) -> Result<Imported> {
+pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
-    let root = Place::root(&node, &faults).map(&[
+    let root = DocumentNode::root(&node, &faults).map(&[
         "calib_robot",
         "name",
         "units",
@@ -51,16 +51,16 @@ pub(super) fn read(file: Text, urdf: Option<Text>) -> Result<Imported> {
     }
 }
 
-fn units(value: Place) -> Units {
+fn units(value: DocumentNode) -> FileUnits {
     let unit = |key: &str, quantity: Quantity, fallback: Unit| {
         let allowed: Vec<_> = (Unit::symbols(quantity).into_iter()).filter_map(|s| Some((s, Unit::parse(s)?))).collect();
         value.get(key).choice(&allowed).unwrap_or(fallback)
     };
-    Units { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
+    FileUnits { length: unit("length", Quantity::Length, Unit::Millimetre), angle: unit("angle", Quantity::Angle, Unit::Degree) }
 }
 
 /// The one kinematic format of the file, or none after a fault.
-fn chain(value: Place, units: Units, urdf: Option<Text>, faults: &Faults) -> Result<Option<Chain>> {
+fn chain(value: DocumentNode, units: FileUnits, urdf: Option<RobotFileText>, faults: &Faults) -> Result<Option<FrameChain>> {
     let mut given = FORMATS.into_iter().filter(|format| value.get(format).given().is_some());
     let chain = match (given.next(), given.next()) {
         (Some(_), Some(_)) => {
@@ -68,8 +68,8 @@ fn chain(value: Place, units: Units, urdf: Option<Text>, faults: &Faults) -> Res
             return Ok(None);
         }
         (Some("screws"), _) => screws::read(&value.get("screws"), units.length),
-        (Some("dh"), _) => dh::read(&value.get("dh"), Convention::Standard, units.length, units.angle),
-        (Some("mdh"), _) => dh::read(&value.get("mdh"), Convention::Modified, units.length, units.angle),
+        (Some("dh"), _) => dh::read(&value.get("dh"), DhConvention::Standard, units.length, units.angle),
+        (Some("mdh"), _) => dh::read(&value.get("mdh"), DhConvention::Modified, units.length, units.angle),
         (Some(_), _) => {
             let ends = value.get("urdf").map(&["base", "tip"]);
             let (base, tip) = (ends.get("base").text(), ends.get("tip").text());
@@ -98,7 +98,7 @@ fn chain(value: Place, units: Units, urdf: Option<Text>, faults: &Faults) -> Res
     Ok(Some(chain))
 }
 
-fn describe(root: &Place, chain: Chain, units: Units) -> RobotDescription {
+fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDescription {
     let tool = tool(root.get("tool"), &chain, units);
     let name = root.get("name").given().map_or_else(|| "robot".into(), |name| name.text());
     let mut joints: Vec<JointDescription> = (chain.joints.iter().enumerate())
@@ -145,7 +145,7 @@ fn describe(root: &Place, chain: Chain, units: Units) -> RobotDescription {
 }
 
 /// The tool frame at the zero pose in the base frame: the measured point, and the orientation of the tool's axes.
-fn tool(value: Place, chain: &Chain, units: Units) -> Isometry3<f64> {
+fn tool(value: DocumentNode, chain: &FrameChain, units: FileUnits) -> Isometry3<f64> {
     let on_link = chain.joints.iter().any(|joint| joint.frame.is_some());
     if value.given().is_none() && on_link {
         return chain.tip;
@@ -156,7 +156,7 @@ fn tool(value: Place, chain: &Chain, units: Units) -> Isometry3<f64> {
     chain.tip * Isometry3::from_parts(Translation3::from(point), orientation)
 }
 
-fn orientation(value: &Place, angle: Unit) -> UnitQuaternion<f64> {
+fn orientation(value: &DocumentNode, angle: Unit) -> UnitQuaternion<f64> {
     let value = value.clone().map(&["rpy", "quaternion"]);
     match (value.get("rpy").given(), value.get("quaternion").given()) {
         (Some(rpy), None) => {
@@ -182,7 +182,7 @@ fn orientation(value: &Place, angle: Unit) -> UnitQuaternion<f64> {
 }
 
 /// What the file says of a joint beyond its screw.
-fn drive(joint: &mut JointDescription, value: Place, units: Units) {
+fn drive(joint: &mut JointDescription, value: DocumentNode, units: FileUnits) {
     if value.given().is_none() {
         return;
     }
@@ -218,10 +218,10 @@ fn drive(joint: &mut JointDescription, value: Place, units: Units) {
 }
 
 /// Columns of targets and recordings name joints: a name stands for one.
-fn distinct(root: &Place, joints: &[JointDescription]) {
+fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
     for (k, joint) in joints.iter().enumerate() {
         if let Some(other) = joints[..k].iter().position(|other| other.name == joint.name) {
-            let places = root.get("joints").given().map_or_else(Vec::new, Place::items);
+            let places = root.get("joints").given().map_or_else(Vec::new, DocumentNode::items);
             let own = |k: usize| places.get(k).map(|value| value.get("name")).filter(|name| name.given().is_some());
             // A name that was not given is `J` and the joint's number: the other one has taken it.
             let (at, other) = own(k).map_or_else(|| (own(other), k), |at| (Some(at), other));
@@ -231,7 +231,7 @@ fn distinct(root: &Place, joints: &[JointDescription]) {
     }
 }
 
-fn link(value: Place, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Point3<f64>) {
+fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> (f64, Point3<f64>) {
     let value = value.map(&["mass", "centre", "frame"]);
     let centre = Point3::from(value.get("centre").sized_vector::<3>(Bound::Length, units.length));
     let of_link = value.get("frame");
@@ -247,7 +247,7 @@ fn link(value: Place, frame: Option<Isometry3<f64>>, units: Units) -> (f64, Poin
     (value.get("mass").not_negative(), centre)
 }
 
-fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
+fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
     let mut couplings: Vec<Coupling> = Vec::new();
     for value in list.items() {
         let value = value.map(&["moved", "by", "ratio"]);
@@ -267,7 +267,7 @@ fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
 }
 
 /// Rated mass, kg, and its centre, m, zero pose, base frame.
-fn payload(value: Place, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f64>) {
+fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> (f64, Point3<f64>) {
     let point = Point3::from(tool.translation.vector);
     if value.given().is_none() {
         return (0.0, point);
@@ -279,7 +279,7 @@ fn payload(value: Place, tool: &Isometry3<f64>, units: Units) -> (f64, Point3<f6
     (value.get("mass").not_negative(), point + if in_tool { tool.rotation * offset } else { offset })
 }
 
-fn gravity(value: Place) -> [f64; 3] {
+fn gravity(value: DocumentNode) -> [f64; 3] {
     let Some(value) = value.given() else { return GRAVITY };
     let gravity = value.vector();
     let size = Vector3::from(gravity).norm();

@@ -1,8 +1,8 @@
 //! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg and Nm/A.
 
-use super::place::{Faults, Place};
+use super::place::{DocumentNode, Faults};
 use super::screws::direction;
-use super::{Imported, Text};
+use super::{Imported, RobotFileText};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
@@ -11,9 +11,9 @@ use nalgebra::{Point3, Vector3};
 
 const KEYS: [&str; 11] = ["name", "axes", "points", "tool", "mass", "com", "ratio", "kt", "payload", "payload_com", "coupling"];
 
-pub(super) fn read(file: Text) -> Result<Imported> {
+pub(super) fn read(file: RobotFileText) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
-    let root = Place::root(&node, &faults).open_map(&KEYS);
+    let root = DocumentNode::root(&node, &faults).open_map(&KEYS);
     let axes = root.get("axes").items();
     if root.get("axes").given().is_some() && axes.is_empty() {
         root.get("axes").fault("no joints; expected at least one axis");
@@ -22,7 +22,9 @@ pub(super) fn read(file: Text) -> Result<Imported> {
     let points = root.get("points").per_joint(n);
     let per_joint = |key: &str| root.get(key).given().map(|list| list.per_joint(n)).unwrap_or_default();
     let (masses, centres, ratios, constants) = (per_joint("mass"), per_joint("com"), per_joint("ratio"), per_joint("kt"));
-    let number = |list: &[Place], i: usize| list.get(i).and_then(Place::given).map(|value| value.sized(Bound::Factor, Unit::One));
+    let number = |list: &[DocumentNode], i: usize| {
+        list.get(i).and_then(DocumentNode::given).map(|value| value.sized(Bound::Factor, Unit::One))
+    };
     let joints = (axes.iter().enumerate())
         .map(|(i, axis)| JointDescription {
             name: format!("J{}", i + 1),
@@ -32,19 +34,19 @@ pub(super) fn read(file: Text) -> Result<Imported> {
             limits: None,
             reduction_ratio: number(&ratios, i),
             motor_constant: number(&constants, i),
-            mass: masses.get(i).and_then(Place::given).map(Place::not_negative),
-            centre: centres.get(i).and_then(Place::given).map(|centre| metres(centre).into()),
+            mass: masses.get(i).and_then(DocumentNode::given).map(DocumentNode::not_negative),
+            centre: centres.get(i).and_then(DocumentNode::given).map(|centre| metres(centre).into()),
         })
         .collect();
     let tool = metres(&root.get("tool"));
     let offset = root.get("payload_com").given().map_or_else(Vector3::zeros, |offset| metres(offset).coords);
     let robot = RobotDescription {
-        name: root.get("name").given().map_or_else(|| "robot".into(), Place::text),
+        name: root.get("name").given().map_or_else(|| "robot".into(), DocumentNode::text),
         joints,
         tool: tool.into(),
         tool_rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         couplings: root.get("coupling").given().map_or_else(Vec::new, |list| couplings(list, n)),
-        payload_mass: root.get("payload").given().map_or(0.0, Place::not_negative),
+        payload_mass: root.get("payload").given().map_or(0.0, DocumentNode::not_negative),
         payload_centre: (tool + offset).into(),
         gravity: [0.0, 0.0, -9.81],
     };
@@ -54,12 +56,12 @@ pub(super) fn read(file: Text) -> Result<Imported> {
     Ok(Imported { robot, notes })
 }
 
-fn metres(value: &Place) -> Point3<f64> {
+fn metres(value: &DocumentNode) -> Point3<f64> {
     Point3::from(value.sized_vector(Bound::Length, Unit::Millimetre))
 }
 
 /// Pairs (moved, by) of joints from 0. The layout states no ratio: the controller is taken to add none.
-fn couplings(list: &Place, joints: usize) -> Vec<Coupling> {
+fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
     let index = |value: f64| (0..joints).find(|j| *j as f64 == value);
     let mut couplings: Vec<_> = (list.items().iter())
         .filter_map(|pair| {

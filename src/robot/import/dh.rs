@@ -3,8 +3,8 @@
 //! holds alpha(i-1) and a(i-1). `theta` of a revolute and `d` of a prismatic joint are the values at joint position zero. A row of
 //! the kind `fixed` moves the frame and is no joint: a base, a track or a tool that the convention alone cannot place.
 
-use super::place::Place;
-use super::{Chain, ChainJoint};
+use super::place::DocumentNode;
+use super::{ChainJoint, FrameChain};
 use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use crate::units::Unit;
@@ -15,12 +15,12 @@ const KINDS: &[(&str, Option<JointKind>)] =
     &[("revolute", Some(JointKind::Revolute)), ("prismatic", Some(JointKind::Prismatic)), ("fixed", None)];
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Convention {
+pub(super) enum DhConvention {
     Standard,
     Modified,
 }
 
-pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Unit) -> Chain {
+pub(super) fn read(rows: &DocumentNode, convention: DhConvention, length: Unit, angle: Unit) -> FrameChain {
     let mut frame = Isometry3::identity();
     let mut joints = Vec::new();
     for row in rows.items() {
@@ -39,10 +39,10 @@ pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Un
         let (turn, along) = (|key: &str| number(key, Bound::Angle, angle), |key: &str| number(key, Bound::Length, length));
         let about_z = rotation(Vector3::z(), turn("theta")) * shift(0.0, number("d", Bound::Offset, length));
         let about_x = rotation(Vector3::x(), turn("alpha")) * shift(along("a"), 0.0);
-        let at_joint = if convention == Convention::Standard { frame } else { frame * about_x };
+        let at_joint = if convention == DhConvention::Standard { frame } else { frame * about_x };
         frame = match convention {
-            Convention::Standard => frame * about_z * about_x,
-            Convention::Modified => at_joint * about_z,
+            DhConvention::Standard => frame * about_z * about_x,
+            DhConvention::Modified => at_joint * about_z,
         };
         let Some(kind) = kind else { continue };
         joints.push(ChainJoint {
@@ -55,7 +55,7 @@ pub(super) fn read(rows: &Place, convention: Convention, length: Unit, angle: Un
             body: None,
         });
     }
-    Chain { joints, tip: frame }
+    FrameChain { joints, tip: frame }
 }
 
 fn rotation(axis: Vector3<f64>, angle: f64) -> Isometry3<f64> {

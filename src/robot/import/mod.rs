@@ -16,7 +16,7 @@ mod urdf;
 
 /// A file's content and the name by which messages call it.
 #[derive(Debug, Clone, Copy)]
-pub struct Text<'a> {
+pub struct RobotFileText<'a> {
     pub label: &'a str,
     pub text: &'a str,
 }
@@ -29,17 +29,17 @@ pub struct Imported {
 }
 
 /// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.
-pub fn read_calib(file: Text, urdf: Option<Text>) -> Result<Imported> {
+pub fn read_calib(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<Imported> {
     calib::read(file, urdf)
 }
 
 /// Reads a practice `robot.json` (mm, kg, Nm/A; couplings as pairs from 0). Fails with every fault of the file.
-pub fn read_case(file: Text) -> Result<Imported> {
+pub fn read_case(file: RobotFileText) -> Result<Imported> {
     case::read(file)
 }
 
 /// What every kinematic format is brought to: joints and frames at the zero pose in the base frame, SI.
-struct Chain {
+struct FrameChain {
     joints: Vec<ChainJoint>,
     /// The frame in which the file's `tool` is given: the base for screws, the last link or tip otherwise.
     tip: Isometry3<f64>,

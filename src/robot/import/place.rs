@@ -3,11 +3,11 @@
 //! A value that could not be read becomes NaN (or empty) after its fault was noted; so one pass finds all faults, and
 //! nothing unread can leave, because [`Faults::finish`] fails when there is any.
 
-use super::Text;
+use super::RobotFileText;
 use crate::error::{Error, Fault, Result};
 use crate::robot::Bound;
 use crate::units::Unit;
-use crate::yaml::{self, Mark, Node, Trouble, Value, join};
+use crate::yaml::{self, Mark, Node, Trouble, YamlValue, join};
 use std::cell::RefCell;
 
 /// The faults found so far in one file.
@@ -18,7 +18,7 @@ pub(super) struct Faults<'f> {
 
 impl<'f> Faults<'f> {
     /// Parses YAML or JSON, which is YAML too; fails where nothing of the file can be read.
-    pub fn parse(file: Text<'f>) -> Result<(Node, Self)> {
+    pub fn parse(file: RobotFileText<'f>) -> Result<(Node, Self)> {
         let (node, troubles) = yaml::parse(file.text);
         let list: Vec<Fault> = troubles.into_iter().map(|trouble| trouble.fault(file.label)).collect();
         match node {
@@ -55,7 +55,7 @@ enum Content<'a> {
 }
 
 #[derive(Clone)]
-pub(super) struct Place<'a> {
+pub(super) struct DocumentNode<'a> {
     content: Content<'a>,
     path: String,
     /// Of the nearest value that is there.
@@ -63,12 +63,12 @@ pub(super) struct Place<'a> {
     faults: &'a Faults<'a>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> DocumentNode<'a> {
     pub fn root(node: &'a Node, faults: &'a Faults<'a>) -> Self {
         Self { content: Content::There(node), path: String::new(), mark: node.mark, faults }
     }
     fn child(&self, node: Option<&'a Node>, path: String) -> Self {
-        let given = node.filter(|node| !matches!(node.value, Value::Null));
+        let given = node.filter(|node| !matches!(node.value, YamlValue::Null));
         let mark = node.map_or(self.mark, |node| node.mark);
         Self { content: given.map_or(Content::Missing, Content::There), path, mark, faults: self.faults }
     }
@@ -85,7 +85,7 @@ impl<'a> Place<'a> {
     fn node(&self) -> Option<&'a Node> {
         if let Content::There(node) = self.content { Some(node) } else { None }
     }
-    fn value(&self) -> Option<&'a Value> {
+    fn value(&self) -> Option<&'a YamlValue> {
         self.node().map(|node| &node.value)
     }
     /// The place if there is something other than null.
@@ -108,7 +108,7 @@ impl<'a> Place<'a> {
     }
     /// The same place, checked to be a map; it may have other keys than the `known` ones.
     pub fn open_map(self, known: &[&str]) -> Self {
-        if let Some(Value::Map(_)) = self.value() {
+        if let Some(YamlValue::Map(_)) = self.value() {
             return self;
         }
         self.expected(&format!("a map with the keys {}", known.join(", ")));
@@ -117,14 +117,14 @@ impl<'a> Place<'a> {
     pub fn get(&self, key: &str) -> Self {
         let path = join(&self.path, key);
         match self.content {
-            Content::There(node) if matches!(node.value, Value::Map(_)) => self.child(node.get(key), path),
+            Content::There(node) if matches!(node.value, YamlValue::Map(_)) => self.child(node.get(key), path),
             Content::There(_) | Content::Unreadable => Self { content: Content::Unreadable, path, ..self.clone() },
             Content::Missing => self.child(None, path),
         }
     }
     pub fn items(&self) -> Vec<Self> {
         match self.value() {
-            Some(Value::List(items)) => {
+            Some(YamlValue::List(items)) => {
                 items.iter().enumerate().map(|(i, node)| self.child(Some(node), format!("{}[{i}]", self.path))).collect()
             }
             _ => {
@@ -136,15 +136,15 @@ impl<'a> Place<'a> {
     /// A list with one entry per joint; one fault when the count differs.
     pub fn per_joint(&self, joints: usize) -> Vec<Self> {
         let items = self.items();
-        if matches!(self.value(), Some(Value::List(_))) && items.len() != joints {
+        if matches!(self.value(), Some(YamlValue::List(_))) && items.len() != joints {
             self.fault(format!("{} entries for {joints} joints; expected one per joint", items.len()));
         }
         items
     }
     pub fn number(&self) -> f64 {
         match self.value() {
-            Some(Value::Integer(value)) => *value as f64,
-            Some(Value::Float(value)) if value.is_finite() => *value,
+            Some(YamlValue::Integer(value)) => *value as f64,
+            Some(YamlValue::Float(value)) if value.is_finite() => *value,
             _ => {
                 self.expected("a finite number");
                 f64::NAN
@@ -175,7 +175,7 @@ impl<'a> Place<'a> {
         self.numbers(|item| item.sized(bound, unit))
     }
     fn numbers<const N: usize>(&self, number: impl Fn(&Self) -> f64) -> [f64; N] {
-        if let Some(Value::List(items)) = self.value()
+        if let Some(YamlValue::List(items)) = self.value()
             && items.len() == N
         {
             let mut vector = [f64::NAN; N];
@@ -190,7 +190,9 @@ impl<'a> Place<'a> {
     pub fn text(&self) -> String {
         match self.value() {
             // Names like 7 are texts that YAML takes for numbers.
-            Some(Value::Text(_) | Value::Integer(_) | Value::Float(_)) => self.node().and_then(Node::text).unwrap_or_default(),
+            Some(YamlValue::Text(_) | YamlValue::Integer(_) | YamlValue::Float(_)) => {
+                self.node().and_then(Node::text).unwrap_or_default()
+            }
             _ => {
                 self.expected("a text");
                 String::new()
@@ -200,7 +202,7 @@ impl<'a> Place<'a> {
     /// The one of `allowed` that is named here.
     pub fn choice<T: Copy>(&self, allowed: &[(&str, T)]) -> Option<T> {
         let list = allowed.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        let Some(Value::Text(text)) = self.value() else {
+        let Some(YamlValue::Text(text)) = self.value() else {
             self.expected(&format!("one of {list}"));
             return None;
         };
@@ -227,10 +229,10 @@ impl<'a> Place<'a> {
 
 fn describe(node: &Node) -> String {
     match &node.value {
-        Value::Null => "nothing".into(),
-        Value::Text(text) => format!("the text `{text}`"),
-        Value::List(items) => format!("a list of {}", items.len()),
-        Value::Map(_) => "a map".into(),
-        Value::Bool(_) | Value::Integer(_) | Value::Float(_) => format!("`{}`", node.text().unwrap_or_default()),
+        YamlValue::Null => "nothing".into(),
+        YamlValue::Text(text) => format!("the text `{text}`"),
+        YamlValue::List(items) => format!("a list of {}", items.len()),
+        YamlValue::Map(_) => "a map".into(),
+        YamlValue::Bool(_) | YamlValue::Integer(_) | YamlValue::Float(_) => format!("`{}`", node.text().unwrap_or_default()),
     }
 }

@@ -1,7 +1,7 @@
 //! Joint screws: an axis and a point on it, or a twist (v; w) with v = -w x point (Lynch & Park, Modern Robotics, 4.1).
 
-use super::place::Place;
-use super::{Chain, ChainJoint};
+use super::place::DocumentNode;
+use super::{ChainJoint, FrameChain};
 use crate::robot::Bound;
 use crate::robot::description::JointKind;
 use crate::units::Unit;
@@ -12,12 +12,12 @@ const SMALL: f64 = 1e-9;
 
 const KINDS: &[(&str, JointKind)] = &[("revolute", JointKind::Revolute), ("prismatic", JointKind::Prismatic)];
 
-pub(super) fn read(screws: &Place, length: Unit) -> Chain {
+pub(super) fn read(screws: &DocumentNode, length: Unit) -> FrameChain {
     let joints = screws.items().into_iter().map(|screw| joint(screw, length)).collect();
-    Chain { joints, tip: Isometry3::identity() }
+    FrameChain { joints, tip: Isometry3::identity() }
 }
 
-fn joint(screw: Place, length: Unit) -> ChainJoint {
+fn joint(screw: DocumentNode, length: Unit) -> ChainJoint {
     let screw = screw.map(&["kind", "axis", "point", "twist"]);
     let kind = screw.get("kind").given().and_then(|kind| kind.choice(KINDS));
     let (kind, axis, point) = match screw.get("twist").given() {
@@ -44,7 +44,7 @@ fn joint(screw: Place, length: Unit) -> ChainJoint {
 }
 
 /// A direction of any length but zero, as a unit vector.
-pub(super) fn direction(value: &Place) -> Vector3<f64> {
+pub(super) fn direction(value: &DocumentNode) -> Vector3<f64> {
     unit(Vector3::from(value.vector::<3>())).unwrap_or_else(|| {
         value.fault("has no direction: its length is zero");
         Vector3::repeat(f64::NAN)
@@ -62,7 +62,7 @@ pub(super) fn unit(vector: Vector3<f64>) -> Option<Vector3<f64>> {
 }
 
 /// Kind, unit axis and the point of the axis nearest to the origin, m.
-fn from_twist(value: &Place, length: Unit) -> (JointKind, Vector3<f64>, Point3<f64>) {
+fn from_twist(value: &DocumentNode, length: Unit) -> (JointKind, Vector3<f64>, Point3<f64>) {
     let twist = value.sized_vector::<6>(Bound::Factor, Unit::One);
     let (v, w) = (Vector3::new(twist[0], twist[1], twist[2]), Vector3::new(twist[3], twist[4], twist[5]));
     if w.norm() < SMALL {

@@ -3,7 +3,7 @@
 //! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
 
 use super::screws::unit;
-use super::{Chain, ChainJoint, Text};
+use super::{ChainJoint, FrameChain, RobotFileText};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::robot::Bound;
 use crate::robot::description::JointKind;
@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet};
 
-struct Joint<'a> {
+struct UrdfJoint<'a> {
     node: Node<'a, 'a>,
     name: &'a str,
     parent: &'a str,
@@ -26,7 +26,7 @@ struct Reader<'a> {
 }
 
 /// Reads the chain from `base` to `tip`; fails with every fault found, each with its line.
-pub(super) fn read(file: Text, base: &str, tip: &str) -> Result<Chain> {
+pub(super) fn read(file: RobotFileText, base: &str, tip: &str) -> Result<FrameChain> {
     let document = Document::parse(file.text).map_err(|e| Error::spec(file.label, format!("not readable as XML: {e}")))?;
     let mut reader = Reader { label: file.label, document: &document, faults: Vec::new() };
     let chain = reader.chain(base, tip);
@@ -42,7 +42,7 @@ impl<'a> Reader<'a> {
         self.faults.push(Fault::new(format!("{}:{line}", self.label), message));
     }
 
-    fn chain(&mut self, base: &str, tip: &str) -> Option<Chain> {
+    fn chain(&mut self, base: &str, tip: &str) -> Option<FrameChain> {
         let root = self.document.root_element();
         if root.tag_name().name() != "robot" {
             self.fault(root, format!("expected a URDF, whose root is <robot>, found <{}>", root.tag_name().name()));
@@ -76,7 +76,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Every joint of the file, by the link it moves.
-    fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, Joint<'a>>> {
+    fn joints(&mut self, root: Node<'a, 'a>, links: &BTreeMap<&'a str, Node>) -> Option<BTreeMap<&'a str, UrdfJoint<'a>>> {
         let mut joints = BTreeMap::new();
         let mut names = BTreeSet::new();
         for node in root.children().filter(|node| node.has_tag_name("joint")) {
@@ -96,7 +96,7 @@ impl<'a> Reader<'a> {
                 }
             }
             let origin = self.origin(node);
-            if joints.insert(child, Joint { node, name, parent, child, origin }).is_some() {
+            if joints.insert(child, UrdfJoint { node, name, parent, child, origin }).is_some() {
                 self.fault(node, format!("joint `{name}`: link `{child}` has two parents; expected a tree"));
             }
         }
@@ -104,7 +104,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The joints from base to tip.
-    fn path(&mut self, root: Node, joints: &BTreeMap<&'a str, Joint<'a>>, base: &str, tip: &str) -> Option<Vec<&'a str>> {
+    fn path(&mut self, root: Node, joints: &BTreeMap<&'a str, UrdfJoint<'a>>, base: &str, tip: &str) -> Option<Vec<&'a str>> {
         let mut path = Vec::new();
         let mut link = tip;
         while link != base {
@@ -129,10 +129,10 @@ impl<'a> Reader<'a> {
 
     fn walk(
         &mut self,
-        joints: &BTreeMap<&'a str, Joint<'a>>,
+        joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
         links: &BTreeMap<&'a str, Node<'a, 'a>>,
         path: &[&'a str],
-    ) -> Chain {
+    ) -> FrameChain {
         let mut frame = Isometry3::identity();
         let mut chain = Vec::new();
         for link in path {
@@ -161,10 +161,10 @@ impl<'a> Reader<'a> {
                 body,
             });
         }
-        Chain { joints: chain, tip: frame }
+        FrameChain { joints: chain, tip: frame }
     }
 
-    fn kind(&mut self, joint: &Joint) -> Option<JointKind> {
+    fn kind(&mut self, joint: &UrdfJoint) -> Option<JointKind> {
         let name = joint.name;
         if let Some(mimic) = joint.node.children().find(|node| node.has_tag_name("mimic")) {
             self.fault(mimic, format!("joint `{name}` mimics another joint; expected a serial chain of independent joints"));
@@ -184,7 +184,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn limits(&mut self, joint: &Joint<'a>) -> Option<[f64; 2]> {
+    fn limits(&mut self, joint: &UrdfJoint<'a>) -> Option<[f64; 2]> {
         let node = joint.node.children().find(|node| node.has_tag_name("limit"))?;
         if joint.node.attribute("type") == Some("continuous") || !node.has_attribute("lower") && !node.has_attribute("upper") {
             return None;
@@ -201,7 +201,7 @@ impl<'a> Reader<'a> {
     /// Mass and centre of what moves with `link`: itself and every branch that the chain does not move on.
     fn body(
         &mut self,
-        joints: &BTreeMap<&'a str, Joint<'a>>,
+        joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
         links: &BTreeMap<&'a str, Node<'a, 'a>>,
         path: &[&'a str],
         link: &'a str,

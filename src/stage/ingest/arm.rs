@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::table::Robot;
 
 /// The joints of the robot table.
-pub(super) struct Arm {
+pub(super) struct RobotJoints {
     pub prismatic: Vec<bool>,
     /// Travel of each joint, rad or m.
     pub limits: Vec<[f64; 2]>,
@@ -13,7 +13,7 @@ pub(super) struct Arm {
     pub slots: Slots,
 }
 
-impl Arm {
+impl RobotJoints {
     pub(super) fn of(robot: &Robot) -> Result<Self> {
         let (mut kinds, mut limits) = (Vec::new(), Vec::new());
         for row in &robot.0 {

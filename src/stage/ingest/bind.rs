@@ -1,10 +1,10 @@
 //! From the columns that the settings name to the columns that a file has.
 
-use super::arm::Arm;
+use super::arm::RobotJoints;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
 use crate::error::{Error, Fault, Result, counted, nearest};
-use crate::observation::{Column, Convention};
+use crate::observation::{Convention, DeclaredColumn};
 use crate::units::{Quantity, Unit};
 use std::ops::Range;
 
@@ -15,15 +15,15 @@ const SHOWN: usize = 60;
 pub(super) struct Binding {
     /// Fields of a row.
     pub width: usize,
-    pub id: Option<Text>,
+    pub id: Option<TextBinding>,
     /// In the order of the row's texts.
-    pub texts: Vec<Option<Text>>,
+    pub texts: Vec<Option<TextBinding>>,
     /// Quantities of several numbers: where they are, and how they are read.
-    pub conventions: Vec<(Range<usize>, &'static Column, &'static Convention)>,
+    pub conventions: Vec<(Range<usize>, &'static DeclaredColumn, &'static Convention)>,
     /// Whether the file has what a kind of measurement measured.
     pub measures: bool,
     pub sequence: Option<usize>,
-    pub cells: Vec<Cell>,
+    pub cells: Vec<NumberBinding>,
     /// Numbers that are the same in every row, SI.
     pub constants: Vec<(usize, f64)>,
     /// Optional columns that the file does not have, for a note.
@@ -31,13 +31,13 @@ pub(super) struct Binding {
 }
 
 /// Text from a column, or for every row the same.
-pub(super) enum Text {
+pub(super) enum TextBinding {
     Column { column: usize, optional: bool },
     Value(String),
 }
 
 /// A column of numbers.
-pub(super) struct Cell {
+pub(super) struct NumberBinding {
     /// Place in a row's numbers.
     pub index: usize,
     pub column: usize,
@@ -69,7 +69,7 @@ impl Binding {
 }
 
 /// The names of a file's columns, if it has a header, else how many there are.
-pub(super) struct Head {
+pub(super) struct FileHeader {
     pub label: String,
     /// Line of the header, or of the first data row.
     pub line: u64,
@@ -78,13 +78,13 @@ pub(super) struct Head {
 }
 
 struct Binder<'a> {
-    head: &'a Head,
+    head: &'a FileHeader,
     binding: Binding,
     faults: Vec<Fault>,
 }
 
 /// Resolves every mapped column, or reports all that are missing.
-pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Binding> {
+pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) -> Result<Binding> {
     let binding = Binding {
         width: head.width,
         id: None,
@@ -99,10 +99,10 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
     let mut binder = Binder { head, binding, faults: Vec::new() };
     let columns = &layout.columns;
     for (declared, text) in columns.texts() {
-        let value = text.value.clone().map(Text::Value);
+        let value = text.value.clone().map(TextBinding::Value);
         let bound = value.or_else(|| {
             let column = binder.column(text.column.as_ref()?, declared.setting, text.optional)?;
-            Some(Text::Column { column, optional: text.optional })
+            Some(TextBinding::Column { column, optional: text.optional })
         });
         match arm.slots.texts().iter().position(|name| *name == declared.setting) {
             Some(at) => binder.binding.texts[at] = bound,
@@ -122,7 +122,7 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
         {
             let difference = binder.difference(scalar, declared.setting)?;
             let cell = binder.cell(declared, false, index, column, unit);
-            binder.binding.cells.push(Cell { optional: scalar.optional, difference, ..cell });
+            binder.binding.cells.push(NumberBinding { optional: scalar.optional, difference, ..cell });
         }
     }
     for (declared, conventions, mapped) in columns.conventions() {
@@ -132,7 +132,7 @@ pub(super) fn bind(layout: &FileLayout, head: &Head, arm: &Arm) -> Result<Bindin
         for (index, reference) in places.clone().zip(references) {
             if let Some(column) = binder.column(reference, declared.setting, false) {
                 let cell = binder.cell(declared, false, index, column, unit);
-                binder.binding.cells.push(Cell { optional: mapped.optional, ..cell });
+                binder.binding.cells.push(NumberBinding { optional: mapped.optional, ..cell });
             }
         }
         binder.binding.conventions.push((places, declared, convention));
@@ -161,7 +161,7 @@ fn unit(symbol: Option<&str>) -> Result<Unit> {
 
 impl Binder<'_> {
     fn fault(&mut self, message: String) {
-        let Head { label, line, .. } = self.head;
+        let FileHeader { label, line, .. } = self.head;
         // Column names of a Parquet file stand on no line.
         let place = if *line == 0 { label.clone() } else { format!("{label}:{line}") };
         self.faults.push(Fault::new(place, message));
@@ -230,12 +230,12 @@ impl Binder<'_> {
         text
     }
     /// A cell that may not be blank.
-    fn cell(&self, declared: &Column, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> Cell {
+    fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
         let (quantity, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
-        Cell { index, column, unit, range, is_direction, optional: false, name, difference: None }
+        NumberBinding { index, column, unit, range, is_direction, optional: false, name, difference: None }
     }
-    fn joints(&mut self, declared: &Column, joints: &JointColumns, arm: &Arm) -> Result<()> {
+    fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &RobotJoints) -> Result<()> {
         let name = declared.setting;
         let count = arm.joints();
         let references: Vec<ColumnRef> = match (&joints.columns, &joints.column) {
@@ -282,7 +282,7 @@ impl Binder<'_> {
             if let Some(column) = self.column(reference, name, false) {
                 let index = arm.slots.of(name).start + joint;
                 let cell = self.cell(declared, is_prismatic, index, column, unit);
-                self.binding.cells.push(Cell { optional: joints.optional, ..cell });
+                self.binding.cells.push(NumberBinding { optional: joints.optional, ..cell });
             }
         }
         Ok(())

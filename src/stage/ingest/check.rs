@@ -5,14 +5,15 @@ use super::columns::Columns;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
 use crate::error::{Fault, counted, nearest};
-use crate::observation::{Column, Conventions, KINDS, Kind, Part};
+use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 
 /// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
 fn needed(settings: &Ingest) -> Vec<&'static str> {
     let [first, others @ ..] = KINDS else { return Vec::new() };
-    let mapped = |kind: &&dyn Kind, columns: &Columns| kind.columns(Part::Value).any(|column| columns.has(column.setting));
+    let mapped =
+        |kind: &&dyn MeasurementKind, columns: &Columns| kind.columns(Part::Value).any(|column| columns.has(column.setting));
     let other = |file: &FileLayout| others.iter().any(|kind| mapped(kind, &file.columns));
     let axes = match &settings.axes {
         Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
@@ -97,7 +98,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
 }
 
 /// What was measured comes with its standard deviation, and names of what it was measured from with it.
-fn kind_faults(kind: &dyn Kind, columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
+fn kind_faults(kind: &dyn MeasurementKind, columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
     let settings = |part: Part| kind.columns(part).map(|column| column.setting);
     let mapped = |part: Part| settings(part).any(|setting| columns.has(setting));
     let values: Vec<&str> = settings(Part::Value).collect();
@@ -116,7 +117,7 @@ fn kind_faults(kind: &dyn Kind, columns: &Columns, place: &str, faults: &mut Vec
 }
 
 fn convention_faults(
-    declared: &Column,
+    declared: &DeclaredColumn,
     conventions: &'static Conventions,
     mapped: &ConventionColumns,
     file: &FileLayout,
@@ -174,7 +175,7 @@ fn difference_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayou
     }
 }
 
-fn joint_faults(declared: &Column, joints: &JointColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+fn joint_faults(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     let quantity = declared.quantity;
     one_of(
         joints.column.is_some(),

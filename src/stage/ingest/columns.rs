@@ -1,7 +1,7 @@
 //! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
 
 use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
-use crate::observation::{Column, Convention, Conventions, Shape};
+use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
 use crate::table::recording_columns;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 
 /// Which column holds which quantity; what is not named here is not read. In the order of the declared columns.
 #[derive(Debug, Clone, Default)]
-pub struct Columns(Vec<(&'static Column, Mapped)>);
+pub struct Columns(Vec<(&'static DeclaredColumn, Mapped)>);
 
 /// Where a quantity stands in a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,7 +29,7 @@ enum Mapped {
 macro_rules! mapped {
     ($(#[$doc:meta])* $all:ident, $one:ident, $variant:ident, $type:ty) => {
         $(#[$doc])*
-        pub(super) fn $all(&self) -> impl Iterator<Item = (&'static Column, &$type)> {
+        pub(super) fn $all(&self) -> impl Iterator<Item = (&'static DeclaredColumn, &$type)> {
             self.0.iter().filter_map(|(column, mapped)| match mapped {
                 Mapped::$variant(mapped) => Some((*column, mapped)),
                 _ => None,
@@ -72,9 +72,11 @@ impl Columns {
     );
 
     /// The mapped quantities of several numbers.
-    pub(super) fn conventions(&self) -> impl Iterator<Item = (&'static Column, &'static Conventions, &ConventionColumns)> {
+    pub(super) fn conventions(
+        &self,
+    ) -> impl Iterator<Item = (&'static DeclaredColumn, &'static Conventions, &ConventionColumns)> {
         self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
-            (Shape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
+            (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
             _ => None,
         })
     }
@@ -121,8 +123,8 @@ impl Serialize for Columns {
 /// Settings of the block, and of the conventions of each.
 static SETTINGS: LazyLock<Vec<&'static str>> = LazyLock::new(|| recording_columns().map(|column| column.setting).collect());
 static CONVENTIONS: LazyLock<BTreeMap<&'static str, Vec<&'static str>>> = LazyLock::new(|| {
-    let named = |column: &Column| match column.shape {
-        Shape::Conventions(conventions) => conventions.all.iter().map(|one| one.name).chain(["unit", "optional"]).collect(),
+    let named = |column: &DeclaredColumn| match column.shape {
+        ColumnShape::Conventions(conventions) => conventions.all.iter().map(|one| one.name).chain(["unit", "optional"]).collect(),
         _ => Vec::new(),
     };
     recording_columns().map(|column| (column.setting, named(column))).collect()
@@ -143,14 +145,14 @@ impl<'de> Visitor<'de> for Block {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Columns, A::Error> {
         let mut found: BTreeMap<&'static str, Mapped> = BTreeMap::new();
-        while let Some(setting) = access.next_key_seed(Key(&SETTINGS))? {
+        while let Some(setting) = access.next_key_seed(KnownKey(&SETTINGS))? {
             let Some(column) = recording_columns().find(|column| column.setting == setting) else { continue };
             let mapped = match column.shape {
-                Shape::Text => access.next_value::<Option<_>>()?.map(Mapped::Text),
-                Shape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
-                Shape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
-                Shape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
-                Shape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
+                ColumnShape::Text => access.next_value::<Option<_>>()?.map(Mapped::Text),
+                ColumnShape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
+                ColumnShape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
+                ColumnShape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
+                ColumnShape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
             };
             if mapped.is_some_and(|mapped| found.insert(column.setting, mapped).is_some()) {
                 return Err(A::Error::duplicate_field(column.setting));
@@ -161,9 +163,9 @@ impl<'de> Visitor<'de> for Block {
 }
 
 /// A key that is one of these.
-struct Key(&'static [&'static str]);
+struct KnownKey(&'static [&'static str]);
 
-impl<'de> DeserializeSeed<'de> for Key {
+impl<'de> DeserializeSeed<'de> for KnownKey {
     type Value = &'static str;
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'static str, D::Error> {
         let name = Cow::<str>::deserialize(deserializer)?;
@@ -172,7 +174,7 @@ impl<'de> DeserializeSeed<'de> for Key {
 }
 
 /// Columns of a quantity of several numbers.
-struct OneConvention(&'static Column);
+struct OneConvention(&'static DeclaredColumn);
 
 impl<'de> DeserializeSeed<'de> for OneConvention {
     type Value = Option<ConventionColumns>;
@@ -195,7 +197,7 @@ impl<'de> Visitor<'de> for OneConvention {
     fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Self::Value, A::Error> {
         let mut out = ConventionColumns::default();
         let known = CONVENTIONS.get(self.0.setting).map(Vec::as_slice).unwrap_or_default();
-        while let Some(key) = access.next_key_seed(Key(known))? {
+        while let Some(key) = access.next_key_seed(KnownKey(known))? {
             match key {
                 "unit" => out.unit = access.next_value()?,
                 "optional" => out.optional = access.next_value()?,
@@ -218,11 +220,11 @@ impl JsonSchema for Columns {
         let mut properties = serde_json::Map::new();
         for column in recording_columns() {
             let mut schema = match column.shape {
-                Shape::Text => generator.subschema_for::<Option<TextColumn>>(),
-                Shape::Count => generator.subschema_for::<Option<CountColumn>>(),
-                Shape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
-                Shape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
-                Shape::Conventions(conventions) => {
+                ColumnShape::Text => generator.subschema_for::<Option<TextColumn>>(),
+                ColumnShape::Count => generator.subschema_for::<Option<CountColumn>>(),
+                ColumnShape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
+                ColumnShape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
+                ColumnShape::Conventions(conventions) => {
                     let block = convention_schema(column.setting, conventions, generator);
                     generator.definitions_mut().insert(conventions.name.into(), block.to_value());
                     let reference = format!("#/definitions/{}", conventions.name);

@@ -121,7 +121,7 @@ pub enum Duplicates {
 /// What becomes of rows with a joint beyond the robot's limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Limits {
+pub enum LimitPolicy {
     /// Used, with a warning that counts them; most rows beyond the limits is an error.
     #[default]
     Warn,

@@ -15,7 +15,7 @@ const LONGEST: usize = 1 << 20;
 pub(super) type Buffered = BufReader<Box<dyn Read + Send>>;
 
 /// Reads one file from its first line to its last.
-pub(super) struct Lines {
+pub(super) struct TextReader {
     reader: Buffered,
     label: String,
     delimiter: Delimiter,
@@ -30,7 +30,7 @@ pub(super) struct Lines {
 
 /// One row; reused from row to row.
 #[derive(Default)]
-pub(super) struct Record {
+pub(super) struct RecordFields {
     /// Line where it begins, from 1.
     pub line: u64,
     /// The bytes as they stand, without the line end.
@@ -40,7 +40,7 @@ pub(super) struct Record {
     fields: Vec<Range<usize>>,
 }
 
-impl Record {
+impl RecordFields {
     /// Starts a row whose fields are pushed one by one.
     pub(super) fn begin(&mut self, line: u64) {
         self.line = line;
@@ -73,7 +73,7 @@ impl Record {
     }
 }
 
-impl Lines {
+impl TextReader {
     /// Opens a file and skips what stands above header and data; `None` where nothing is left.
     pub(super) fn open(reader: Buffered, label: &str, layout: &FileLayout) -> Result<Self> {
         let delimiter = delimiter(&layout.delimiter).ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?;
@@ -129,7 +129,7 @@ impl Lines {
         Ok(true)
     }
     /// Takes the mark of a comment off the header.
-    fn uncomment(&mut self, record: &mut Record) -> Result<()> {
+    fn uncomment(&mut self, record: &mut RecordFields) -> Result<()> {
         if !self.header_in_comment || record.text.trim_ascii().is_empty() {
             return Ok(());
         }
@@ -145,7 +145,7 @@ impl Lines {
         Ok(())
     }
     /// The next row; false at the end of the file.
-    pub(super) fn next(&mut self, record: &mut Record) -> Result<bool> {
+    pub(super) fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         loop {
             record.text.clear();
             if !self.line(&mut record.text)? {
@@ -212,7 +212,7 @@ fn split(text: &[u8], delimiter: Delimiter, fields: &mut Vec<Range<usize>>) {
 }
 
 /// Fields of a row with quotes; false where a quote is still open at the end.
-fn unquote(record: &mut Record, delimiter: Delimiter) -> bool {
+fn unquote(record: &mut RecordFields, delimiter: Delimiter) -> bool {
     record.fields.clear();
     record.unquoted.clear();
     let (mut start, mut inside, mut fresh) = (0, false, true);
@@ -268,8 +268,8 @@ mod tests {
             columns: Default::default(),
         };
         let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);
-        let mut lines = Lines::open(reader, "a.csv", &layout).unwrap();
-        let (mut record, mut rows) = (Record::default(), Vec::new());
+        let mut lines = TextReader::open(reader, "a.csv", &layout).unwrap();
+        let (mut record, mut rows) = (RecordFields::default(), Vec::new());
         while lines.next(&mut record).unwrap() {
             let fields = (0..record.len()).map(|index| String::from_utf8_lossy(record.field(index).unwrap()).into()).collect();
             rows.push((record.line, fields));

@@ -3,7 +3,7 @@
 //! Through a row's joints and those of its neighbours in the file goes a parabola in time: its slope in the row is the velocity. What
 //! that is worth is seen from the same with neighbours twice as far (Richardson: the difference is three times the error).
 
-use super::arm::Arm;
+use super::arm::RobotJoints;
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
 use schemars::JsonSchema;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// neighbours in the file, never across gaps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Motion {
+pub struct VelocitySettings {
     /// Longer steps in time between rows are gaps, s; five times the usual step if not given.
     #[serde(default)]
     pub gap_s: Option<f64>,
@@ -25,7 +25,7 @@ pub struct Motion {
     pub later_s: f64,
 }
 
-impl Motion {
+impl VelocitySettings {
     pub(super) fn faults(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
         if self.gap_s.is_some_and(|gap| !(gap > 0.0 && gap.is_finite())) {
@@ -51,7 +51,7 @@ const OTHER_UNIT: f64 = 3.0;
 
 /// Times and joints of a file's usable rows.
 #[derive(Default)]
-pub(super) struct Samples {
+pub(super) struct JointSamples {
     numbers: Vec<u64>,
     time: Vec<f64>,
     q: Vec<f64>,
@@ -66,7 +66,7 @@ pub(super) struct Track {
     rates: Vec<f64>,
 }
 
-impl Samples {
+impl JointSamples {
     pub(super) fn push(&mut self, number: u64, time: f64, q: &[f64], given: &[f64]) {
         if time.is_finite() {
             self.numbers.push(number);
@@ -103,7 +103,14 @@ impl Samples {
 
     /// The track of a file of `rows` data rows, with a word to the user; fails where `motion` asks for velocities and the rows are too
     /// far apart in time for them, and where those that the file gives are in another unit.
-    pub(super) fn track(self, motion: Option<&Motion>, rows: u64, arm: &Arm, label: &str, context: &Context) -> Result<Track> {
+    pub(super) fn track(
+        self,
+        motion: Option<&VelocitySettings>,
+        rows: u64,
+        arm: &RobotJoints,
+        label: &str,
+        context: &Context,
+    ) -> Result<Track> {
         let joints = arm.joints();
         let mut steps: Vec<f64> =
             self.time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0 && step.is_finite()).collect();
@@ -230,8 +237,8 @@ impl Track {
 mod tests {
     use super::*;
 
-    fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> Samples {
-        let mut samples = Samples::default();
+    fn samples(times: &[f64], q: impl Fn(f64) -> f64) -> JointSamples {
+        let mut samples = JointSamples::default();
         times.iter().zip(1..).for_each(|(time, number)| samples.push(number, *time, &[q(*time)], &[]));
         samples
     }

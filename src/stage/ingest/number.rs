@@ -4,7 +4,7 @@ use super::layout::Decimal;
 
 /// Why a cell is no number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Fault {
+pub(super) enum NumberFault {
     Blank,
     Text,
     /// A number with a decimal comma where a point was announced.
@@ -16,16 +16,16 @@ pub(super) enum Fault {
 }
 
 /// A finite number, or why the cell is none. Blanks around it were removed.
-pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Result<f64, Fault> {
+pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Result<f64, NumberFault> {
     if cell.is_empty() {
-        return Err(Fault::Blank);
+        return Err(NumberFault::Blank);
     }
     match decimal {
-        Decimal::Point => read(cell).map_err(|fault| if with_point(cell).is_some() { Fault::Comma } else { fault }),
-        Decimal::Comma if cell.contains(&b'.') => Err(read(cell).map_or(Fault::Text, |_| Fault::Point)),
+        Decimal::Point => read(cell).map_err(|fault| if with_point(cell).is_some() { NumberFault::Comma } else { fault }),
+        Decimal::Comma if cell.contains(&b'.') => Err(read(cell).map_or(NumberFault::Text, |_| NumberFault::Point)),
         Decimal::Comma => {
             let mut buffer = [0u8; 64];
-            let Some(copy) = buffer.get_mut(..cell.len()) else { return Err(Fault::Text) };
+            let Some(copy) = buffer.get_mut(..cell.len()) else { return Err(NumberFault::Text) };
             copy.copy_from_slice(cell);
             if let Some(mark) = copy.iter_mut().find(|byte| **byte == b',') {
                 *mark = b'.';
@@ -35,9 +35,9 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Result<f64, Fault> {
     }
 }
 
-fn read(cell: &[u8]) -> Result<f64, Fault> {
-    let value: f64 = std::str::from_utf8(cell).ok().and_then(|text| text.parse().ok()).ok_or(Fault::Text)?;
-    if value.is_finite() { Ok(value) } else { Err(Fault::NotFinite) }
+fn read(cell: &[u8]) -> Result<f64, NumberFault> {
+    let value: f64 = std::str::from_utf8(cell).ok().and_then(|text| text.parse().ok()).ok_or(NumberFault::Text)?;
+    if value.is_finite() { Ok(value) } else { Err(NumberFault::NotFinite) }
 }
 
 /// The number that a cell would be with its one comma as decimal mark.
@@ -59,20 +59,20 @@ mod tests {
         assert_eq!(parse(b"-0,000212669", Decimal::Comma), Ok(-0.000212669));
         assert_eq!(parse(b"2,02011E+13", Decimal::Comma), Ok(2.02011e13));
         assert_eq!(parse(b"17", Decimal::Comma), Ok(17.0));
-        assert_eq!(parse(b"0.365", Decimal::Comma), Err(Fault::Point));
-        assert_eq!(parse(b"1.234,5", Decimal::Comma), Err(Fault::Text));
+        assert_eq!(parse(b"0.365", Decimal::Comma), Err(NumberFault::Point));
+        assert_eq!(parse(b"1.234,5", Decimal::Comma), Err(NumberFault::Text));
         assert_eq!(parse(b"+1.5e-3", Decimal::Point), Ok(1.5e-3));
-        assert_eq!(parse(b"0,365", Decimal::Point), Err(Fault::Comma));
-        assert_eq!(parse(b"1,234,5", Decimal::Point), Err(Fault::Text));
+        assert_eq!(parse(b"0,365", Decimal::Point), Err(NumberFault::Comma));
+        assert_eq!(parse(b"1,234,5", Decimal::Point), Err(NumberFault::Text));
     }
 
     #[test]
     fn what_is_not_finite_is_no_number() {
         for cell in ["NaN", "inf", "-Infinity", "1e999"] {
-            assert_eq!(parse(cell.as_bytes(), Decimal::Point), Err(Fault::NotFinite), "{cell}");
+            assert_eq!(parse(cell.as_bytes(), Decimal::Point), Err(NumberFault::NotFinite), "{cell}");
         }
-        assert_eq!(parse(b"", Decimal::Point), Err(Fault::Blank));
-        assert_eq!(parse(b"--", Decimal::Point), Err(Fault::Text));
-        assert_eq!(parse(&[b'1'; 70], Decimal::Comma), Err(Fault::Text));
+        assert_eq!(parse(b"", Decimal::Point), Err(NumberFault::Blank));
+        assert_eq!(parse(b"--", Decimal::Point), Err(NumberFault::Text));
+        assert_eq!(parse(&[b'1'; 70], Decimal::Comma), Err(NumberFault::Text));
     }
 }

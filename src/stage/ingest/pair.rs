@@ -1,7 +1,7 @@
 //! Duplicates within a file, and partners across several: every other file is joined to the first.
 
 use super::layout::{Duplicates, Join};
-use super::scan::{Key, Scan};
+use super::scan::{IdFingerprint, Scan};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub(super) struct Twin {
 
 /// What the files together decide about the usable rows of one of them.
 #[derive(Default)]
-pub(super) struct Fate {
+pub(super) struct FileDecision {
     /// Rows given up as duplicates, by data row.
     pub twins: BTreeMap<u32, Twin>,
     /// For a join, the data row of each other file for each data row of the first, from 1; [`NONE`] where there is none. For the
@@ -27,7 +27,7 @@ pub(super) struct Fate {
     pub partners: Vec<Vec<u32>>,
 }
 
-impl Fate {
+impl FileDecision {
     /// Whether a data row, from 1, has all its partners.
     pub fn is_whole(&self, number: usize) -> bool {
         let row = number.wrapping_sub(1);
@@ -36,8 +36,8 @@ impl Fate {
 }
 
 /// Decides for all files. Files that continue each other share their ids.
-pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<Fate> {
-    let mut fates: Vec<Fate> = scans.iter().map(|_| Fate::default()).collect();
+pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplicates) -> Vec<FileDecision> {
+    let mut fates: Vec<FileDecision> = scans.iter().map(|_| FileDecision::default()).collect();
     if let Some(Join::Append {}) | None = join {
         let mut keys = Vec::new();
         for scan in scans.iter_mut() {
@@ -58,7 +58,7 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
         let pairs = match join {
             Some(Join::Id {}) => by_id(&first.keys, &second.keys),
             Some(Join::Time { tolerance_s, offset_s }) => {
-                let times = |scan: &Scan, fate: &Fate, offset: f64| -> Vec<(f64, u32)> {
+                let times = |scan: &Scan, fate: &FileDecision, offset: f64| -> Vec<(f64, u32)> {
                     let rows = scan.times.iter().filter(|(_, number)| !fate.twins.contains_key(number));
                     rows.map(|(time, number)| (time - offset, *number)).collect()
                 };
@@ -67,7 +67,7 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
                 by_time(times(first, one, 0.0), times(second, other, offset), *tolerance_s)
             }
             _ => {
-                let usable = |scan: &Scan, fate: &Fate, number: u32| {
+                let usable = |scan: &Scan, fate: &FileDecision, number: u32| {
                     scan.usable.get(number as usize - 1).copied().unwrap_or(false) && !fate.twins.contains_key(&number)
                 };
                 let rows = 1..=first.read.min(second.read) as u32;
@@ -91,7 +91,7 @@ pub(super) fn decide(scans: &mut [Scan], join: Option<&Join>, duplicates: Duplic
 }
 
 /// Sorts keys by id and leaves one of each id, or none. Copies of one row are one row: they do not contradict each other.
-fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
+fn single(keys: &mut Vec<IdFingerprint>, duplicates: Duplicates, fates: &mut [FileDecision]) {
     keys.sort_unstable();
     let mut dropped = Vec::new();
     for same in keys.chunk_by(|a, b| (a.hash, a.check) == (b.hash, b.check)) {
@@ -119,7 +119,7 @@ fn single(keys: &mut Vec<Key>, duplicates: Duplicates, fates: &mut [Fate]) {
 }
 
 /// Pairs of rows with one id; both lists sorted, every id once.
-fn by_id(first: &[Key], second: &[Key]) -> Vec<(u32, u32)> {
+fn by_id(first: &[IdFingerprint], second: &[IdFingerprint]) -> Vec<(u32, u32)> {
     let (mut a, mut b) = (first.iter().peekable(), second.iter().peekable());
     let mut pairs = Vec::new();
     while let (Some(left), Some(right)) = (a.peek(), b.peek()) {
@@ -199,10 +199,10 @@ mod tests {
 
     #[test]
     fn of_equal_ids_one_or_none_stays() {
-        let key = |hash, number| Key { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
+        let key = |hash, number| IdFingerprint { hash, check: 0, file: 0, number, line: number + 1, content: number.into() };
         let keys = vec![key(5, 1), key(3, 2), key(5, 3), key(5, 4)];
         let stays = |duplicates| {
-            let (mut keys, mut fates) = (keys.clone(), [Fate::default()]);
+            let (mut keys, mut fates) = (keys.clone(), [FileDecision::default()]);
             single(&mut keys, duplicates, &mut fates);
             let twins: Vec<(u32, u32)> = fates[0].twins.iter().map(|(number, twin)| (*number, twin.line)).collect();
             (keys.iter().map(|key| key.number).collect::<Vec<_>>(), twins)

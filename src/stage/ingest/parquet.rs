@@ -2,7 +2,7 @@
 //!
 //! Cells become text and numbers again: a number of 64 bits comes back the same, and there is one way of judging rows.
 
-use super::lines::{Record, failed};
+use super::lines::{RecordFields, failed};
 use crate::error::{Error, Result};
 use crate::raw::{self, ParquetFile};
 use arrow::array::RecordBatch;
@@ -14,7 +14,7 @@ use std::io::Read;
 const BATCH: usize = 1 << 10;
 
 /// Reads one file from its names to its last row.
-pub(super) struct Columns {
+pub(super) struct ParquetReader {
     reader: ParquetFile,
     label: String,
     names: Option<Vec<String>>,
@@ -25,7 +25,7 @@ pub(super) struct Columns {
     cell: String,
 }
 
-impl Columns {
+impl ParquetReader {
     pub(super) fn open(mut source: impl Read, label: &str) -> Result<Self> {
         let mut content = Vec::new();
         source.read_to_end(&mut content).map_err(|error| failed(label, &error))?;
@@ -40,7 +40,7 @@ impl Columns {
         (u128::from(self.size) * u128::from(self.rows) / u128::from(self.reader.rows.max(1))) as u64
     }
     /// The names of the columns, then row by row; false at the end of the file.
-    pub(super) fn next(&mut self, record: &mut Record) -> Result<bool> {
+    pub(super) fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         record.begin(self.rows);
         if let Some(names) = self.names.take() {
             names.iter().for_each(|name| record.push(name.as_bytes()));

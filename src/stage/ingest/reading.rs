@@ -1,35 +1,35 @@
 //! One reading of one file from top to bottom, row by row.
 
-use super::arm::Arm;
-use super::bind::{Head, bind};
+use super::arm::RobotJoints;
+use super::bind::{FileHeader, bind};
 use super::encoding;
-use super::layout::{Decimal, FileLayout, Limits};
-use super::lines::{Lines, Record, failed};
-use super::parquet::Columns;
-use super::row::{Refusal, Row, RowReader};
+use super::layout::{Decimal, FileLayout, LimitPolicy};
+use super::lines::{RecordFields, TextReader, failed};
+use super::parquet::ParquetReader;
+use super::row::{RecordedRow, RowReader, RowRefusal};
 use crate::error::{Error, Result, counted};
-use crate::stage::{Context, Source};
+use crate::stage::{Context, OpenedInput};
 use std::io::{BufRead, BufReader};
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
 
 /// The rows of a file of either kind.
-enum Rows {
-    Text(Lines),
-    Parquet(Box<Columns>),
+enum FileReader {
+    Text(TextReader),
+    Parquet(Box<ParquetReader>),
 }
 
-impl Rows {
-    fn open(source: Source, layout: &FileLayout) -> Result<Self> {
+impl FileReader {
+    fn open(source: OpenedInput, layout: &FileLayout) -> Result<Self> {
         let mut reader = BufReader::with_capacity(1 << 16, source.reader);
         // The mark of four bytes is in the first buffer of any file that is long enough to be one.
         if reader.fill_buf().map_err(|error| failed(&source.label, &error))?.starts_with(b"PAR1") {
-            return Ok(Self::Parquet(Box::new(Columns::open(reader, &source.label)?)));
+            return Ok(Self::Parquet(Box::new(ParquetReader::open(reader, &source.label)?)));
         }
-        Ok(Self::Text(Lines::open(reader, &source.label, layout)?))
+        Ok(Self::Text(TextReader::open(reader, &source.label, layout)?))
     }
-    fn next(&mut self, record: &mut Record) -> Result<bool> {
+    fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         match self {
             Self::Text(lines) => lines.next(record),
             Self::Parquet(columns) => columns.next(record),
@@ -50,26 +50,26 @@ impl Rows {
 }
 
 /// An opened file below its header.
-pub(super) struct Reading<'a> {
+pub(super) struct OpenedFile<'a> {
     pub label: String,
-    rows: Rows,
-    pub record: Record,
-    pub row: Row,
+    rows: FileReader,
+    pub record: RecordFields,
+    pub row: RecordedRow,
     reader: RowReader<'a>,
     /// The record already holds the first row.
     ahead: bool,
 }
 
-impl<'a> Reading<'a> {
+impl<'a> OpenedFile<'a> {
     /// Opens a file and finds its columns.
-    pub(super) fn open(source: Source, layout: &FileLayout, arm: &'a Arm, limits: Limits) -> Result<Self> {
+    pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
         let label = source.label.clone();
-        let mut rows = Rows::open(source, layout)?;
+        let mut rows = FileReader::open(source, layout)?;
         let (header, decimal) = match &rows {
-            Rows::Text(_) => (layout.header, layout.decimal),
-            Rows::Parquet(_) => (true, Decimal::Point),
+            FileReader::Text(_) => (layout.header, layout.decimal),
+            FileReader::Parquet(_) => (true, Decimal::Point),
         };
-        let mut record = Record::default();
+        let mut record = RecordFields::default();
         if !rows.next(&mut record)? {
             let lines = counted(rows.lines(), "line");
             let message = match (rows.bytes(), header) {
@@ -80,7 +80,7 @@ impl<'a> Reading<'a> {
             };
             return Err(Error::data(label, message));
         }
-        let mut head = Head { label: label.clone(), line: record.line, width: record.len(), names: None };
+        let mut head = FileHeader { label: label.clone(), line: record.line, width: record.len(), names: None };
         if header {
             let name = |index| encoding::shown(record.field(index).unwrap_or_default()).into_owned();
             let mut names: Vec<String> = (0..record.len()).map(name).collect();
@@ -90,13 +90,13 @@ impl<'a> Reading<'a> {
             }
             head.width = names.len();
             head.names = Some(names);
-            if let Rows::Text(lines) = &mut rows {
+            if let FileReader::Text(lines) = &mut rows {
                 lines.skip(layout.skip_below_header)?;
             }
         }
         let binding = bind(layout, &head, arm)?;
         let reader = RowReader { binding, decimal, limits, arm, last_sequence: None };
-        Ok(Self { label, rows, record, row: Row::default(), reader, ahead: !header })
+        Ok(Self { label, rows, record, row: RecordedRow::default(), reader, ahead: !header })
     }
     /// Lines of the file read so far; of a Parquet file its rows.
     pub(super) fn lines(&self) -> u64 {
@@ -111,7 +111,7 @@ impl<'a> Reading<'a> {
         &self.reader.binding
     }
     /// Reads the next row into `self.row`: used or refused; `None` at the end.
-    pub(super) fn next(&mut self) -> Result<Option<Result<(), Refusal>>> {
+    pub(super) fn next(&mut self) -> Result<Option<Result<(), RowRefusal>>> {
         if !std::mem::take(&mut self.ahead) && !self.rows.next(&mut self.record)? {
             return Ok(None);
         }
@@ -121,23 +121,23 @@ impl<'a> Reading<'a> {
 }
 
 /// Whether a file has the columns that are mapped; without a robot, those that do not depend on its joints.
-pub(super) fn header(layout: &FileLayout, arm: Option<&Arm>, limits: Limits, context: &Context) -> Result<()> {
+pub(super) fn header(layout: &FileLayout, arm: Option<&RobotJoints>, limits: LimitPolicy, context: &Context) -> Result<()> {
     let source = context.services.open(&layout.file)?;
     if let Some(arm) = arm {
-        return Reading::open(source, layout, arm, limits).map(drop);
+        return OpenedFile::open(source, layout, arm, limits).map(drop);
     }
     let layout = FileLayout { columns: layout.columns.without_joints(), ..layout.clone() };
-    let arm = Arm::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
-    Reading::open(source, &layout, &arm, limits).map(drop)
+    let arm = RobotJoints::new(vec![false], vec![[f64::NEG_INFINITY, f64::INFINITY]]);
+    OpenedFile::open(source, &layout, &arm, limits).map(drop)
 }
 
 /// Counts units of work up to the next sign of progress.
-pub(super) struct Pace<'a> {
+pub(super) struct ProgressCounter<'a> {
     context: &'a Context<'a>,
     rows: u64,
 }
 
-impl<'a> Pace<'a> {
+impl<'a> ProgressCounter<'a> {
     pub(super) fn new(context: &'a Context<'a>) -> Self {
         Self { context, rows: 0 }
     }

@@ -1,11 +1,11 @@
 //! One row read as quantities, or the reason why not.
 
-use super::arm::Arm;
-use super::bind::{Binding, Text};
+use super::arm::RobotJoints;
+use super::bind::{Binding, TextBinding};
 use super::encoding;
-use super::layout::{Decimal, Limits};
-use super::lines::Record;
-use super::number::{self, Fault};
+use super::layout::{Decimal, LimitPolicy};
+use super::lines::RecordFields;
+use super::number::{self, NumberFault};
 use super::slots::KindSlots;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
@@ -53,18 +53,18 @@ impl Reason {
 
 /// A row that is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Refusal {
+pub(super) struct RowRefusal {
     pub reason: Reason,
     pub detail: String,
 }
 
-fn refuse<T>(reason: Reason, detail: String) -> Result<T, Refusal> {
-    Err(Refusal { reason, detail })
+fn refuse<T>(reason: Reason, detail: String) -> Result<T, RowRefusal> {
+    Err(RowRefusal { reason, detail })
 }
 
 /// The quantities of one row; reused from row to row.
 #[derive(Default)]
-pub(super) struct Row {
+pub(super) struct RecordedRow {
     /// Number of the data row in its file, from 1.
     pub number: u64,
     pub line: u64,
@@ -87,15 +87,15 @@ pub(super) struct Row {
 pub(super) struct RowReader<'a> {
     pub binding: Binding,
     pub decimal: Decimal,
-    pub limits: Limits,
-    pub arm: &'a Arm,
+    pub limits: LimitPolicy,
+    pub arm: &'a RobotJoints,
     /// Of the last usable row.
     pub last_sequence: Option<i64>,
 }
 
 impl RowReader<'_> {
     /// Fills `row` from a record; `row.id` is filled also where the row is refused for its numbers.
-    pub(super) fn read(&mut self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
+    pub(super) fn read(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         row.id.clear();
         row.texts.resize_with(self.binding.texts.len(), String::new);
         row.texts.iter_mut().for_each(String::clear);
@@ -135,7 +135,7 @@ impl RowReader<'_> {
         Ok(())
     }
 
-    fn numbers(&self, record: &Record, row: &mut Row) -> Result<(), Refusal> {
+    fn numbers(&self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for cell in &self.binding.cells {
             let Some(own) = self.number(record, cell.column, &cell.name, cell.optional)? else { continue };
             let mut value = cell.unit.to_si(own);
@@ -175,26 +175,26 @@ impl RowReader<'_> {
     }
 
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
-    fn number(&self, record: &Record, column: usize, name: &str, optional: bool) -> Result<Option<f64>, Refusal> {
+    fn number(&self, record: &RecordFields, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
         let shown = || shown(record, column);
         let detail = match number::parse(record.field(column).unwrap_or_default(), self.decimal) {
             Ok(value) => return Ok(Some(value)),
-            Err(Fault::Blank) if optional => return Ok(None),
-            Err(Fault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
-            Err(Fault::Text) => format!("{name}: `{}` is not a number", shown()),
-            Err(Fault::Comma) => {
+            Err(NumberFault::Blank) if optional => return Ok(None),
+            Err(NumberFault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
+            Err(NumberFault::Text) => format!("{name}: `{}` is not a number", shown()),
+            Err(NumberFault::Comma) => {
                 format!("{name}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", shown())
             }
-            Err(Fault::Point) => {
+            Err(NumberFault::Point) => {
                 format!("{name}: `{}` has a decimal point; allowed: `decimal: point` in the settings", shown())
             }
-            Err(Fault::NotFinite) => format!("{name}: `{}` is not a finite number", shown()),
+            Err(NumberFault::NotFinite) => format!("{name}: `{}` is not a finite number", shown()),
         };
         refuse(Reason::NotANumber, detail)
     }
 
     /// Makes what a recording keeps of quantities of several numbers.
-    fn conventions(&self, row: &mut Row) -> Result<(), Refusal> {
+    fn conventions(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for (places, declared, convention) in &self.binding.conventions {
             let Some(numbers) = row.values.get_mut(places.clone()) else { continue };
             let own = &numbers[..convention.numbers];
@@ -216,7 +216,7 @@ impl RowReader<'_> {
     }
 
     /// A row measured something, and what needs a standard deviation has one; of what this file holds.
-    fn measured(&self, row: &Row) -> Result<(), Refusal> {
+    fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
         let kinds = &self.arm.slots.kinds;
         if self.binding.measures && !kinds.iter().any(|kind| kind.values.iter().any(there)) {
@@ -234,7 +234,7 @@ impl RowReader<'_> {
         Ok(())
     }
 
-    fn plausible(&self, row: &mut Row) -> Result<(), Refusal> {
+    fn plausible(&self, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         if POINT.iter().all(|axis| row.values.get(self.arm.slots.of(axis).start) == Some(&0.0)) {
             return refuse(Reason::LostBeam, "the position is 0, 0, 0: the tracker saw nothing".into());
         }
@@ -242,7 +242,7 @@ impl RowReader<'_> {
         for (joint, (q, [lower, upper])) in q.iter().zip(&self.arm.limits).enumerate() {
             if *q < lower - SLACK || *q > upper + SLACK {
                 row.beyond = Some(joint);
-                if self.limits == Limits::Reject {
+                if self.limits == LimitPolicy::Reject {
                     let (scale, unit) =
                         if self.arm.prismatic.get(joint) == Some(&true) { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
                     let detail = format!(
@@ -260,7 +260,7 @@ impl RowReader<'_> {
         Ok(())
     }
 
-    fn sequence(&mut self, text: &[u8]) -> Result<i64, Refusal> {
+    fn sequence(&mut self, text: &[u8]) -> Result<i64, RowRefusal> {
         let shown = String::from_utf8_lossy(text);
         if text.is_empty() {
             return refuse(Reason::Blank, "sequence is blank".into());
@@ -279,7 +279,7 @@ impl RowReader<'_> {
 }
 
 /// A field for people, cut at 40 characters.
-fn shown(record: &Record, column: usize) -> String {
+fn shown(record: &RecordFields, column: usize) -> String {
     encoding::shown(record.field(column).unwrap_or_default()).chars().take(40).collect()
 }
 
@@ -287,10 +287,16 @@ fn round(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-fn text(source: &Option<Text>, record: &Record, name: &str, complete: bool, into: &mut String) -> Result<(), Refusal> {
+fn text(
+    source: &Option<TextBinding>,
+    record: &RecordFields,
+    name: &str,
+    complete: bool,
+    into: &mut String,
+) -> Result<(), RowRefusal> {
     match source {
-        Some(Text::Value(value)) => into.push_str(value),
-        Some(Text::Column { column, optional }) => {
+        Some(TextBinding::Value(value)) => into.push_str(value),
+        Some(TextBinding::Column { column, optional }) => {
             let bytes = record.field(*column).unwrap_or_default();
             match encoding::text(bytes).as_deref() {
                 Some("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),

@@ -4,11 +4,11 @@
 //! file of a join is held with its numbers. Where the arm moves, 16 bytes a joint and row for its velocities.
 
 use super::Ingest;
-use super::arm::Arm;
+use super::arm::RobotJoints;
 use super::layout::{FileLayout, Join};
-use super::motion::{Samples, Track};
-use super::reading::{Pace, Reading};
-use super::row::{Reason, Refusal, Row};
+use super::motion::{JointSamples, Track};
+use super::reading::{OpenedFile, ProgressCounter};
+use super::row::{Reason, RecordedRow, RowRefusal};
 use crate::error::{Error, Result};
 use crate::stage::Context;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use std::ops::Range;
 
 /// What is remembered of a point id: 96 bits of its hash (two ids in 10^7 are confused once in 10^14 files) and its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Key {
+pub(super) struct IdFingerprint {
     pub hash: u64,
     pub check: u32,
     /// Index of the file.
@@ -30,28 +30,28 @@ pub(super) struct Key {
 
 /// How many rows were refused for a reason, and the first of them.
 #[derive(Debug, Clone)]
-pub(super) struct Count {
+pub(super) struct RefusalCount {
     pub rows: u64,
     pub first_line: u64,
     pub first_detail: String,
 }
 
-pub(super) type Tally = BTreeMap<Reason, Count>;
+pub(super) type RefusalCounts = BTreeMap<Reason, RefusalCount>;
 
 /// Counts one refusal.
-pub(super) fn tally(counts: &mut Tally, line: u64, refusal: &Refusal) {
-    let new = || Count { rows: 0, first_line: line, first_detail: refusal.detail.clone() };
+pub(super) fn tally(counts: &mut RefusalCounts, line: u64, refusal: &RowRefusal) {
+    let new = || RefusalCount { rows: 0, first_line: line, first_detail: refusal.detail.clone() };
     counts.entry(refusal.reason).or_insert_with(new).rows += 1;
 }
 
 /// Rows that say something odd about the whole file, with the first of them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Odd {
+pub(super) struct FileOddities {
     pub rows: u64,
     pub first: Option<(u64, usize, f64)>,
 }
 
-impl Odd {
+impl FileOddities {
     fn count(&mut self, line: u64, joint: usize, value: f64) {
         self.rows += 1;
         self.first.get_or_insert((line, joint, value));
@@ -60,7 +60,7 @@ impl Odd {
 
 /// The numbers and texts of the second file of a join, by data row.
 #[derive(Default)]
-pub(super) struct Packed {
+pub(super) struct PackedRows {
     pub slots: Vec<usize>,
     pub values: Vec<f64>,
     pub ids: Vec<String>,
@@ -68,8 +68,8 @@ pub(super) struct Packed {
     pub texts: Vec<Option<Vec<String>>>,
 }
 
-impl Packed {
-    fn push(&mut self, row: &Row, named: bool) {
+impl PackedRows {
+    fn push(&mut self, row: &RecordedRow, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
         if named {
             self.ids.push(row.id.clone());
@@ -87,17 +87,17 @@ pub(super) struct Scan {
     pub read: u64,
     /// The last data row that is not blank all over, as a spreadsheet leaves them at the end.
     pub last: u64,
-    pub tally: Tally,
-    pub keys: Vec<Key>,
+    pub tally: RefusalCounts,
+    pub keys: Vec<IdFingerprint>,
     /// Time and number of usable rows, for a join by time.
     pub times: Vec<(f64, u32)>,
     /// Usable data rows, for a join.
     pub usable: Vec<bool>,
-    pub packed: Option<Packed>,
+    pub packed: Option<PackedRows>,
     pub slots: Vec<usize>,
     /// Revolute joints beyond one and a half turns.
-    pub turns: Odd,
-    pub beyond: Odd,
+    pub turns: FileOddities,
+    pub beyond: FileOddities,
     /// Largest angle of a revolute joint, rad.
     pub largest: f64,
     /// Where the arm moves: of the file with the joints.
@@ -114,10 +114,10 @@ impl Scan {
 }
 
 /// Reads file `index` of the settings once.
-pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &Arm, context: &Context) -> Result<Scan> {
+pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &RobotJoints, context: &Context) -> Result<Scan> {
     let source = context.services.open(&layout.file)?;
     let size = source.size;
-    let mut reading = Reading::open(source, layout, arm, settings.limits)?;
+    let mut reading = OpenedFile::open(source, layout, arm, settings.limits)?;
     let label = reading.label.clone();
     context.services.begin(&format!("reading {label}"), size, "bytes");
     for missing in &reading.binding().missing {
@@ -126,29 +126,29 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &A
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
     let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
-    let packed = (joined && index > 0).then(|| Packed { slots: slots.clone(), texts: texts(), ..Packed::default() });
+    let packed = (joined && index > 0).then(|| PackedRows { slots: slots.clone(), texts: texts(), ..PackedRows::default() });
     let mut scan = Scan {
         label,
         lines: 0,
         read: 0,
         last: 0,
-        tally: Tally::new(),
+        tally: RefusalCounts::new(),
         keys: Vec::new(),
         times: Vec::new(),
         usable: Vec::new(),
         packed,
         slots,
-        turns: Odd::default(),
-        beyond: Odd::default(),
+        turns: FileOddities::default(),
+        beyond: FileOddities::default(),
         largest: 0.0,
         track: None,
     };
-    let mut samples = is_track(settings, layout).then(Samples::default);
+    let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
     // By id, both rows have the same one.
     let named = layout.columns.has("point_id") && !matches!(settings.join, Some(Join::Id {}));
-    let mut pace = Pace::new(context);
+    let mut pace = ProgressCounter::new(context);
     while let Some(judged) = reading.next()? {
         let row = &reading.row;
         if let Some((joint, angle)) = row.turned {
@@ -201,7 +201,7 @@ fn is_track(settings: &Ingest, layout: &FileLayout) -> bool {
     timed && moving && asked && layout.columns.has("q")
 }
 
-fn sample(samples: &mut Samples, row: &Row, layout: &FileLayout, arm: &Arm) {
+fn sample(samples: &mut JointSamples, row: &RecordedRow, layout: &FileLayout, arm: &RobotJoints) {
     let all = |places: &Range<usize>| row.values.get(places.clone()).unwrap_or_default();
     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
     let given = if layout.columns.has("velocity") { all(&arm.slots.velocity) } else { &[] };
@@ -212,17 +212,17 @@ fn narrow(number: u64, label: &str) -> Result<u32> {
     u32::try_from(number).map_err(|_| Error::data(label, "more than 4294967295 rows"))
 }
 
-fn key(row: &Row, file: usize, label: &str) -> Result<Key> {
+fn key(row: &RecordedRow, file: usize, label: &str) -> Result<IdFingerprint> {
     let digest = blake3::hash(row.id.as_bytes());
     let mut bytes = digest.as_bytes().iter().copied();
     let hash = first_eight(&mut bytes);
     let check = bytes.take(4).fold(0u32, |hash, byte| hash << 8 | u32::from(byte));
     let (number, line) = (narrow(row.number, label)?, narrow(row.line, label)?);
-    Ok(Key { hash, check, file: file as u32, number, line, content: content(row) })
+    Ok(IdFingerprint { hash, check, file: file as u32, number, line, content: content(row) })
 }
 
 /// Hash of the numbers and texts of a row.
-fn content(row: &Row) -> u64 {
+fn content(row: &RecordedRow) -> u64 {
     let mut hasher = blake3::Hasher::new();
     for value in &row.values {
         hasher.update(&value.to_bits().to_le_bytes());
@@ -239,7 +239,7 @@ fn first_eight(bytes: &mut impl Iterator<Item = u8>) -> u64 {
 }
 
 impl Scan {
-    fn odd(&mut self, row: &Row, arm: &Arm) {
+    fn odd(&mut self, row: &RecordedRow, arm: &RobotJoints) {
         let q = row.values.get(arm.slots.q.clone()).unwrap_or_default();
         for (value, _) in q.iter().zip(&arm.prismatic).filter(|(_, prismatic)| !**prismatic) {
             self.largest = self.largest.max(value.abs());

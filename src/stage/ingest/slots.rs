@@ -1,12 +1,12 @@
 //! Where the quantities of a row live in its list of numbers and of texts: one after another, as the recording declares them.
 
-use crate::observation::{Column, KINDS, Kind, Part};
+use crate::observation::{DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::recording_columns;
 use std::ops::Range;
 
 /// The layout of a row, of a robot with so many joints.
 pub(super) struct Slots {
-    columns: Vec<(&'static Column, Range<usize>)>,
+    columns: Vec<(&'static DeclaredColumn, Range<usize>)>,
     texts: Vec<&'static str>,
     /// Numbers in a row.
     pub count: usize,
@@ -19,7 +19,7 @@ pub(super) struct Slots {
 
 /// Where a kind's numbers are.
 pub(super) struct KindSlots {
-    pub kind: &'static dyn Kind,
+    pub kind: &'static dyn MeasurementKind,
     pub values: Vec<usize>,
     pub sigma: Vec<usize>,
 }
@@ -27,12 +27,12 @@ pub(super) struct KindSlots {
 impl Slots {
     pub(super) fn new(joints: usize) -> Self {
         let mut count = 0;
-        let place = |column: &'static Column| {
+        let place = |column: &'static DeclaredColumn| {
             let first = count;
             count += column.numbers(joints);
             (column, first..count)
         };
-        let columns: Vec<(&'static Column, Range<usize>)> = recording_columns().map(place).collect();
+        let columns: Vec<(&'static DeclaredColumn, Range<usize>)> = recording_columns().map(place).collect();
         let texts = recording_columns().filter(|column| column.is_text() && column.setting != "point_id");
         let mut slots = Self {
             texts: texts.map(|column| column.setting).collect(),
@@ -44,7 +44,7 @@ impl Slots {
             kinds: Vec::new(),
         };
         (slots.time, slots.q, slots.velocity) = (slots.of("time").start, slots.of("q"), slots.of("velocity"));
-        let part = |kind: &dyn Kind, part: Part| -> Vec<usize> {
+        let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
             kind.columns(part).flat_map(|column| slots.of(column.setting).take(column.stored.len())).collect()
         };
         let kinds =
@@ -58,7 +58,7 @@ impl Slots {
         found.map_or(0..0, |(_, places)| places.clone())
     }
     /// All columns with numbers, and their places.
-    pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static Column, Range<usize>)> {
+    pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static DeclaredColumn, Range<usize>)> {
         self.columns.iter().filter(|(_, places)| !places.is_empty())
     }
     /// Settings of the texts of a row beside its id.

@@ -1,12 +1,12 @@
 //! What is wrong with a file as a whole: errors for the owner of the measurements, before any table is written.
 
 use super::Ingest;
-use super::arm::Arm;
+use super::arm::RobotJoints;
 use super::columns::Columns;
-use super::layout::{Join, Limits};
-use super::pair::Fate;
+use super::layout::{Join, LimitPolicy};
+use super::pair::FileDecision;
 use super::row::Reason;
-use super::scan::{Count, Scan};
+use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
 
@@ -14,7 +14,7 @@ use crate::stage::Context;
 const SMALL_IN_DEGREES: f64 = 6.5;
 
 /// Rows of a file that become part of the recording.
-pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
+pub(super) fn accepted(scan: &Scan, fate: &FileDecision) -> u64 {
     if fate.partners.is_empty() {
         return scan.used() - fate.twins.len() as u64;
     }
@@ -22,7 +22,13 @@ pub(super) fn accepted(scan: &Scan, fate: &Fate) -> u64 {
 }
 
 /// Fails where a file cannot be what the settings say it is; warns where it is odd.
-pub(super) fn judge(settings: &Ingest, scans: &[Scan], fates: &[Fate], arm: &Arm, context: &Context) -> Result<()> {
+pub(super) fn judge(
+    settings: &Ingest,
+    scans: &[Scan],
+    fates: &[FileDecision],
+    arm: &RobotJoints,
+    context: &Context,
+) -> Result<()> {
     let mut faults = unequal(settings, scans);
     for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
         let angles = implausible(scan, &layout.columns, settings.limits);
@@ -58,7 +64,7 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
     faults.collect()
 }
 
-fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> {
+fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy) -> Option<Fault> {
     let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
     let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
     if scan.turns.rows * 2 > judged
@@ -77,7 +83,7 @@ fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> 
         );
         return Some(Fault::new(format!("{}:{line}", scan.label), message));
     }
-    if limits == Limits::Warn
+    if limits == LimitPolicy::Warn
         && scan.beyond.rows * 2 > judged
         && let Some((line, joint, value)) = scan.beyond.first
     {
@@ -92,7 +98,7 @@ fn implausible(scan: &Scan, columns: &Columns, limits: Limits) -> Option<Fault> 
     None
 }
 
-fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: usize) -> Option<Fault> {
+fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], index: usize) -> Option<Fault> {
     let (scan, fate) = (scans.get(index)?, fates.get(index)?);
     let accepted = accepted(scan, fate);
     let rejected = scan.read - accepted;
@@ -119,7 +125,7 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: u
         (Reason::Unmatched, unmatched, 0, lonely),
     ] {
         if rows > 0 {
-            counts.insert(reason, Count { rows, first_line, first_detail: detail });
+            counts.insert(reason, RefusalCount { rows, first_line, first_detail: detail });
         }
     }
     let mut reasons: Vec<_> = counts.iter().collect();
@@ -155,8 +161,8 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[Fate], index: u
     ))
 }
 
-fn warn(scan: &Scan, columns: &Columns, limits: Limits, arm: &Arm, context: &Context) {
-    if limits == Limits::Warn
+fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, context: &Context) {
+    if limits == LimitPolicy::Warn
         && let Some((line, joint, value)) = scan.beyond.first
     {
         let [lower, upper] = arm.limits.get(joint).copied().unwrap_or([f64::NAN; 2]);

@@ -1,10 +1,10 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
-use super::arm::Arm;
+use super::arm::RobotJoints;
 use super::layout::{FileLayout, Join};
-use super::pair::{Fate, NONE};
-use super::reading::{Pace, Reading};
-use super::row::{Reason, Refusal, Row};
+use super::pair::{FileDecision, NONE};
+use super::reading::{OpenedFile, ProgressCounter};
+use super::row::{Reason, RecordedRow, RowRefusal};
 use super::scan::Scan;
 use super::{Ingest, verdict};
 use crate::error::{Error, Result};
@@ -19,17 +19,17 @@ const CHUNK: usize = 1 << 16;
 const REJECTED_CHUNK: usize = 1 << 12;
 
 /// What all files give and decide together.
-pub(super) struct Decided<'a> {
+pub(super) struct JoinDecisions<'a> {
     pub settings: &'a Ingest,
-    pub arm: &'a Arm,
+    pub arm: &'a RobotJoints,
     pub scans: &'a [Scan],
-    pub fates: &'a [Fate],
+    pub fates: &'a [FileDecision],
     /// Names of the files in tables.
     pub names: &'a [String],
 }
 
 /// Writes the streamed tables.
-pub(super) fn write(decided: &Decided, context: &Context) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
+pub(super) fn write(decided: &JoinDecisions, context: &Context) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
     let joined = decided.fates.iter().any(|fate| !fate.partners.is_empty());
     let leading = if joined { 1 } else { decided.scans.len() };
     let rows = decided.scans.iter().zip(decided.fates).take(leading).map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
@@ -43,7 +43,7 @@ pub(super) fn write(decided: &Decided, context: &Context) -> Result<(StreamedTab
 }
 
 fn file(
-    decided: &Decided,
+    decided: &JoinDecisions,
     index: usize,
     layout: &FileLayout,
     mut recording: Option<&mut Chunks>,
@@ -55,8 +55,8 @@ fn file(
         return Err(Error::Bug(format!("file {index} was not scanned")));
     };
     let source = context.services.open(&layout.file)?;
-    let mut reading = Reading::open(source, layout, decided.arm, decided.settings.limits)?;
-    let mut pace = Pace::new(context);
+    let mut reading = OpenedFile::open(source, layout, decided.arm, decided.settings.limits)?;
+    let mut pace = ProgressCounter::new(context);
     let mut accepted = 0;
     while let Some(judged) = reading.next()? {
         match judged.and_then(|()| decided.outcome(index, fate, &reading.row)) {
@@ -86,18 +86,18 @@ fn file(
     Ok(())
 }
 
-impl Decided<'_> {
+impl JoinDecisions<'_> {
     /// Why a usable row is not used after all, if so.
-    fn outcome(&self, index: usize, fate: &Fate, row: &Row) -> Result<(), Refusal> {
+    fn outcome(&self, index: usize, fate: &FileDecision, row: &RecordedRow) -> Result<(), RowRefusal> {
         if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
             let there =
                 if twin.file as usize == index { String::new() } else { format!(" of {}", self.name(twin.file as usize)) };
             return Err(if twin.copied {
                 let detail = format!("a copy of line {}{there}: the same id, the same values", twin.line);
-                Refusal { reason: Reason::DuplicateRow, detail }
+                RowRefusal { reason: Reason::DuplicateRow, detail }
             } else {
                 let detail = format!("point id `{}` also stands on line {}{there}", row.id, twin.line);
-                Refusal { reason: Reason::DuplicateId, detail }
+                RowRefusal { reason: Reason::DuplicateId, detail }
             });
         }
         if fate.is_whole(row.number as usize) {
@@ -106,10 +106,10 @@ impl Decided<'_> {
         let lacks = |partner: &Vec<u32>| partner.get((row.number - 1) as usize).is_none_or(|partner| *partner == NONE);
         let other = fate.partners.iter().position(lacks).unwrap_or_default();
         let other = if index == 0 { self.name(other + 1) } else { self.name(0) };
-        Err(Refusal { reason: Reason::Unmatched, detail: self.lonely(other, index, row) })
+        Err(RowRefusal { reason: Reason::Unmatched, detail: self.lonely(other, index, row) })
     }
     /// The data row of file `file` that is part of a row of file `index`.
-    fn number(&self, file: usize, index: usize, row: &Row, fate: &Fate) -> Option<u64> {
+    fn number(&self, file: usize, index: usize, row: &RecordedRow, fate: &FileDecision) -> Option<u64> {
         if file == index {
             return Some(row.number);
         }
@@ -117,7 +117,7 @@ impl Decided<'_> {
         (*partner != NONE).then_some(u64::from(*partner))
     }
     /// When file `file` recorded its part of a row of the first file, s by the first one's clock.
-    fn moment(&self, file: usize, row: &Row, fate: &Fate) -> Option<f64> {
+    fn moment(&self, file: usize, row: &RecordedRow, fate: &FileDecision) -> Option<f64> {
         let time = self.arm.slots.time;
         let Some(Join::Time { offset_s, .. }) = &self.settings.join else { return None };
         if file == 0 {
@@ -129,7 +129,7 @@ impl Decided<'_> {
         Some(packed.values.get(at)? - if file == 1 { *offset_s } else { 0.0 })
     }
     /// How much later (s) than its joints the point of a row was measured.
-    fn later(&self, moving: usize, row: &Row, fate: &Fate) -> Option<f64> {
+    fn later(&self, moving: usize, row: &RecordedRow, fate: &FileDecision) -> Option<f64> {
         let values = || KINDS.iter().flat_map(|kind| kind.columns(Part::Value));
         let files = &self.settings.files;
         let point = files.iter().position(|file| values().any(|column| file.columns.has(column.setting)))?;
@@ -140,7 +140,7 @@ impl Decided<'_> {
         self.names.get(index).map_or("", String::as_str)
     }
     /// A row of file `index` has no partner in the file named `other`, or that none in a third.
-    fn lonely(&self, other: &str, index: usize, row: &Row) -> String {
+    fn lonely(&self, other: &str, index: usize, row: &RecordedRow) -> String {
         let other = if index > 0 && self.names.len() > 2 { format!("{other} (joined to all files)") } else { other.into() };
         match &self.settings.join {
             Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
@@ -182,7 +182,7 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
-    fn new(decided: &Decided, context: &Context<'a>) -> Result<Self> {
+    fn new(decided: &JoinDecisions, context: &Context<'a>) -> Result<Self> {
         let slots = &decided.arm.slots;
         let mut has = vec![false; slots.count];
         for slot in decided.scans.iter().flat_map(|scan| &scan.slots) {
@@ -223,7 +223,7 @@ impl<'a> Chunks<'a> {
             before: 0,
         })
     }
-    fn push(&mut self, row: &Row, index: usize, fate: &Fate, decided: &Decided) -> Result<()> {
+    fn push(&mut self, row: &RecordedRow, index: usize, fate: &FileDecision, decided: &JoinDecisions) -> Result<()> {
         let label = decided.scans.get(index).map_or("", |scan| scan.label.as_str());
         self.merged.clone_from(&row.values);
         let (mut id, mut texts) = (&row.id, row.texts.iter().collect::<Vec<&String>>());
@@ -266,7 +266,7 @@ impl<'a> Chunks<'a> {
         Ok(())
     }
     /// Velocities that follow from the joints over time; with a join by time joints and velocities at the moment of the point.
-    fn carry(&mut self, decided: &Decided, index: usize, row: &Row, fate: &Fate) {
+    fn carry(&mut self, decided: &JoinDecisions, index: usize, row: &RecordedRow, fate: &FileDecision) {
         let slots = &decided.arm.slots;
         // Of files that continue each other each has its own joints.
         let moving = if fate.partners.is_empty() { index } else { self.moving };

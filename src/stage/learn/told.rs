@@ -1,12 +1,12 @@
 //! What `learn` tells of the rivals and of a network's training.
 
-use crate::estimate::network::rivals::{Comparison, CorrectionContest};
-use crate::estimate::network::{Course, Judged, Phase, Rival};
+use crate::estimate::network::rivals::{RivalComparison, RivalContest};
+use crate::estimate::network::{JudgedRival, Phase, Rival, TrainingStep};
 use crate::table::{Corrections, CorrectionsRow, Training, TrainingRow};
 
 /// What the comparison comes to, for the person who waits.
-pub(super) fn sentence(comparison: &Comparison, learnt: bool) -> String {
-    let tell = |judged: &Judged| {
+pub(super) fn sentence(comparison: &RivalComparison, learnt: bool) -> String {
+    let tell = |judged: &JudgedRival| {
         let name = judged.rival.map_or("none", Rival::name);
         format!("{name} {:.3} mm", judged.mean() * 1e3)
     };
@@ -16,11 +16,11 @@ pub(super) fn sentence(comparison: &Comparison, learnt: bool) -> String {
     format!("{what}; cross-validated error on its own training rows: {}", all.join(", "))
 }
 
-pub(super) fn table(step: &str, contest: &CorrectionContest, comparison: &Comparison, learnt: bool) -> Corrections {
+pub(super) fn table(step: &str, contest: &RivalContest, comparison: &RivalComparison, learnt: bool) -> Corrections {
     let chosen = if learnt { comparison.chosen } else { 0 };
     let best = &comparison.judged[chosen];
     let before = comparison.judged[0].mean() * 1e3;
-    let row = |(j, judged): (usize, &Judged)| {
+    let row = |(j, judged): (usize, &JudgedRival)| {
         let (gain, sigma, behind) = (judged.gain * 1e3, judged.sigma * 1e3, (judged.mean() - best.mean()) * 1e3);
         let reason = match judged.rival {
             None if j == chosen => "nothing that was tried helps clearly".to_string(),
@@ -73,7 +73,7 @@ pub(super) fn table(step: &str, contest: &CorrectionContest, comparison: &Compar
 }
 
 /// The course of a training as a table.
-pub(super) fn history(step: &str, course: Vec<Course>) -> Training {
+pub(super) fn history(step: &str, course: Vec<TrainingStep>) -> Training {
     let rows = course.into_iter().map(|record| TrainingRow {
         step: step.into(),
         phase: match record.phase {

@@ -4,15 +4,15 @@ use super::NetworkRow;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 
-type Place = (i64, i64, i64);
+type NumberKey = (i64, i64, i64);
 
 /// Values by part, then by member, and layer, to, from.
-pub(super) struct Numbers<'a>(BTreeMap<&'a str, BTreeMap<i64, BTreeMap<Place, f64>>>);
+pub(super) struct Numbers<'a>(BTreeMap<&'a str, BTreeMap<i64, BTreeMap<NumberKey, f64>>>);
 
 impl<'a> Numbers<'a> {
     /// Fails where a key stands twice.
     pub fn new(rows: &'a [NetworkRow]) -> Result<Self> {
-        let mut parts: BTreeMap<&str, BTreeMap<i64, BTreeMap<Place, f64>>> = BTreeMap::new();
+        let mut parts: BTreeMap<&str, BTreeMap<i64, BTreeMap<NumberKey, f64>>> = BTreeMap::new();
         for row in rows {
             let part = parts.entry(&row.part).or_default().entry(row.member).or_default();
             if part.insert((row.layer, row.to, row.from), row.value).is_some() {
@@ -34,7 +34,7 @@ impl<'a> Numbers<'a> {
     }
 
     /// All shared rows of a part: layer, to, from and value.
-    pub fn all(&self, part: &str) -> impl Iterator<Item = (Place, f64)> {
+    pub fn all(&self, part: &str) -> impl Iterator<Item = (NumberKey, f64)> {
         self.0.get(part).and_then(|members| members.get(&0)).into_iter().flatten().map(|(place, value)| (*place, *value))
     }
 

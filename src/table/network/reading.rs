@@ -3,13 +3,13 @@
 use super::numbers::{Numbers, index};
 use super::{MILLI, Network, activation_name, coefficient_unit, feature_unit, map_name, place, source_unit};
 use crate::error::{Error, Result, counted};
-use crate::estimate::network::arm::{Arm, Hinge};
-use crate::estimate::network::basis::{BasisTerm, Wave, Way};
-use crate::estimate::network::correction::{Body, Correction, Dress, Feature, JointMotion, Map, Networks, Scaling};
+use crate::estimate::network::arm::{Hinge, ScrewArm};
+use crate::estimate::network::basis::{BasisTerm, OutputMotion, Wave};
+use crate::estimate::network::correction::{Body, Correction, Feature, JointMotion, Map, NetworkScaling, Networks, Scaling};
 use crate::estimate::network::linear::Linear;
 use crate::estimate::network::process::Process;
 use crate::estimate::network::region::{Jointly, Region, Valid};
-use crate::estimate::network::{Activation, OUTPUTS, Shape};
+use crate::estimate::network::{Activation, LayerSizes, OUTPUTS};
 use std::collections::BTreeMap;
 
 impl Network {
@@ -62,7 +62,7 @@ fn region(numbers: &Numbers, prismatic: &[bool]) -> Result<Region> {
     Ok(Region { ranges, jointly })
 }
 
-fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Dress> {
+fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<NetworkScaling> {
     let mut features = BTreeMap::new();
     for map in [Map::Value, Map::Sin, Map::Cos] {
         for ((_, to, from), _) in numbers.all(map_name(map)) {
@@ -80,7 +80,7 @@ fn dress(numbers: &Numbers, prismatic: &[bool], sources: usize) -> Result<Dress>
     let inputs = features.iter().enumerate().map(|(i, f)| scaling("input", i + 1, feature_unit(*f, prismatic)));
     let inputs = inputs.collect::<Result<Vec<Scaling>>>()?;
     let outputs = [scaling("output", 1, MILLI)?, scaling("output", 2, MILLI)?, scaling("output", 3, MILLI)?];
-    Ok(Dress { features, inputs, outputs })
+    Ok(NetworkScaling { features, inputs, outputs })
 }
 
 fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Networks> {
@@ -100,7 +100,7 @@ fn networks(numbers: &Numbers, inputs: usize, prismatic: &[bool]) -> Result<Netw
     let outputs = joints.as_ref().map_or(OUTPUTS, |motion: &JointMotion| motion.scales.len());
     // Of the biases of the hidden layer and of the outputs, the first member's.
     let hidden = numbers.first_member("bias").saturating_sub(outputs);
-    let shape = Shape { inputs, hidden, outputs, activation };
+    let shape = LayerSizes { inputs, hidden, outputs, activation };
     let member = |member: usize| -> Result<Vec<f64>> {
         let value = |index: usize| {
             let (part, place) = place(shape, index);
@@ -136,10 +136,10 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
                 return Err(Error::data("network", format!("no station {station}")));
             }
             let way = match part {
-                "along" => Way::Along(within(from, 3)?),
-                "turn" => Way::Turn(within(from, joints)?),
-                "shift" => Way::Shift(station, within(from, 3)?),
-                _ => Way::Tilt(station, within(from, 3)?),
+                "along" => OutputMotion::Along(within(from, 3)?),
+                "turn" => OutputMotion::Turn(within(from, joints)?),
+                "shift" => OutputMotion::Shift(station, within(from, 3)?),
+                _ => OutputMotion::Tilt(station, within(from, 3)?),
             };
             terms.insert(to, BasisTerm { way, waves: Vec::new() });
         }
@@ -166,7 +166,7 @@ fn linear(numbers: &Numbers, sources: usize) -> Result<Linear> {
     Ok(Linear { arm, members, noise: numbers.shared("terms_noise", 0)? / MILLI, terms })
 }
 
-fn arm(numbers: &Numbers) -> Result<Arm> {
+fn arm(numbers: &Numbers) -> Result<ScrewArm> {
     let hinge = |j: usize| -> Result<Hinge> {
         let slides = numbers.shared("slides", j + 1)? != 0.0;
         let point: [f64; 3] = numbers.row("point", j + 1)?;
@@ -174,5 +174,5 @@ fn arm(numbers: &Numbers) -> Result<Arm> {
     };
     let hinges = (0..numbers.count("slides")).map(hinge).collect::<Result<Vec<Hinge>>>()?;
     let tool: [f64; 3] = numbers.row("tool", 0)?;
-    Ok(Arm { hinges, tool: tool.map(|value| value / MILLI), down: numbers.row("down", 0)? })
+    Ok(ScrewArm { hinges, tool: tool.map(|value| value / MILLI), down: numbers.row("down", 0)? })
 }

@@ -1,25 +1,28 @@
 //! Every column of the recording, declared once: what kinds of measurement own, and the circumstances that are here.
 
-use crate::observation::{Column, KINDS, Shape};
+use crate::observation::{ColumnShape, DeclaredColumn, KINDS};
 use crate::units::Quantity::{Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time};
 
 const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
 
-const fn simulated(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> Column {
-    Column::number(setting, stored, Length, [-200.0, 200.0], about).together(SIMULATED)
+const fn simulated(setting: &'static str, stored: &'static [&'static str], about: &'static str) -> DeclaredColumn {
+    DeclaredColumn::number(setting, stored, Length, [-200.0, 200.0], about).together(SIMULATED)
 }
 
-static CIRCUMSTANCES: &[Column] = &[
-    Column::text("point_id", "Name of the point; without it rows are called `row 17`."),
-    Column {
-        shape: Shape::Count,
-        ..Column::text("sequence", "Order of the recording, strictly increasing; without it the number of the data row, from 1.")
+static CIRCUMSTANCES: &[DeclaredColumn] = &[
+    DeclaredColumn::text("point_id", "Name of the point; without it rows are called `row 17`."),
+    DeclaredColumn {
+        shape: ColumnShape::Count,
+        ..DeclaredColumn::text(
+            "sequence",
+            "Order of the recording, strictly increasing; without it the number of the data row, from 1.",
+        )
     },
-    Column::text("usage", "What the recording itself says a row is for, e.g. `fit` or `validate`."),
-    Column::text("target", "Which of several targets on the tool was measured; blank for the robot's tool point."),
-    Column::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
-    Column::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
-    Column::number("temperature", &["temp"], Temperature, [-60.0, 200.0], "Temperature of the arm or of the room."),
+    DeclaredColumn::text("usage", "What the recording itself says a row is for, e.g. `fit` or `validate`."),
+    DeclaredColumn::text("target", "Which of several targets on the tool was measured; blank for the robot's tool point."),
+    DeclaredColumn::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
+    DeclaredColumn::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
+    DeclaredColumn::number("temperature", &["temp"], Temperature, [-60.0, 200.0], "Temperature of the arm or of the room."),
     simulated(
         "sim_x",
         &["sim_x"],
@@ -27,17 +30,17 @@ static CIRCUMSTANCES: &[Column] = &[
     ),
     simulated("sim_y", &["sim_y"], "The same point by another simulation, y."),
     simulated("sim_z", &["sim_z"], "The same point by another simulation, z."),
-    Column {
-        shape: Shape::Joints { prismatic: Some((Length, [-200.0, 200.0])) },
-        ..Column::number("q", &["q{j}"], Angle, [-20.0, 20.0], "Joint positions.")
+    DeclaredColumn {
+        shape: ColumnShape::Joints { prismatic: Some((Length, [-200.0, 200.0])) },
+        ..DeclaredColumn::number("q", &["q{j}"], Angle, [-20.0, 20.0], "Joint positions.")
     },
-    Column {
-        shape: Shape::Joints { prismatic: None },
-        ..Column::number("current", &["i{j}"], Current, [-1e4, 1e4], "Motor currents.")
+    DeclaredColumn {
+        shape: ColumnShape::Joints { prismatic: None },
+        ..DeclaredColumn::number("current", &["i{j}"], Current, [-1e4, 1e4], "Motor currents.")
     },
-    Column {
-        shape: Shape::Joints { prismatic: None },
-        ..Column::number(
+    DeclaredColumn {
+        shape: ColumnShape::Joints { prismatic: None },
+        ..DeclaredColumn::number(
             "direction",
             &["dir{j}"],
             Number,
@@ -45,9 +48,9 @@ static CIRCUMSTANCES: &[Column] = &[
             "Direction of the last move of each joint: 1, -1 or 0; no unit.",
         )
     },
-    Column {
-        shape: Shape::Joints { prismatic: Some((LinearRate, [-100.0, 100.0])) },
-        ..Column::number(
+    DeclaredColumn {
+        shape: ColumnShape::Joints { prismatic: Some((LinearRate, [-100.0, 100.0])) },
+        ..DeclaredColumn::number(
             "velocity",
             &["dq{j}"],
             AngularRate,
@@ -58,6 +61,6 @@ static CIRCUMSTANCES: &[Column] = &[
 ];
 
 /// All columns, in the order in which people see them.
-pub fn columns() -> impl Iterator<Item = &'static Column> {
+pub fn columns() -> impl Iterator<Item = &'static DeclaredColumn> {
     CIRCUMSTANCES.iter().chain(KINDS.iter().flat_map(|kind| kind.about().columns))
 }

@@ -1,7 +1,7 @@
 //! The true robot, a twin that shares no kinematics with the model, goes where it was wanted: every kind of effect that acts.
 
 use crate::desk::{Desk, table};
-use calib::compensate::{Arm as Identified, Circumstance, Nominal, Reach, SETTLED, Wanted, least_change, one_step};
+use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change, one_step};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
@@ -159,7 +159,7 @@ impl Cell {
     }
 
     /// Rms (mm) of where the true robot goes, with the commands that `solve` makes of each target.
-    fn true_error(&self, arm: &Identified, targets: &[Point], solve: impl Fn(&mut Reach, &Wanted, &[f64]) -> Vec<f64>) -> f64 {
+    fn true_error(&self, arm: &Identified, targets: &[Point], solve: impl Fn(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>) -> f64 {
         let square = self.misses(arm, targets, solve).into_iter().map(|miss| miss * miss).sum::<f64>();
         (square / targets.len() as f64).sqrt() * 1e3
     }
@@ -169,7 +169,7 @@ impl Cell {
         &self,
         arm: &Identified,
         targets: &[Point],
-        mut solve: impl FnMut(&mut Reach, &Wanted, &[f64]) -> Vec<f64>,
+        mut solve: impl FnMut(&mut Reach, &ToolGoal, &[f64]) -> Vec<f64>,
     ) -> Vec<f64> {
         let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
         let robot = RobotModel::new(self.robot.clone());
@@ -183,7 +183,7 @@ impl Cell {
                 direction: target.direction.clone(),
                 current: None,
             });
-            let wanted = Wanted { pose: robot.forward(&target.q), oriented: false };
+            let wanted = ToolGoal { pose: robot.forward(&target.q), oriented: false };
             commands.push(Point { q: solve(&mut reach, &wanted, &target.q), ..target.clone() });
         }
         let shots = self.measure(commands, &exact, 77);
@@ -301,7 +301,7 @@ fn a_learned_correction_is_made_up_for() {
         let arm = Identified::new(model.clone(), correction);
         let rigid = Identified::new(model, None);
         let targets = cell.targets(&[0.0]);
-        let solve = |reach: &mut Reach, wanted: &Wanted, q: &[f64]| {
+        let solve = |reach: &mut Reach, wanted: &ToolGoal, q: &[f64]| {
             let found = least_change(reach, wanted, q, q);
             assert!(found.residual <= SETTLED, "round trip {} m", found.residual);
             found.q

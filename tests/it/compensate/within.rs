@@ -2,7 +2,7 @@
 
 use super::true_error::Cell;
 use crate::desk::{Desk, table};
-use calib::compensate::{Arm, SETTLED, Scatter, Uncertainty, least_change};
+use calib::compensate::{IdentifiedArm, SETTLED, Scatter, Uncertainty, least_change};
 use calib::effect::Load;
 use calib::robot::RobotModel;
 use calib::stage::{Identify, IdentifyReads};
@@ -28,7 +28,7 @@ fn within(cell: &Cell, effects: &[&str], payload_kg: &[f64]) -> f64 {
         let prediction: Prediction = table(&tables).remove(0);
         let model = parameters.model(robot.clone(), &[], Load::GravityTorque).expect("a model");
         let covariance = covariance.of_model(&model).expect("a covariance");
-        let arm = Arm::new(model, None);
+        let arm = IdentifiedArm::new(model, None);
         let scatter = Scatter { unexplained: prediction.unexplained_mm() * 1e-3, repeatability: 0.0 };
         let uncertainty = Uncertainty::new(&arm, covariance, scatter);
         let targets = cell.targets_by(TARGETS, &payload_kg[payload_kg.len() - 1..], 3000 + seed);

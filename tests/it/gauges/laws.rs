@@ -4,9 +4,9 @@ use super::{SIGMA, THREE};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
-use calib::observation::{KINDS, Kind, Weight, rank};
+use calib::observation::{KINDS, MeasurementKind, Weight, rank};
 use calib::robot::description::RobotDescription;
-use calib::robot::{Anchor, Gauging, Measurements, Readings, RobotModel, Target};
+use calib::robot::{Anchor, MeasurementSetup, Measurements, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ impl Truth {
         let rotation = home.rotation * Pose::from_rotation_vector(askew, Vector3::zeros()).rotation;
         let target = Target { name: String::new(), seat: Pose::new(rotation, home.point(&offset)), oriented: true };
         let anchor = Anchor { name: String::new(), place: Vector3::new(4.6, -2.5, 0.8) };
-        let robot = robot.measured_by(Gauging { targets: vec![target], anchors: vec![anchor] });
+        let robot = robot.measured_by(MeasurementSetup { targets: vec![target], anchors: vec![anchor] });
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.0, 0.0));
         let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
         for (k, spec) in model.stack.specs().to_vec().iter().enumerate() {
@@ -60,19 +60,18 @@ impl Truth {
     pub fn fit(&self, data: &Measurements, asked: impl Fn(&str) -> bool) -> (Model, Fitted) {
         let rows: Vec<usize> = (0..data.rows()).collect();
         let (robot, base) = gauge(RobotModel::new(self.description.clone()), data, &rows, &BTreeMap::new()).unwrap();
-        let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
+        let model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
         let candidates: Vec<usize> = (0..model.x.len()).filter(|k| asked(&model.stack.specs()[*k].name)).collect();
-        let fitted = fit(&mut model, data, &FitOptions { rows: &rows, candidates: &candidates });
-        (model, fitted)
+        fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
     }
 
     /// How the target is turned in every row, by differences of points.
     fn rotations(&self, data: &Measurements) -> Vec<Matrix3<f64>> {
-        let seat = self.model.robot.gauging().targets[0].seat;
+        let seat = self.model.robot.setup().targets[0].seat;
         let beside = [0, 1, 2].map(|axis: usize| {
-            let mut gauging = self.model.robot.gauging().clone();
-            gauging.targets[0].seat.translation += seat.rotation.column(axis) * 0.5;
-            Model { robot: self.model.robot.clone().measured_by(gauging), ..self.model.clone() }.predict(data)
+            let mut setup = self.model.robot.setup().clone();
+            setup.targets[0].seat.translation += seat.rotation.column(axis) * 0.5;
+            Model { robot: self.model.robot.clone().measured_by(setup), ..self.model.clone() }.predict(data)
         });
         let rows = 0..data.rows();
         rows.map(|row| Matrix3::from_columns(&[0, 1, 2].map(|axis: usize| (beside[axis][row] - data.position[row]) / 0.5)))
@@ -83,7 +82,7 @@ impl Truth {
         let (stack, x) = (&self.model.stack, &self.model.x);
         let named = |axis: &str| stack.specs().iter().position(|spec| spec.name == format!("anchor.{axis}")).expect("an axis");
         let moved = Vector3::new(x[named("x")], x[named("y")], x[named("z")]);
-        let anchor = self.model.robot.gauging().anchors[0].place + moved;
+        let anchor = self.model.robot.setup().anchors[0].place + moved;
         let row: &dyn Fn(usize) -> Vec<f64> = match kind {
             "orientation" => &|row| rotations[row].iter().copied().collect(),
             "inclination" => &|row| [0, 1].map(|axis: usize| rotations[row][(2, axis)].asin()).to_vec(),
@@ -117,7 +116,7 @@ pub(super) fn select(data: &Measurements, rows: &[usize]) -> Measurements {
 const ASKEW: [f64; 3] = [0.9, -1.2, 0.4];
 
 /// Residual of a kind under the model with parameters `x`.
-fn residual(kind: &dyn Kind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
+fn residual(kind: &dyn MeasurementKind, truth: &Model, data: &Measurements, row: usize, x: &[f64]) -> Vector3<f64> {
     let mut scratch = truth.stack.scratch(&truth.robot);
     let placed = truth.stack.place(&truth.robot, data, row, x, &mut scratch);
     kind.residual(data, row, &placed).expect("measured").0
@@ -155,7 +154,7 @@ fn every_kind_leaves_nothing_at_the_truth_and_its_derivatives_are_central_differ
 }
 
 /// The data with one kind alone.
-fn alone(data: &Measurements, kind: &dyn Kind) -> Measurements {
+fn alone(data: &Measurements, kind: &dyn MeasurementKind) -> Measurements {
     let name = kind.about().name;
     let mut own = data.clone();
     own.readings.retain(|readings| readings.kind == name);

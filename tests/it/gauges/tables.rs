@@ -77,11 +77,17 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     assert!((placed("anchor.N.x") - 4000.0).abs() < 0.5, "{} mm", placed("anchor.N.x"));
     let model = parameters.model(RobotModel::new(description), &[], Load::GravityTorque).expect("a model");
     let own = recording.measurements(&Default::default());
-    let misses = model.misses(&own);
+    let errors = model.row_errors(&own);
     let prediction = table::<Prediction>(&tables).remove(0);
-    for (row, miss) in prediction.0.iter().zip(&misses) {
-        assert!((row.error_mm - miss.length * 1e3).abs() < 1e-6, "{}: {} and {}", row.point_id, row.error_mm, miss.length * 1e3);
-        assert!((row.turn_rad.expect("turned") - miss.angle.expect("turned")).abs() < 1e-9);
+    for (row, error) in prediction.0.iter().zip(&errors) {
+        assert!(
+            (row.error_mm - error.length * 1e3).abs() < 1e-6,
+            "{}: {} and {}",
+            row.point_id,
+            row.error_mm,
+            error.length * 1e3
+        );
+        assert!((row.turn_rad.expect("turned") - error.angle.expect("turned")).abs() < 1e-9);
         assert_eq!(row.measured.as_deref(), (row.sequence >= 90).then_some("rotation distance"));
     }
     let rank = |quantity: &str| {

@@ -10,7 +10,7 @@ use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-pub(super) struct Desk<'a> {
+pub(super) struct RunState<'a> {
     pub plan: &'a Plan,
     /// Tables by port, for every stage whose tables are known.
     pub tables: Vec<Option<BTreeMap<String, TableRef>>>,
@@ -18,23 +18,23 @@ pub(super) struct Desk<'a> {
 }
 
 /// The key of a stage, or the stage whose tables must be there first.
-pub(super) enum Key {
+pub(super) enum KeyState {
     Known(StageKey),
     Pending(usize),
 }
 
-impl<'a> Desk<'a> {
+impl<'a> RunState<'a> {
     pub fn new(plan: &'a Plan) -> Self {
         Self { plan, tables: vec![None; plan.stages.len()], hashes: BTreeMap::new() }
     }
 
-    pub fn key(&mut self, index: usize) -> Result<Key> {
+    pub fn key(&mut self, index: usize) -> Result<KeyState> {
         let stage = &self.plan.stages[index];
         let mut reads = BTreeMap::new();
         for input in &stage.inputs {
             let mut keys = Vec::new();
             for origin in &input.from {
-                let Some(tables) = &self.tables[origin.stage] else { return Ok(Key::Pending(origin.stage)) };
+                let Some(tables) = &self.tables[origin.stage] else { return Ok(KeyState::Pending(origin.stage)) };
                 let table = table(tables, &self.plan.stages[origin.stage], origin.port)?;
                 // Only where a port takes several tables does the stage see whose they are.
                 let writer = (input.port.arity == Arity::Every).then(|| self.plan.stages[origin.stage].id.clone());
@@ -51,7 +51,7 @@ impl<'a> Desk<'a> {
         for port in &stage.outputs {
             schemas.insert(port.name.to_string(), schema::of(port.kind)?.id());
         }
-        Ok(Key::Known(StageKey {
+        Ok(KeyState::Known(StageKey {
             key_format: KEY_FORMAT,
             id: stage.id.clone(),
             stage: stage.entry.name.into(),

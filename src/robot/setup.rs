@@ -25,13 +25,13 @@ pub struct Anchor {
 
 /// Targets and anchors, each by the order of names.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Gauging {
+pub struct MeasurementSetup {
     /// None: the robot's tool point is what is measured.
     pub targets: Vec<Target>,
     pub anchors: Vec<Anchor>,
 }
 
-impl Gauging {
+impl MeasurementSetup {
     pub fn target(&self, name: &str) -> Option<usize> {
         self.targets.iter().position(|target| target.name == name)
     }

@@ -1,7 +1,7 @@
 //! How far off a row is under a model, in the units of people: a length and an angle.
 
 use super::model::Model;
-use crate::effect::Scratch;
+use crate::effect::PlacementBuffers;
 use crate::observation::{Dimension, KINDS, Residual};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// How far off a row is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Miss {
+pub struct RowError {
     /// Measured - predicted along the axes that were measured, m.
     pub point: Vector3<f64>,
     /// Its length, or that of another kind where no axis was measured, m.
@@ -19,7 +19,7 @@ pub struct Miss {
 }
 
 /// How far off a row is under a model.
-pub(crate) fn miss(model: &Model, data: &Measurements, row: usize, scratch: &mut Scratch) -> Miss {
+pub(crate) fn row_error(model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> RowError {
     let placed = model.place(data, row, scratch);
     let (mut length, mut angle) = (None, None);
     for residual in KINDS.iter().filter_map(|kind| Residual::of(*kind, data, row, &placed)) {
@@ -29,15 +29,15 @@ pub(crate) fn miss(model: &Model, data: &Measurements, row: usize, scratch: &mut
         };
         first.get_or_insert_with(|| residual.error.norm());
     }
-    Miss { point: data.residual(row, &placed.point), length: length.unwrap_or(0.0), angle }
+    RowError { point: data.residual(row, &placed.point), length: length.unwrap_or(0.0), angle }
 }
 
 impl Model {
     /// What is left of every row, where some row measured other than a whole point; empty where all measured just that.
-    pub fn misses(&self, data: &Measurements) -> Vec<Miss> {
+    pub fn row_errors(&self, data: &Measurements) -> Vec<RowError> {
         let plain = data.readings.is_empty() && (0..data.rows()).all(|row| data.whole(row));
         let rows = if plain { 0 } else { data.rows() };
         let scratch = || self.stack.scratch(&self.robot);
-        (0..rows).into_par_iter().map_init(scratch, |scratch, row| miss(self, data, row, scratch)).collect()
+        (0..rows).into_par_iter().map_init(scratch, |scratch, row| row_error(self, data, row, scratch)).collect()
     }
 }

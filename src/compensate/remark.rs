@@ -1,0 +1,54 @@
+//! What is wrong with a command, and how people are told.
+
+use std::fmt;
+
+/// What is wrong with a command.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Remark {
+    /// How far the point stays away, m, where the orientation is not all that fails.
+    NotReached(Option<f64>),
+    /// By how much the orientation is off, rad.
+    Turned(f64),
+    /// Joints, from 0.
+    BeyondLimits(Vec<usize>),
+    BeyondMeasured(Unmeasured),
+    /// The share of the learned correction that applies.
+    Faded(f64),
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotReached(Some(off)) => write!(f, "not reached, {:.3} mm off", off * 1e3),
+            Self::NotReached(None) => f.write_str("not reached"),
+            Self::Turned(turn) => write!(f, "orientation off by {:.4} deg", turn.to_degrees()),
+            Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", listed(joints)),
+            Self::BeyondMeasured(what) => write!(f, "{what} beyond the measured range"),
+            Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
+        }
+    }
+}
+
+/// What of a command lies outside of what was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Unmeasured {
+    /// From 0.
+    Joints(Vec<usize>),
+    Payload,
+    Temperature,
+}
+
+impl fmt::Display for Unmeasured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Joints(joints) => write!(f, "joint {}", listed(joints)),
+            Self::Payload => f.write_str("payload"),
+            Self::Temperature => f.write_str("temperature"),
+        }
+    }
+}
+
+/// Joints, from 0, as people count them: `3, 5`.
+fn listed(joints: &[usize]) -> String {
+    joints.iter().map(|joint| (joint + 1).to_string()).collect::<Vec<_>>().join(", ")
+}
