@@ -158,7 +158,7 @@ pub fn fit(model: &mut Model, data: &Measurements, options: &FitOptions) -> Fitt
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
         prior_checks,
-        repeated: poses.against(problem.data, whole_points(&all.residuals), free.len()),
+        repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
         indices: indices(&singular, options.rows.len()),

@@ -34,6 +34,11 @@ pub enum Shape {
     },
     /// Several numbers in one of several conventions.
     Conventions(&'static Conventions),
+    /// One number a row: so many standard deviations, unless the file says another number, of each of these settings.
+    Uncertainty {
+        of: &'static [&'static str],
+        coverage: f64,
+    },
 }
 
 /// Ways to write a quantity of several numbers.
@@ -92,6 +97,11 @@ impl Column {
         Self { shape: Shape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
     }
 
+    /// So many standard deviations of the settings `of`, which it stands for.
+    pub const fn uncertainty(setting: &'static str, of: &'static [&'static str], coverage: f64, about: &'static str) -> Self {
+        Self { shape: Shape::Uncertainty { of, coverage }, ..Self::number(setting, &[], Quantity::Length, [0.0, 1.0], about) }
+    }
+
     pub const fn as_part(self, part: Part) -> Self {
         Self { part, ..self }
     }
@@ -107,7 +117,7 @@ impl Column {
     /// Numbers that reading a row of a robot with so many joints takes at most.
     pub fn numbers(&self, joints: usize) -> usize {
         match self.shape {
-            Shape::Text | Shape::Count => 0,
+            Shape::Text | Shape::Count | Shape::Uncertainty { .. } => 0,
             Shape::Number => 1,
             Shape::Joints { .. } => joints,
             Shape::Conventions(conventions) => {

@@ -1,8 +1,8 @@
 //! Recordings that proposed poses are compared with.
 
 use crate::error::{Error, Fault, Result};
+use crate::robot::Measurements;
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::robot::{Instrument, Measurements};
 use crate::table::{Loose, Recording, from_file};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -31,7 +31,7 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
     if table.rows() == 0 {
         return Err(Error::data(label, "has no rows"));
     }
-    let mut data = table.measurements(&Instrument::default());
+    let mut data = table.measurements();
     data.sigma = vec![Vector3::repeat(sigma); data.rows()];
     Ok((data, warning))
 }

@@ -50,7 +50,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -79,7 +79,7 @@ impl Stage for Identify {
     }
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
         let setting = Setting { base, load: self.load.into() };

@@ -34,7 +34,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses, everything identified before is kept";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -45,7 +45,7 @@ impl Stage for Stiffness {
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
         const EFFECT: &str = "joint_compliance";
         let robot = RobotModel::new(reads.robot.to_description()?);
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let mut model = reads.parameters.model(robot, &[EFFECT], self.load.into())?;
         let compliance = model.stack.effects().find(|(effect, _)| effect.name() == EFFECT);

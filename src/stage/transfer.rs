@@ -36,7 +36,7 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tries an identified model on another recording of the robot; only its base is found anew";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = TransferReads;
     type Writes = Identified;
 
@@ -45,7 +45,7 @@ impl Stage for Transfer {
     }
 
     fn run(&self, reads: TransferReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let earlier = reads.parameters.of_the_arm()?;
         let left = reads.parameters.0.len() - earlier.0.len();

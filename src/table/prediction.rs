@@ -22,6 +22,8 @@ crate::table::rows! { "prediction",
         error_mm: f64,
         /// One-sigma length of the measurement noise that the row is weighted by (root of the summed variances).
         noise_mm: f64,
+        /// What `noise_mm` rests on: `repeats`, `instrument` or `inferred`; null in tables of before.
+        noise_basis: Option<String>,
         /// One-sigma length of the predicted position's uncertainty from the parameters'; null where this step does not know it.
         sigma_mm: Option<f64>,
         /// Length of the residual under a fit of this step without the row's fold, folds drawn at random by pose; null where the step
@@ -85,6 +87,7 @@ impl Prediction {
                     _ => residual.norm(),
                 },
                 noise_mm: noise(data, row) * 1e3,
+                noise_basis: Some(data.noise_basis.name().into()),
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
                 fold_error_mm: None,
                 block_error_mm: None,

@@ -3,6 +3,7 @@
 mod foreign;
 mod kinds;
 mod moving;
+mod noise;
 mod refusals;
 mod together;
 

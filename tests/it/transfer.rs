@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use calib::effect::Load;
 use calib::error::Result;
 use calib::estimate::Model;
-use calib::robot::{Instrument, RobotModel};
+use calib::robot::RobotModel;
 use calib::spatial::Pose;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
@@ -101,7 +101,7 @@ fn after_base(points: &[Vector3<f64>], measured: &[[f64; 3]]) -> [f64; 2] {
 
 /// Mean and largest error on the rows of `to`, mm, without and with what was learnt on `from`.
 fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
-    let plain = from.model.predict(&to.recording.measurements(&Instrument::default()));
+    let plain = from.model.predict(&to.recording.measurements());
     let correction = from.learnt.network.correction(&from.recording.prismatic).unwrap().expect("something was learnt");
     let corrected: Vec<Vector3<f64>> =
         plain.iter().enumerate().map(|(row, p)| p + Vector3::from(correction.at(to.recording.q(row)).delta)).collect();

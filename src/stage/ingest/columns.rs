@@ -1,6 +1,6 @@
 //! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
 
-use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
 use crate::observation::{Column, Convention, Conventions, Shape};
 use crate::table::recording_columns;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -24,6 +24,7 @@ enum Mapped {
     Number(ScalarColumn),
     Joints(JointColumns),
     Conventions(ConventionColumns),
+    Uncertainty(UncertaintyColumn),
 }
 
 macro_rules! mapped {
@@ -75,6 +76,18 @@ impl Columns {
     pub(super) fn conventions(&self) -> impl Iterator<Item = (&'static Column, &'static Conventions, &ConventionColumns)> {
         self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
             (Shape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
+            _ => None,
+        })
+    }
+
+    /// The mapped uncertainties, with the settings that each stands for and how many standard deviations it is.
+    pub(super) fn uncertainties(
+        &self,
+    ) -> impl Iterator<Item = (&'static Column, &UncertaintyColumn, &'static [&'static str], f64)> {
+        self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
+            (Shape::Uncertainty { of, coverage }, Mapped::Uncertainty(mapped)) => {
+                Some((*column, mapped, of, mapped.coverage_factor.unwrap_or(coverage)))
+            }
             _ => None,
         })
     }
@@ -150,6 +163,7 @@ impl<'de> Visitor<'de> for Block {
                 Shape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
                 Shape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
                 Shape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
+                Shape::Uncertainty { .. } => access.next_value::<Option<_>>()?.map(Mapped::Uncertainty),
                 Shape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
             };
             if mapped.is_some_and(|mapped| found.insert(column.setting, mapped).is_some()) {
@@ -222,6 +236,7 @@ impl JsonSchema for Columns {
                 Shape::Count => generator.subschema_for::<Option<CountColumn>>(),
                 Shape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
                 Shape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
+                Shape::Uncertainty { .. } => generator.subschema_for::<Option<UncertaintyColumn>>(),
                 Shape::Conventions(conventions) => {
                     let block = convention_schema(column.setting, conventions, generator);
                     generator.definitions_mut().insert(conventions.name.into(), block.to_value());
