@@ -248,7 +248,7 @@ impl Tally {
         self.not_reached += u64::from(answer.q.is_none());
         self.turned += u64::from(answer.q.is_some() && answer.remark.contains("orientation off"));
         self.beyond_limits += u64::from(answer.remark.contains("beyond its limits"));
-        self.beyond_measured += u64::from(answer.remark.contains("beyond the measured"));
+        self.beyond_measured += u64::from(answer.remark.contains("the measured range"));
     }
 }
 

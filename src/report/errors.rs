@@ -285,7 +285,7 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
 /// The noise, and what it rests on.
 fn noise(row: &StatisticsRow) -> String {
     match row.noise_basis.as_deref() {
-        Some("inferred") => format!("{} (inferred: the recording states none)", mm(row.noise_rms_mm)),
+        _ if row.is_inferred() => format!("{} (inferred: the recording states none)", mm(row.noise_rms_mm)),
         Some(basis) => format!("{} (by {basis})", mm(row.noise_rms_mm)),
         None => mm(row.noise_rms_mm),
     }

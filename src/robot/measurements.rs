@@ -79,11 +79,13 @@ impl Measurements {
 
     /// The first row of the stop at which a row was measured: several targets in a row, one after the other in one pose.
     pub fn stop(&self, row: usize) -> usize {
-        let mut first = row;
-        let Some(target) = &self.target else { return first };
-        let new = |first: usize| (first..=row).all(|other| target.name(other) != target.name(first - 1));
-        while first > 0 && self.near_pose(first - 1, row) && new(first) {
-            first -= 1;
+        let Some(target) = &self.target else { return row };
+        let mut first = (0..row).rev().take_while(|other| self.near_pose(*other, row)).last().unwrap_or(row);
+        for other in first + 1..=row {
+            // The same target again: the arm came back to the pose.
+            if (first..other).any(|k| target.name(k) == target.name(other)) {
+                first = other;
+            }
         }
         first
     }

@@ -12,6 +12,7 @@ mod posture;
 mod readings;
 mod rows;
 mod travel;
+mod visited;
 
 pub use bound::Bound;
 pub use gauging::{Anchor, Gauging, Target};
@@ -22,3 +23,5 @@ pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{Named, Reading, Readings};
 pub use rows::{Row, Rows};
 pub use travel::Travel;
+pub use visited::Visited;
+pub(crate) use visited::listed;

@@ -2,7 +2,6 @@
 
 use crate::error::Result;
 use crate::pipeline::Outcome;
-use crate::robot::NoiseBasis;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{Standing, Statistics, StatisticsRow, Table};
@@ -35,7 +34,7 @@ pub fn statistics(outcome: &Outcome, standing: Option<&Standing>, store: &Store)
             text.push_str(&block(title, &rows));
         }
     }
-    if rows.iter().any(|row| row.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())) {
+    if rows.iter().any(StatisticsRow::is_inferred) {
         text.push_str(
             "expected rests on inferred noise: the recording states none, and no `instrument` is stated in `ingest`\n\n",
         );

@@ -36,6 +36,8 @@ crate::table::rows! { "prediction",
         measured: Option<String>,
         /// Angle between what was measured and predicted of the orientation; null where nothing was.
         turn_rad: Option<f64>,
+        /// What of the row lies outside of where the model was measured; null inside, or where that is not known.
+        remark: Option<String>,
     }
 }
 
@@ -93,6 +95,7 @@ impl Prediction {
                 block_error_mm: None,
                 measured: (!whole).then(|| measured(data, row)),
                 turn_rad: miss.and_then(|miss| miss.angle),
+                remark: None,
             }
         });
         Self(rows.collect())
@@ -104,6 +107,12 @@ impl Prediction {
             self.0[*row].fold_error_mm = Some(fold * 1e3);
             self.0[*row].block_error_mm = Some(block * 1e3);
         }
+        self
+    }
+
+    /// The same with a remark for each row; nothing where there is none.
+    pub fn with_remarks(mut self, remarks: impl Iterator<Item = Option<String>>) -> Self {
+        self.0.iter_mut().zip(remarks).for_each(|(row, remark)| row.remark = remark);
         self
     }
 

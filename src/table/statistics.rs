@@ -57,3 +57,12 @@ crate::table::rows! { "statistics",
         reference_max_mm: Option<f64>,
     }
 }
+
+use crate::robot::NoiseBasis;
+
+impl StatisticsRow {
+    /// Whether its figures of noise rest on nothing that was stated or measured again.
+    pub fn is_inferred(&self) -> bool {
+        self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
+    }
+}

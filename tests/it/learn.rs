@@ -101,6 +101,7 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
             block_error_mm: None,
             measured: None,
             turn_rad: None,
+            remark: None,
         });
     }
     (recording, split, prediction)

@@ -28,6 +28,7 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         block_error_mm: None,
         measured: None,
         turn_rad: None,
+        remark: None,
     }
 }
 
