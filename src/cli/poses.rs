@@ -59,7 +59,7 @@ pub(super) struct PosesArguments {
     /// Payloads at hand, kg; poses are grouped by them [default: 0, or those of the run]
     #[arg(long, value_name = "KG,..", value_delimiter = ',')]
     payload: Vec<f64>,
-    /// Standard deviation per axis of a measured point, instrument and repeatability, mm [default: 0.02, or the run's]
+    /// Standard deviation per axis of a measured point, instrument and repeatability, mm [default: that of the recording `--against` or of the run, else 0.02]
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
     /// Random poses to choose from

@@ -19,7 +19,7 @@ pub use correct::{CommandTarget, CorrectedCommand, CorrectionOptions, Correction
 pub use coverage::Coverage;
 use coverage::beyond_limits;
 pub use inverse::inverse;
-pub use remark::{Remark, Unmeasured};
+pub use remark::Remark;
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
 pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};

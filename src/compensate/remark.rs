@@ -1,5 +1,6 @@
 //! What is wrong with a command, and how people are told.
 
+use crate::robot::{Unmeasured, numbered};
 use std::fmt;
 
 /// What is wrong with a command.
@@ -22,33 +23,9 @@ impl fmt::Display for Remark {
             Self::NotReached(Some(off)) => write!(f, "not reached, {:.3} mm off", off * 1e3),
             Self::NotReached(None) => f.write_str("not reached"),
             Self::Turned(turn) => write!(f, "orientation off by {:.4} deg", turn.to_degrees()),
-            Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", listed(joints)),
-            Self::BeyondMeasured(what) => write!(f, "{what} beyond the measured range"),
+            Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", numbered(joints)),
+            Self::BeyondMeasured(what) => what.fmt(f),
             Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
         }
     }
-}
-
-/// What of a command lies outside of what was measured.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Unmeasured {
-    /// From 0.
-    Joints(Vec<usize>),
-    Payload,
-    Temperature,
-}
-
-impl fmt::Display for Unmeasured {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Joints(joints) => write!(f, "joint {}", listed(joints)),
-            Self::Payload => f.write_str("payload"),
-            Self::Temperature => f.write_str("temperature"),
-        }
-    }
-}
-
-/// Joints, from 0, as people count them: `3, 5`.
-fn listed(joints: &[usize]) -> String {
-    joints.iter().map(|joint| (joint + 1).to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -1,8 +1,9 @@
 //! What a model leaves of the rows, against their noise.
 
 use super::types::Question;
+use super::verdict_statement::Ground;
 use crate::estimate::{Screening, Weight};
-use crate::robot::Measurements;
+use crate::robot::{Measurements, NoiseBasis};
 use nalgebra::Vector3;
 
 /// Sizes of what is left.
@@ -57,6 +58,18 @@ impl Misfit {
             chi_square: whitened(kept) / freedom,
             not_carried,
             rows,
+        }
+    }
+
+    /// What a verdict on it rests on.
+    pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize) -> Ground {
+        Ground {
+            basis,
+            repeats,
+            noise: self.noise_floor,
+            instrument: (data.noise_basis != NoiseBasis::Inferred).then_some(self.instrument),
+            left: self.leftover_rms,
+            in_motion: data.in_motion(&self.rows),
         }
     }
 }

@@ -17,6 +17,7 @@ mod search;
 mod separate;
 mod too_few;
 mod types;
+mod verdict_statement;
 mod whitened;
 mod words;
 

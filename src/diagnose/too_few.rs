@@ -2,6 +2,7 @@
 
 use super::misfit::Misfit;
 use super::types::{Diagnosis, ErrorLengths, JointRepeatability, Located, Question, VerdictKind};
+use super::verdict_statement::statement;
 use crate::effect::{BasePlacement, Effect, EffectStack};
 use crate::estimate::{FitOptions, Model, align, fit_screened};
 
@@ -19,8 +20,12 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let predicted = model.predict(data);
     let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
     let errors = ErrorLengths::of(data, &predicted, &misfit.rows);
+    let ground = misfit.ground(data, data.noise_basis, 0);
+    let statement = statement(VerdictKind::NotAsked, &ground);
     Diagnosis {
         verdict: VerdictKind::NotAsked,
+        statement,
+        noise_basis: data.noise_basis,
         noise_floor: misfit.noise_floor,
         before: errors,
         after: errors,

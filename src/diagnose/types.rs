@@ -2,7 +2,7 @@
 
 use crate::effect::{Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Folds, Model, Screening};
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
 
 /// What is to be diagnosed.
@@ -22,7 +22,7 @@ pub struct Question<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRepeatability {
     pub sigma: f64,
-    /// Immediate repeats of a pose; none where it was taken from the residual.
+    /// Repeats of a target in a pose that it rests on; with few it is taken from the residual.
     pub repeats: usize,
 }
 
@@ -175,6 +175,10 @@ impl ErrorLengths {
 /// The outcome of a diagnosis.
 pub struct Diagnosis {
     pub verdict: VerdictKind,
+    /// The verdict in a sentence, with what its noise rests on.
+    pub statement: String,
+    /// What the noise rests on.
+    pub noise_basis: NoiseBasis,
     /// Length of the noise of a row, rms, m.
     pub noise_floor: f64,
     /// Of held-out rows (of the fitted ones where none are held out), suspects apart.

@@ -14,8 +14,14 @@ pub enum Basis {
     Sway { period: f64 },
     /// cos(k pi (u - low) / (high - low)), k = 1..=count, held at either end: a curve without its mean.
     Cosines { low: f64, high: f64, count: usize },
-    /// The same, fading out beyond either end within one wave of the highest cosine.
-    Fading { low: f64, high: f64, count: usize },
+    /// The same, fading out beyond either end within one wave of the highest cosine, and straight across gaps.
+    Fading {
+        low: f64,
+        high: f64,
+        count: usize,
+        #[serde(default, skip_serializing_if = "Gaps::are_none")]
+        gaps: Gaps,
+    },
     /// exp(-((u - centre) / width)^2).
     Bump { centre: f64, width: f64 },
     /// tanh((u - centre) / width): one level below, another above.
@@ -32,6 +38,28 @@ pub enum Basis {
     Creep { start: f64, end: f64, exponent: f64 },
     /// 1 - exp(-(u - start) / constant) from `start` on.
     Settling { start: f64, constant: f64 },
+}
+
+/// Stretches of a curve's variable without support; none where both ends are one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Gaps(pub [[f64; 2]; 2]);
+
+impl Gaps {
+    fn are_none(&self) -> bool {
+        self.0.iter().all(|[low, high]| low == high)
+    }
+
+    /// Where a curve is looked at instead of `u`, and with which weights: at both ends of a gap, a straight line between them, which is
+    /// the stiffest curve that they allow.
+    fn ends(&self, u: f64) -> [(f64, f64); 2] {
+        match self.0.iter().find(|[low, high]| u > *low && u < *high) {
+            Some([low, high]) => {
+                let share = (u - low) / (high - low);
+                [(*low, 1.0 - share), (*high, share)]
+            }
+            None => [(u, 1.0), (u, 0.0)],
+        }
+    }
 }
 
 /// Lengths of the recording, from its start, over which a creep is believed to go on.
@@ -75,11 +103,14 @@ impl Basis {
             Self::Cosines { low, high, count } => {
                 cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, value))
             }
-            Self::Fading { low, high, count } => {
+            Self::Fading { low, high, count, gaps } => {
                 let wave = 2.0 * (high - low) / count as f64;
                 let beyond = (low - u).max(u - high).clamp(0.0, wave);
                 let share = if beyond > 0.0 { 0.5 + 0.5 * libm::cos(PI * beyond / wave) } else { 1.0 };
-                cosines(u, [low, high], count).enumerate().for_each(|(k, value)| each(k, share * value));
+                let [(a, own), (b, other)] = gaps.ends(u);
+                let (from, to) = (cosines(a, [low, high], count), cosines(b, [low, high], count));
+                let straight = from.zip(to).map(|(from, to)| own * from + other * to);
+                straight.enumerate().for_each(|(k, value)| each(k, share * value));
             }
             Self::Bump { centre, width } => {
                 let distance = (u - centre) / width;
@@ -114,4 +145,32 @@ pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Itera
 pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
     let step = libm::pow(first, libm::exp2(-pace * f64::from(level)));
     [value * step, value / step].map(|other| other.clamp(low, high)).into_iter().filter(move |other| *other != value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_straight_across_a_gap_and_as_before_beside_it() {
+        let values = |basis: Basis, u: f64| {
+            let mut out = vec![0.0; basis.count()];
+            basis.values(u, &mut |k, value| out[k] = value);
+            out
+        };
+        let (low, high, count) = (-1.0, 2.0, 12);
+        let plain = Basis::Fading { low, high, count, gaps: Gaps::default() };
+        let bridged = Basis::Fading { low, high, count, gaps: Gaps([[0.25, 0.75], [0.0; 2]]) };
+        for u in [-1.2, -0.5, 0.25, 0.75, 1.9, 2.1] {
+            assert_eq!(values(bridged, u), values(plain, u), "{u}");
+        }
+        let (from, to, middle) = (values(plain, 0.25), values(plain, 0.75), values(bridged, 0.5));
+        for ((from, to), middle) in from.iter().zip(to).zip(middle) {
+            assert!((middle - 0.5 * (from + to)).abs() < 1e-12, "{middle}");
+        }
+        let text = serde_json::to_string(&plain).expect("JSON");
+        assert!(!text.contains("gaps"), "{text}");
+        assert_eq!(serde_json::from_str::<Basis>(&text).expect("the same"), plain);
+        assert_eq!(serde_json::from_str::<Basis>(&serde_json::to_string(&bridged).expect("JSON")).expect("the same"), bridged);
+    }
 }

@@ -1,7 +1,7 @@
 //! `joint_table`: a repeatable error of a joint of no simple form, as a curve over the range that was measured.
 
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
+    Basis, Cause, CauseDescription, Gaps, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Summary, Survey, Term, Variable,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -15,6 +15,10 @@ const RESOLUTIONS: [f64; 3] = [12.0, 24.0, 36.0];
 const VALUES_EACH: f64 = 20.0;
 /// Rows within a wave of an end of the range.
 const SUPPORT: usize = 5;
+/// Rows within a wave anywhere between; with fewer the curve is straight there.
+const SUPPORT_BETWEEN: usize = 3;
+/// Places within a wave at which that is asked.
+const PLACES: f64 = 8.0;
 /// How large a number of a curve may be, rad (60 arcsec): holds it down where points are sparse.
 pub(super) const PLAUSIBLE: f64 = 3e-4;
 /// Cosines of a curve up to this one make at most two periods over its range.
@@ -39,11 +43,15 @@ impl Cause for JointTable {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let mut out = Vec::new();
         for joint in survey.revolute() {
+            let mut q: Vec<f64> = survey.rows.iter().map(|row| survey.data.q(*row)[joint]).collect();
+            q.sort_by(f64::total_cmp);
             for resolution in RESOLUTIONS {
-                let Some([low, high]) = well_covered(survey, joint, 2.0 * PI / resolution) else { continue };
+                let wave = 2.0 * PI / resolution;
+                let Some([low, high]) = well_covered(&q, wave) else { continue };
+                let gaps = gaps(&q, wave, [low, high]);
                 let count = (resolution * (high - low) / PI).ceil();
                 if count >= 1.0 && 3.0 * survey.rows.len() as f64 > VALUES_EACH * count {
-                    let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize });
+                    let law = Law::new(Variable::Angle { joint }, Basis::Fading { low, high, count: count as usize, gaps });
                     let term = Term::new(&Self, Motion::Joint { joint }, law);
                     out.push(Hypothesis::new(term, RESOLUTIONS.len()).penalised(4.0));
                 }
@@ -81,12 +89,56 @@ pub(super) fn strongest_orders(table: &Term, numbers: &[&ParameterEstimate]) -> 
     format!("a curve, strongest about {} times a turn", orders.collect::<Vec<_>>().join(", "))
 }
 
-/// The range of a joint without sparse ends: within a wave (rad) of either end there are some rows.
-fn well_covered(survey: &Survey, joint: usize, wave: f64) -> Option<[f64; 2]> {
-    let mut q: Vec<f64> = survey.rows.iter().map(|row| survey.data.q(*row)[joint]).collect();
-    q.sort_by(f64::total_cmp);
+/// The range of a joint's sorted positions without sparse ends: within a wave (rad) of either end there are some rows.
+fn well_covered(q: &[f64], wave: f64) -> Option<[f64; 2]> {
     let covered = |some: &[f64]| some[SUPPORT - 1] - some[0] < wave;
     let low = q.windows(SUPPORT).find(|some| covered(some))?[0];
     let high = q.windows(SUPPORT).rfind(|some| covered(some))?[SUPPORT - 1];
     (high > low).then_some([low, high])
+}
+
+/// The two widest stretches of a range (rad) of sorted positions in which a wave holds too few rows.
+fn gaps(q: &[f64], wave: f64, [low, high]: [f64; 2]) -> Gaps {
+    let step = wave / PLACES;
+    let below = |limit: f64| q.partition_point(|value| *value < limit);
+    let sparse = |u: f64| below(u + 0.5 * wave) - below(u - 0.5 * wave) < SUPPORT_BETWEEN;
+    // Ends are supported by rows within a whole wave of them.
+    let places = ((high - low - wave) / step).floor().max(0.0) as usize;
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    for u in (0..=places).map(|k| low + 0.5 * wave + k as f64 * step).filter(|u| sparse(*u)) {
+        match found.last_mut() {
+            Some(last) if u - last[1] < 1.5 * step => last[1] = u,
+            _ => found.push([u, u]),
+        }
+    }
+    found.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    let mut widest = found.into_iter().filter(|[low, high]| high > low);
+    Gaps([0; 2].map(|_: i32| widest.next().unwrap_or_default()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// deg
+    fn found(q: impl Iterator<Item = f64>, wave: f64) -> Vec<[f64; 2]> {
+        let q: Vec<f64> = q.map(f64::to_radians).collect();
+        let wave = wave.to_radians();
+        let range = well_covered(&q, wave).expect("rows");
+        let Gaps(all) = gaps(&q, wave, range);
+        all.into_iter().filter(|[low, high]| high > low).map(|gap| gap.map(f64::to_degrees)).collect()
+    }
+
+    #[test]
+    fn a_table_knows_where_there_was_but_one_row_in_twenty_degrees() {
+        let rows = |k: i32| f64::from(k);
+        let whole = found((0..120).map(rows), 10.0);
+        assert!(whole.is_empty(), "{whole:?}");
+        let lonely = (0..=50).chain([60]).chain(70..=120).map(rows);
+        let gaps = found(lonely, 10.0);
+        let [[low, high]] = gaps[..] else { panic!("{gaps:?}") };
+        assert!((50.0..55.0).contains(&low) && (65.0..70.0).contains(&high), "{low} to {high}");
+        // A wave that is longer than the gap has rows enough.
+        assert!(found((0..=50).chain([60]).chain(70..=120).map(rows), 30.0).is_empty());
+    }
 }

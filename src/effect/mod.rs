@@ -56,7 +56,7 @@ pub use anchor::AnchorShift;
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
 pub use base_frame::{BaseFrame, BasePlacement};
-pub use basis::Basis;
+pub use basis::{Basis, Gaps};
 pub use cable_drag::CableDrag;
 pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hypotheses, identified, whole};
 pub use deflection::{Deflection, Direction};

@@ -5,12 +5,9 @@
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
 use super::factor::TriangularFactor;
-use super::fit::Fitted;
-use super::model::Model;
 use super::problem::Problem;
 use super::session::Session;
 use crate::effect::BaseFrame;
-use crate::robot::Measurements;
 use faer::Mat;
 
 /// A parameter's step from one recording to the other, SI.

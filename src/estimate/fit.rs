@@ -164,7 +164,7 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
         values: errors.iter().map(|(_, axes)| axes).sum(),
         covariance,
         prior_checks,
-        repeated: poses.against(problem.data, whole_points(&all.residuals), free.len()),
+        repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
         downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
         indices: indices(&singular, problem.rows.len()),

@@ -8,9 +8,10 @@ use super::model::Model;
 use crate::effect::{EffectContext, EffectStack, Load, whole};
 use crate::observation::{Residual, Weight};
 use crate::robot::Measurements;
+use crate::robot::pose_groups::{NEAR, SAME, STILL, grouped, near};
 use nalgebra::{Matrix3, Vector3};
 
-/// Rows grouped by pose and payload; poses in the order of their first rows, rows in the order of recording.
+/// Rows grouped by pose and payload, near poses being one; poses in the order of their first rows, rows in the order of recording.
 pub struct Poses {
     all: Vec<Vec<usize>>,
     /// Whole points of one target in one pose.
@@ -34,14 +35,9 @@ pub struct Repeated {
 
 impl Poses {
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
-        let mut sorted = rows.to_vec();
-        sorted.sort_unstable_by(|a, b| {
-            let joints = data.q(*a).iter().zip(data.q(*b)).map(|(x, y)| x.total_cmp(y));
-            let order = joints.fold(data.payload[*a].total_cmp(&data.payload[*b]), |order, next| order.then(next));
-            order.then(a.cmp(b))
-        });
-        let mut poses: Vec<Vec<usize>> = sorted.chunk_by(|a, b| data.same_pose(*a, *b)).map(<[usize]>::to_vec).collect();
-        poses.sort_unstable_by_key(|rows| rows[0]);
+        // Of a moving arm the rows beside one are always near.
+        let limit = if data.in_motion(rows) { SAME } else { NEAR };
+        let poses = grouped(rows, |row| data.q(row), limit, |a, b| data.payload[a] == data.payload[b]);
         let points = poses.iter().flat_map(|rows| points(data, rows)).collect();
         Self { all: poses, points }
     }
@@ -58,15 +54,17 @@ impl Poses {
     /// What the repeats say against what a fit of `parameters` left of `whole` points. `None` without repeats.
     pub(crate) fn against<'a>(
         &self,
+        model: &Model,
         data: &Measurements,
         whole: impl Iterator<Item = &'a Residual> + Clone,
         parameters: usize,
     ) -> Option<Repeated> {
         let (mut squares, mut whitened, mut freedom, mut revisited) = (0.0, 0.0, 0, false);
         for pose in self.repeated() {
-            let mean = mean(data, pose);
-            for row in pose {
-                let off = data.position[*row] - mean;
+            let points = in_first_pose(model, data, pose);
+            let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+            for (row, point) in pose.iter().zip(points) {
+                let off = point - mean;
                 squares += off.norm_squared();
                 whitened += Weight::of(data, *row, 0.0).apply(&off).norm_squared();
             }
@@ -113,8 +111,16 @@ const COARSEST: f64 = 1e-2;
 /// Fall of the deviance that chance alone makes once in a hundred recordings: half of chi-square's, since s cannot be negative.
 const CLEAR: f64 = 5.4;
 
-fn mean(data: &Measurements, rows: &[usize]) -> Vector3<f64> {
-    rows.iter().map(|row| data.position[*row]).sum::<Vector3<f64>>() / rows.len() as f64
+/// Points of near poses as they would have been measured in the first of them: less what the model moves them in between.
+fn in_first_pose(model: &Model, data: &Measurements, rows: &[usize]) -> Vec<Vector3<f64>> {
+    let exact = |row: &usize| near(data.q(rows[0]), data.q(*row), SAME);
+    if rows.iter().all(exact) {
+        return rows.iter().map(|row| data.position[*row]).collect();
+    }
+    let mut scratch = model.stack.scratch(&model.robot);
+    let mut predicted = |row: usize| model.place(data, row, &mut scratch).point;
+    let first = predicted(rows[0]);
+    rows.iter().map(|row| data.position[*row] - (predicted(*row) - first)).collect()
 }
 
 /// The whole points among the rows of a pose, by target.
@@ -131,7 +137,8 @@ fn points(data: &Measurements, pose: &[usize]) -> Vec<Vec<usize>> {
 
 /// Rows of a point between which the arm did not move: nothing but rows of the same pose lies between.
 pub(crate) fn visits<'a>(data: &Measurements, point: &'a [usize]) -> Vec<&'a [usize]> {
-    point.chunk_by(|a, b| (a + 1..*b).all(|between| data.same_pose(*a, between))).collect()
+    let stands = |a: usize, b: usize| data.payload[a] == data.payload[b] && near(data.q(a), data.q(b), STILL);
+    point.chunk_by(|a, b| (a + 1..=*b).all(|next| stands(*a, next))).collect()
 }
 
 /// A pose that was left and returned to.
@@ -146,12 +153,14 @@ struct PoseGroup {
 
 impl PoseGroup {
     fn of(model: &Model, data: &Measurements, pose: &[usize]) -> Option<Self> {
+        let mut points = in_first_pose(model, data, pose).into_iter();
         let visits: Vec<(Vector3<f64>, Matrix3<f64>)> = visits(data, pose)
             .into_iter()
             .map(|rows| {
                 let variance = rows.iter().map(|row| data.sigma[*row].map(|sigma| sigma * sigma)).sum::<Vector3<f64>>();
                 let count = rows.len() as f64;
-                (mean(data, rows), Matrix3::from_diagonal(&(variance / (count * count))))
+                let mean = points.by_ref().take(rows.len()).sum::<Vector3<f64>>() / count;
+                (mean, Matrix3::from_diagonal(&(variance / (count * count))))
             })
             .collect();
         let middle = visits.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / visits.len() as f64;

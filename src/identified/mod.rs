@@ -15,7 +15,7 @@ use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::description::RobotDescription;
-use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::robot::{Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
@@ -88,7 +88,7 @@ impl IdentifiedModel {
             Some(network) => Network::from_frame(&load(&network.table)?)?.correction(&prismatic)?,
             None => None,
         };
-        let data = recording.map(|table| table.measurements(&Instrument::default()));
+        let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
         let warnings = stands.iter().flat_map(Standing::warnings).collect();
         let covariance = stage.outputs.iter().find(|output| output.kind == CovarianceTable::KIND);

@@ -186,10 +186,13 @@ impl ExaminedFile {
         if let Some(sigma) = found.sigma {
             // In the unit of the point, unless the name says another.
             let unit = self.said[sigma[0]].unit_of(&LENGTHS).unwrap_or(self.length_unit(&best.columns).0);
-            let lines =
-                ["sigma_x", "sigma_y", "sigma_z"].iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
+            let (names, what) = match self.said[sigma[0]].stem().contains(words::U95) {
+                true => (["u95_x", "u95_y", "u95_z"], "two standard deviations"),
+                false => (["sigma_x", "sigma_y", "sigma_z"], "one standard deviation"),
+            };
+            let lines = names.iter().zip(sigma).map(|(name, column)| self.line(name, column, Some(unit)));
             let lines: Vec<String> = lines.collect();
-            self.remarks.push(format!("{}   # CHECK: one standard deviation, if rows are to be weighted by it", lines[0]));
+            self.remarks.push(format!("{}   # CHECK: {what}, if rows are to be weighted by it", lines[0]));
             self.remarks.extend(lines.into_iter().skip(1));
         }
         let by_size = self.length_unit(&best.columns).1.then(|| "the unit, by the size of the numbers".to_string());

@@ -4,6 +4,7 @@ use super::InitRequest;
 use super::columns::{Choice, ExaminedFile, Mapping};
 use super::together::Joined;
 use crate::error::one_line;
+use crate::stage::ingest::instruments;
 use crate::yaml::quoted;
 use std::path::Path;
 
@@ -40,10 +41,20 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
         out.push_str(&file_text(file, &lacks));
     }
     joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
+    out.push_str(&instrument());
     let by_usage = found.iter().any(|file| file.get("usage").is_some());
     out.push_str(if by_usage { BY_USAGE } else { EVERY });
     out.push_str(STAGES);
     out
+}
+
+/// A line to fill in: nobody but the person knows what measured.
+fn instrument() -> String {
+    format!(
+        "      # instrument: REPLACE     # what measured the points: {}\n      #                         # or {{constant_um: 10, \
+         per_metre_um: 2.5, coverage: 2}}; without it, or sigma_x or u95 above, noise is inferred\n",
+        instruments().join(", ")
+    )
 }
 
 /// Whether no file has columns of joints, or of the measured point.

@@ -112,8 +112,10 @@ pub(super) const DIFFERENCE: [&str; 18] = [
 ];
 /// Differences that are usually target less measured point; others are measured point less target.
 pub(super) const TARGET_LESS_MEASURED: [&str; 4] = ["dif", "diff", "difference", "differenz"];
-pub(super) const SIGMA: [&str; 12] =
-    ["std", "stdev", "stddev", "sigma", "sd", "u", "unc", "uncertainty", "unsicherheit", "rms", "\u{3c3}", "s"];
+pub(super) const SIGMA: [&str; 13] =
+    ["std", "stdev", "stddev", "sigma", "sd", "u", "unc", "uncertainty", "unsicherheit", "rms", "\u{3c3}", "s", U95];
+/// What columns of uncertainties with 95 % coverage are called.
+pub(super) const U95: &str = "u95";
 
 /// What columns of points' names are called.
 pub(super) const IDS: [&str; 38] = [

@@ -34,6 +34,11 @@ pub enum ColumnShape {
     },
     /// Several numbers in one of several conventions.
     Conventions(&'static Conventions),
+    /// One number a row: so many standard deviations, unless the file says another number, of each of these settings.
+    Uncertainty {
+        of: &'static [&'static str],
+        coverage: f64,
+    },
 }
 
 /// Ways to write a quantity of several numbers.
@@ -92,6 +97,14 @@ impl DeclaredColumn {
         Self { shape: ColumnShape::Text, ..Self::number(setting, &[], Quantity::Number, [0.0, 0.0], about) }
     }
 
+    /// So many standard deviations of the settings `of`, which it stands for.
+    pub const fn uncertainty(setting: &'static str, of: &'static [&'static str], coverage: f64, about: &'static str) -> Self {
+        Self {
+            shape: ColumnShape::Uncertainty { of, coverage },
+            ..Self::number(setting, &[], Quantity::Length, [0.0, 1.0], about)
+        }
+    }
+
     pub const fn as_part(self, part: Part) -> Self {
         Self { part, ..self }
     }
@@ -107,7 +120,7 @@ impl DeclaredColumn {
     /// Numbers that reading a row of a robot with so many joints takes at most.
     pub fn numbers(&self, joints: usize) -> usize {
         match self.shape {
-            ColumnShape::Text | ColumnShape::Count => 0,
+            ColumnShape::Text | ColumnShape::Count | ColumnShape::Uncertainty { .. } => 0,
             ColumnShape::Number => 1,
             ColumnShape::Joints { .. } => joints,
             ColumnShape::Conventions(conventions) => {

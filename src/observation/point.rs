@@ -11,6 +11,10 @@ pub struct PointKind;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const SIGMAS: &[&str] = &["sigma_x", "sigma_y", "sigma_z"];
+const EXPANDED: &[&str] = &["u95_x", "u95_y", "u95_z"];
+const STANDARD: &[&str] = &["u_x", "u_y", "u_z"];
+/// Standard deviations to 95 % coverage, as certificates round them (GUM, 6.3.3).
+const TWO: f64 = 2.0;
 /// m; no tracker sees farther.
 const FAR: [f64; 2] = [-200.0, 200.0];
 
@@ -34,6 +38,24 @@ static ABOUT: KindDescription = KindDescription {
         sigma("sigma_x", &["sigma_x"], "Standard deviation of x."),
         sigma("sigma_y", &["sigma_y"], "Standard deviation of y."),
         sigma("sigma_z", &["sigma_z"], "Standard deviation of z."),
+        DeclaredColumn::uncertainty(
+            "u95",
+            SIGMAS,
+            TWO,
+            "Uncertainty of each coordinate with 95 % coverage: two standard deviations.",
+        ),
+        DeclaredColumn::uncertainty("u95_x", &["sigma_x"], TWO, "Uncertainty of x with 95 % coverage.").together(EXPANDED),
+        DeclaredColumn::uncertainty("u95_y", &["sigma_y"], TWO, "Uncertainty of y with 95 % coverage.").together(EXPANDED),
+        DeclaredColumn::uncertainty("u95_z", &["sigma_z"], TWO, "Uncertainty of z with 95 % coverage.").together(EXPANDED),
+        DeclaredColumn::uncertainty(
+            "u",
+            SIGMAS,
+            1.0,
+            "Standard uncertainty of each coordinate, or with `coverage_factor` an expanded one.",
+        ),
+        DeclaredColumn::uncertainty("u_x", &["sigma_x"], 1.0, "Standard uncertainty of x.").together(STANDARD),
+        DeclaredColumn::uncertainty("u_y", &["sigma_y"], 1.0, "Standard uncertainty of y.").together(STANDARD),
+        DeclaredColumn::uncertainty("u_z", &["sigma_z"], 1.0, "Standard uncertainty of z.").together(STANDARD),
     ],
     own_sigma: false,
     rank: Rank { places: true, rotations: false, blind: [0, 0] },

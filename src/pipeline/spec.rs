@@ -196,7 +196,8 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
             _ => Node::empty_map(node.mark),
         };
         if matches!(with.value, YamlValue::Map(_)) {
-            let (stage, files, more) = type_settings(file, with, entry);
+            let (stage, files, mut more) = type_settings(file, with, entry);
+            more.iter_mut().for_each(moved);
             (draft.stage, draft.files) = (stage, files);
             troubles.extend(more.into_iter().map(|trouble| trouble.below("with")));
         }
@@ -209,6 +210,16 @@ fn stage_names(wish: &Node) -> Option<Vec<String>> {
         YamlValue::Text(name) => Some(vec![name.clone()]),
         YamlValue::List(items) => items.iter().map(Node::text).collect(),
         _ => None,
+    }
+}
+
+/// Says where a setting went that stages no longer have.
+fn moved(trouble: &mut Trouble) {
+    if trouble.path == "tracker" && trouble.is_unknown_key() {
+        trouble.message =
+            "the instrument's noise belongs to the recording: state it once, as `instrument` of the stage `ingest`, e.g. \
+                           `instrument: leica_at960` or `instrument: {constant_um: 10, per_metre_um: 2.5, coverage: 2}`"
+                .into();
     }
 }
 

@@ -11,7 +11,7 @@ use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::pipeline::StageReport;
 use crate::robot::description::RobotDescription;
-use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::robot::{Measurements, RobotModel};
 use crate::store::{Store, TableRef};
 use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
 use nalgebra::Vector3;
@@ -62,7 +62,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let parameters: Parameters = written(store, &stage)?;
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
     let recording: Recording = read(store, &stage)?;
-    let mut data = recording.measurements(&Instrument::default());
+    let mut data = recording.measurements();
     let predicted = model.predict(&data);
     let rows = as_fitted(&mut data, &written(store, &stage)?, &predicted);
     let estimated = |name: &String| parameters.0.iter().any(|row| row.name == *name && row.status == "free");

@@ -31,7 +31,7 @@ pub struct PoseProposal<'a> {
     pub(super) warnings: Vec<String>,
 }
 
-/// mm.
+/// mm; where neither the request nor a recording says one.
 const SIGMA: f64 = 0.02;
 
 /// A robot file, and the URDF that it refers to.
@@ -62,9 +62,12 @@ pub fn proposal<'a>(
             return Err(Error::spec("--separate", format!("`{name}` cannot be told: {reason}")));
         }
     }
-    let shown = request.sigma.unwrap_or(SIGMA);
+    let mut recording = against.map(|path| recorded::recording(path, &imported)).transpose()?;
+    let usual = recording.as_ref().and_then(|(data, _)| recorded::usual_sigma(data));
+    let shown = request.sigma.or(usual.map(|sigma| sigma * 1e3)).unwrap_or(SIGMA);
     let sigma = shown * 1e-3;
-    let recording = against.map(|path| recorded::recording(path, &imported, sigma)).transpose()?;
+    // As if measured like the proposed poses: these are compared, not their instruments.
+    recording.iter_mut().for_each(|(data, _)| data.sigma = vec![Vector3::repeat(sigma); data.rows()]);
     let proposal = propose(model(), &site, &wish(request, aim, sigma)).map_err(|fault| Error::spec(place, fault))?;
     let score = |data: &Measurements| proposal.jacobian.score(&model(), data, &proposal.workspace);
     let recorded = recording.as_ref().map(|(data, _)| score(data));

@@ -1,14 +1,21 @@
 //! Recordings that proposed poses are compared with.
 
 use crate::error::{Error, Fault, Result};
+use crate::estimate::choose::median;
 use crate::robot::description::{JointKind, RobotDescription};
-use crate::robot::{Instrument, Measurements};
+use crate::robot::{Measurements, NoiseBasis};
 use crate::table::{Loose, Recording, from_file};
-use nalgebra::Vector3;
 use std::path::Path;
 
-/// Joints and payloads of a recording, as if measured with `sigma` (m) per axis, and a warning where nothing vouches for them.
-pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Result<(Measurements, Option<String>)> {
+/// The usual standard deviation of an axis, m; none where no point was measured, or nobody stated it.
+pub(super) fn usual_sigma(data: &Measurements) -> Option<f64> {
+    let measured: Vec<f64> = data.sigma.iter().flatten().copied().filter(|sigma| sigma.is_finite()).collect();
+    let stated = data.noise_basis != NoiseBasis::Inferred && !measured.is_empty();
+    stated.then(|| median(measured))
+}
+
+/// A recording, and a warning where nothing vouches for it.
+pub(super) fn recording(path: &Path, robot: &RobotDescription) -> Result<(Measurements, Option<String>)> {
     let label = path.display().to_string();
     let Loose { table, vouched } = from_file::<Recording>(path).map_err(|error| match error {
         Error::Data(faults) => Error::Data(
@@ -31,7 +38,5 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription, sigma: f64) -> Re
     if table.rows() == 0 {
         return Err(Error::data(label, "has no rows"));
     }
-    let mut data = table.measurements(&Instrument::default());
-    data.sigma = vec![Vector3::repeat(sigma); data.rows()];
-    Ok((data, warning))
+    Ok((table.measurements(), warning))
 }

@@ -276,9 +276,18 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
             ("95 % of points within", mm(after.p95_mm)),
             ("worst point", mm(after.max_mm)),
             ("rms", mm(after.rms_mm)),
-            ("rms of measurement noise alone", mm(after.noise_rms_mm)),
+            ("rms of measurement noise alone", noise(after)),
         ],
         others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
+    }
+}
+
+/// The noise, and what it rests on.
+fn noise(row: &StatisticsRow) -> String {
+    match row.noise_basis.as_deref() {
+        _ if row.is_inferred() => format!("{} (inferred: the recording states none)", mm(row.noise_rms_mm)),
+        Some(basis) => format!("{} (by {basis})", mm(row.noise_rms_mm)),
+        None => mm(row.noise_rms_mm),
     }
 }
 

@@ -80,8 +80,11 @@ impl FindingsSection {
 
 fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
     let repeatability = Unit::Arcsecond.from_si(verdict.repeatability_rad);
+    let basis = verdict.noise_basis.as_ref().map(|basis| format!(" (by {basis})")).unwrap_or_default();
+    let basis = basis.replace("by inferred", "inferred");
+    let noise = format!("{} mm{basis}", mm(verdict.noise_floor_mm));
     let facts = [
-        ("noise of one point, rms", Some(format!("{} mm", mm(verdict.noise_floor_mm)))),
+        ("noise of one point, rms", Some(noise)),
         ("left over at fitted rows, rms", Some(format!("{} mm", mm(verdict.leftover_rms_mm)))),
         ("chance that what is left is noise", verdict.p_after.map(|p| significant(p, 2))),
         ("chance that what the simulation leaves is noise", verdict.p_before.map(|p| significant(p, 2))),
@@ -94,14 +97,25 @@ fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
 fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
     let said = match verdict.verdict.as_str() {
         "explained" => "What was found brings the error of held-out points down to the noise.",
-        "nothing_missing" => "Nothing is left but noise: the simulation is complete as far as these data can tell.",
+        "nothing_missing" => "These data show nothing that the simulation lacks.",
         "not_asked" => "Too few rows were fitted to ask what the simulation lacks.",
         _ => "Something is left that the findings do not explain.",
     };
+    let said = match &verdict.statement {
+        Some(statement) => sentence_case(statement),
+        None => said.into(),
+    };
     match tables.withdrawn.iter().find(|gone| gone.step == verdict.step) {
         Some(gone) => format!("This model does not stand for the run: {gone}. {said}"),
-        None => said.into(),
+        None => said,
     }
+}
+
+/// A statement as a sentence of its own.
+fn sentence_case(statement: &str) -> String {
+    let mut letters = statement.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }
 
 /// A chance; what floating point no longer holds is not zero.

@@ -11,6 +11,7 @@ pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, jud
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points, "mean_mm": row.mean_mm, "std_mm": row.std_mm,
             "p95_mm": row.p95_mm, "max_mm": row.max_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm, "noise_rms_mm": row.noise_rms_mm,
+            "noise_basis": row.noise_basis,
         })
     });
     let findings = tables.findings.iter().flat_map(|table| &table.0).map(|row| {
@@ -34,7 +35,7 @@ pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, jud
         })
     });
     let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back().map(|row| {
-        json!({ "step": row.step, "verdict": row.verdict, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
+        json!({ "step": row.step, "verdict": row.verdict, "statement": row.statement, "noise_basis": row.noise_basis, "noise_floor_mm": row.noise_floor_mm, "before_rms_mm": row.before_rms_mm,
             "after_rms_mm": row.after_rms_mm, "not_observable": row.not_observable.lines().collect::<Vec<_>>(),
             "withdrawn": row.withdrawn.iter().flat_map(|text| text.lines()).collect::<Vec<_>>(), "clock": row.clock })
     });

@@ -1,5 +1,7 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
+use crate::robot::instrument::NoiseBasis;
+use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::robot::readings::{Named, Reading, Readings};
 use nalgebra::{Matrix3, Vector3};
 
@@ -25,6 +27,8 @@ pub struct Measurements {
     pub direction: Option<Vec<f64>>,
     /// Velocity of each joint when the point was measured, rad/s or m/s; without it the arm stood.
     pub velocity: Option<Vec<f64>>,
+    /// What `sigma` and `spread` rest on.
+    pub noise_basis: NoiseBasis,
     /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
     pub spread: Option<Vec<Matrix3<f64>>>,
     /// The target that each row measured; the tool point where rows name none.
@@ -73,9 +77,23 @@ impl Measurements {
         nearest(self.temperature.as_ref()?, row)
     }
 
-    /// What joint `joint` moved (rad or m) from the row before to this one; 0 in the first row.
+    /// The first row of the stop at which a row was measured: several targets in a row, one after the other in one pose.
+    pub fn stop(&self, row: usize) -> usize {
+        let Some(target) = &self.target else { return row };
+        let mut first = (0..row).rev().take_while(|other| self.near_pose(*other, row)).last().unwrap_or(row);
+        for other in first + 1..=row {
+            // The same target again: the arm came back to the pose.
+            if (first..other).any(|k| target.name(k) == target.name(other)) {
+                first = other;
+            }
+        }
+        first
+    }
+
+    /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
     pub fn last_move(&self, row: usize, joint: usize) -> f64 {
-        if row == 0 { 0.0 } else { self.q(row)[joint] - self.q(row - 1)[joint] }
+        let first = self.stop(row);
+        if first == 0 { 0.0 } else { self.q(first)[joint] - self.q(first - 1)[joint] }
     }
 
     /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of the rows; 0 if it never moved.
@@ -137,63 +155,16 @@ impl Measurements {
 
     /// Whether rows `a` and `b` are the same pose under the same payload.
     pub fn same_pose(&self, a: usize, b: usize) -> bool {
-        let near = |(x, y): (&f64, &f64)| (x - y).abs() < SAME_JOINT;
-        self.payload[a] == self.payload[b] && self.q(a).iter().zip(self.q(b)).all(near)
+        self.payload[a] == self.payload[b] && near(self.q(a), self.q(b), SAME)
+    }
+
+    /// The same of poses that differ by no more than a joint's return to one and the geometry of an arm is sure of.
+    pub fn near_pose(&self, a: usize, b: usize) -> bool {
+        self.payload[a] == self.payload[b] && near(self.q(a), self.q(b), NEAR)
     }
 }
 
 /// The value of a row, of the last one that has one, or of the next.
 fn nearest(all: &[f64], row: usize) -> Option<f64> {
     (0..=row).rev().chain(row + 1..all.len()).map(|k| all[k]).find(|value| value.is_finite())
-}
-
-/// Joint positions (rad or m) closer than this are one command: below any controller's resolution.
-const SAME_JOINT: f64 = 1e-9;
-
-/// The tracker's point noise: (constant + per_metre * range) / coverage is one sigma per axis.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Instrument {
-    /// Constant part of the stated noise, um.
-    #[serde(default = "constant")]
-    pub constant_um: f64,
-    /// Part that grows with range, um per metre.
-    #[serde(default = "per_metre")]
-    pub per_metre_um: f64,
-    /// How many sigmas the stated figures are.
-    #[serde(default = "coverage")]
-    pub coverage: f64,
-}
-
-// The tracker of the paper (Sec. 6): 10 um + 2.5 um/m, a 2-sigma figure.
-fn constant() -> f64 {
-    10.0
-}
-fn per_metre() -> f64 {
-    2.5
-}
-fn coverage() -> f64 {
-    2.0
-}
-
-impl Default for Instrument {
-    fn default() -> Self {
-        Self { constant_um: constant(), per_metre_um: per_metre(), coverage: coverage() }
-    }
-}
-
-impl Instrument {
-    /// One standard deviation per axis (m) at a point in the tracker's frame.
-    pub fn sigma(&self, position: &Vector3<f64>) -> f64 {
-        (self.constant_um + self.per_metre_um * position.norm()) * 1e-6 / self.coverage
-    }
-
-    /// What is wrong with the figures, if anything.
-    pub fn fault(&self) -> Option<&'static str> {
-        let fine = self.constant_um >= 0.0 && self.per_metre_um >= 0.0 && self.coverage > 0.0;
-        let something = self.constant_um + self.per_metre_um > 0.0;
-        (!fine || !something).then_some(
-            "expected a noise above zero and a coverage above zero, e.g. {constant_um: 10, per_metre_um: 2.5, coverage: 2}",
-        )
-    }
 }

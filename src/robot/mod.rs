@@ -3,19 +3,25 @@
 mod bound;
 pub mod description;
 pub mod import;
+mod instrument;
 mod measurements;
 mod model;
+pub mod pose_groups;
 mod posture;
 mod readings;
 mod rows;
 mod setup;
 mod travel;
+mod visited;
 
 pub use bound::Bound;
-pub use measurements::{Instrument, Measurements};
+pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, Published, START, SigmaSource};
+pub use measurements::Measurements;
 pub use model::RobotModel;
 pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{Named, Reading, Readings};
 pub use rows::{DhRow, DhTable};
 pub use setup::{Anchor, MeasurementSetup, Target};
 pub use travel::Travel;
+pub(crate) use visited::numbered;
+pub use visited::{Unmeasured, Visited};

@@ -3,7 +3,7 @@
 use crate::effect::{BaseFrame, Load};
 use crate::error::Result;
 use crate::estimate::{FitOptions, Fitted, Model, Prior, Session, align, changes};
-use crate::robot::{Instrument, Measurements, RobotModel};
+use crate::robot::{Measurements, RobotModel};
 use crate::stage::repeated::Repeatability;
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, RawFile, Stage, reads, writes};
@@ -20,8 +20,6 @@ pub struct Compare {
     pub previous_parameters: Option<RawFile>,
     /// Table `recording` that it was fitted to, Parquet.
     pub previous_recording: Option<RawFile>,
-    /// The tracker's noise.
-    pub tracker: Instrument,
     /// How well joints come back to a pose, as in `identify`.
     pub repeatability: Repeatability,
 }
@@ -43,7 +41,7 @@ writes! {
 impl Stage for Compare {
     const NAME: &'static str = "compare";
     const SUMMARY: &'static str = "Tests which parameters changed since an earlier recording of the same robot";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = CompareReads;
     type Writes = CompareWrites;
 
@@ -51,11 +49,7 @@ impl Stage for Compare {
         let fault = |place: &str, message: &str| crate::error::Fault::new(place, message);
         let one = self.previous_parameters.is_some() != self.previous_recording.is_some();
         let missing = one.then(|| fault("previous_recording", "`previous_parameters` and `previous_recording` go together"));
-        missing
-            .into_iter()
-            .chain(self.tracker.fault().map(|text| fault("tracker", text)))
-            .chain(self.repeatability.fault())
-            .collect()
+        missing.into_iter().chain(self.repeatability.fault()).collect()
     }
 
     fn files(&self) -> Vec<(String, RawFile)> {
@@ -160,7 +154,7 @@ impl Compare {
         split: Option<&Split>,
         context: &Context,
     ) -> Result<FittedRecording> {
-        let mut data = recording.measurements(&self.tracker);
+        let mut data = recording.measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;

@@ -22,8 +22,8 @@ pub fn suspicion(points: impl Iterator<Item = [f64; 2]>, parameters: usize) -> O
     let [rms, stated] = [error, noise].map(|sum| (sum / count as f64).sqrt());
     (FAR_BELOW.powi(2) * error < expected).then(|| {
         format!(
-            "the points miss the model by {rms:.2e} mm rms, far below the instrument's {stated:.2e} mm: they are probably computed (a target, \
-             a nominal point), not measured; check the column mapping in `ingest`, or state the `tracker`'s noise"
+            "the points miss the model by {rms:.2e} mm rms, far below the {stated:.2e} mm of the recording's noise: they are probably computed (a target, \
+             a nominal point), not measured; check the column mapping in `ingest`, or state the `instrument` there"
         )
     })
 }

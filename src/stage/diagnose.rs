@@ -3,7 +3,7 @@
 use crate::diagnose::{Question, VerdictKind as Said, against_simulation, diagnose};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
-use crate::robot::{Instrument, RobotModel};
+use crate::robot::RobotModel;
 use crate::stage::{Context, Stage, screened};
 use crate::table::{
     Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
@@ -20,9 +20,6 @@ pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
     #[serde(default = "fit_set")]
     pub on: Vec<String>,
-    /// The tracker's noise.
-    #[serde(default)]
-    pub tracker: Instrument,
 }
 
 fn fit_set() -> Vec<String> {
@@ -60,7 +57,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 9;
+    const IMPLEMENTATION: u32 = 10;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -69,14 +66,11 @@ impl Stage for Diagnose {
         if self.on.is_empty() {
             faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
         }
-        if let Some(fault) = self.tracker.fault() {
-            faults.push(Fault::new("tracker", fault));
-        }
         faults
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let asked = reads.split.rows(&reads.recording, &self.on)?;
         let mut corrected = Corrected::RobotFile;
         if let Some(simulated) = &reads.recording.simulated {

@@ -4,7 +4,7 @@ use crate::effect::Load;
 use crate::error::counted;
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect, cross_validate};
 use crate::observation::noise;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::{Context, computed, repeated, screened};
 use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
@@ -59,9 +59,6 @@ macro_rules! identification {
             /// Whether rows that no smooth model can follow (exchanged, slipped, lost, shifted, gross) are set aside and listed.
             #[serde(default = "crate::stage::identified::yes")]
             pub screen: bool,
-            /// The tracker's noise.
-            #[serde(default)]
-            pub tracker: crate::robot::Instrument,
             /// How well joints come back to a pose: `measured` from poses that the recording returns to, `ignored`, or
             /// `{arcsec: 3}`.
             #[serde(default)]
@@ -93,7 +90,6 @@ macro_rules! identification {
                     faults.push(crate::error::Fault::new("folds", format!("allowed: 0 for none, or 2 to {most}")));
                 }
                 faults.extend(self.repeatability.fault());
-                faults.extend(self.tracker.fault().map(|fault| crate::error::Fault::new("tracker", fault)));
                 faults
             }
         }
@@ -225,8 +221,9 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
         services.note(format!(
-            "{:.3} mm per axis is left beyond the instrument's {:.3} mm: this model does not explain it",
+            "{:.3} mm per axis is left beyond {} {:.3} mm: this model does not explain it",
             fitted.excess_sigma * 1e3,
+            if fitting.data.noise_basis == NoiseBasis::Inferred { "the inferred" } else { "the instrument's" },
             noise_axis * 1e3
         ));
     }

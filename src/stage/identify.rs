@@ -79,7 +79,7 @@ impl Stage for Identify {
     }
 
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
         let setting = EffectContext { base, load: self.load.into() };

@@ -12,6 +12,7 @@ mod layout;
 mod lines;
 mod mapped;
 mod motion;
+mod noise;
 mod number;
 mod pair;
 mod parquet;
@@ -24,8 +25,9 @@ mod write;
 
 pub use columns::Columns;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
-pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
+pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
 pub use motion::VelocitySettings;
+pub use noise::{InstrumentSetting, instruments};
 
 use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
@@ -53,6 +55,10 @@ pub struct Ingest {
     /// orientations or distances are mapped. Of those listed a cell may be blank where its column is `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<Vec<Axis>>,
+    /// By what points were measured, for rows that record no standard deviation: a name, e.g. `leica_at960`, or figures, e.g.
+    /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is inferred, and every figure that rests on it says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instrument: Option<InstrumentSetting>,
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
     /// takes the usual settings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -83,7 +89,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "raw delimited files -> recording, with every rejected row and its reason";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 

@@ -2,7 +2,7 @@
 
 use crate::error::{Fault, counted};
 use crate::estimate::{Model, Poses, Repeated, spread};
-use crate::robot::Measurements;
+use crate::robot::{Measurements, NoiseBasis};
 use crate::stage::Context;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,6 +43,9 @@ impl Repeatability {
             }),
         };
         data.spread = sigma.map(|sigma| spread(model, data, sigma));
+        if sigma.is_some() && *self == Self::Measured {
+            data.noise_basis = NoiseBasis::Repeats;
+        }
         sigma
     }
 }

@@ -3,7 +3,7 @@
 use crate::effect::Load;
 use crate::error::{Error, Fault, Result};
 use crate::report::{AcceptanceLimits, ReportOptions, Tables, pages};
-use crate::robot::{Instrument, RobotModel};
+use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
     Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
@@ -70,7 +70,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -141,7 +141,7 @@ impl Report {
         let (Some(parameters), Some(prediction)) = (parameters, prediction) else { return Ok(Curves::default()) };
         let robot = RobotModel::new(reads.robot.to_description()?);
         let model = parameters.table.model(robot, &[], Load::GravityTorque)?;
-        let data = reads.recording.measurements(&Instrument::default());
+        let data = reads.recording.measurements();
         curves::curves(&findings.table, &parameters.table, &model, &reads.recording, &data, &prediction.table)
     }
 }

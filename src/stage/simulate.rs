@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::{Instrument, START, SigmaSource};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
@@ -80,7 +81,7 @@ writes! {
 impl Stage for Simulate {
     const NAME: &'static str = "simulate";
     const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = SimulateReads;
     type Writes = SimulateWrites;
 
@@ -204,6 +205,13 @@ impl Simulate {
         faults
     }
 
+    /// What the tracker states of its noise; nothing where it has none, since no fit can weigh by zero.
+    fn noise(&self) -> (Instrument, SigmaSource) {
+        let Tracker { noise_um, noise_um_per_m, coverage, .. } = self.tracker;
+        let stated = Instrument { constant_um: noise_um, per_metre_um: noise_um_per_m, coverage };
+        if stated.fault().is_none() { (stated, SigmaSource::Instrument) } else { (START, SigmaSource::Inferred) }
+    }
+
     fn recording(&self, robot: &RobotDescription, shots: &[Shot]) -> Recording {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         let mut ids = Vec::with_capacity(shots.len());
@@ -213,6 +221,7 @@ impl Simulate {
             *count += 1;
             ids.push(format!("{usage}-{count:04}"));
         }
+        let (figures, source) = self.noise();
         Recording {
             joints: robot.joints.len(),
             prismatic: robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
@@ -221,8 +230,8 @@ impl Simulate {
             usage: shots.iter().map(|shot| Some(self.blocks[shot.block].usage.clone())).collect(),
             q: shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
             position: shots.iter().map(|shot| shot.position).collect(),
-            // A tracker states its noise once, not per point; whoever fits the recording states it too.
-            position_sigma: None,
+            position_sigma: Some(shots.iter().map(|shot| [figures.sigma(&shot.position.into()); 3]).collect()),
+            sigma_source: Some(vec![source; shots.len()]),
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
             payload: Some(shots.iter().map(|shot| self.blocks[shot.block].payload_kg).collect()),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),

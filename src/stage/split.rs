@@ -1,9 +1,10 @@
 //! `split`: which rows of the recording serve what. Every row belongs to exactly one named set.
 //!
 //! Neighbouring rows with the same joints are repeats of one pose: blocks and random choice keep them together, since a pose
-//! that was seen in training is no test.
+//! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted.
 
 use crate::error::{Error, Fault, Result, counted};
+use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
@@ -18,7 +19,8 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum SplitBy {
-    /// Every n-th row in the order of recording goes to `set`, the others to `rest`. Repeats of a pose are not kept together.
+    /// Every n-th row in the order of recording goes to `set`, the others to `rest`; where several targets are measured in a pose,
+    /// every n-th pose with all of them. Repeats of a pose are not kept together.
     Every {
         /// One of how many rows, from 2.
         n: u64,
@@ -104,7 +106,7 @@ writes! {
 impl Stage for SplitBy {
     const NAME: &'static str = "split";
     const SUMMARY: &'static str = "recording -> named sets of rows: every n-th, blocks, random, by usage, by order";
-    const IMPLEMENTATION: u32 = 1;
+    const IMPLEMENTATION: u32 = 2;
     type Reads = SplitReads;
     type Writes = SplitWrites;
 
@@ -216,7 +218,9 @@ impl SplitBy {
         match self {
             Self::Every { n, offset, set, rest } => {
                 let offset = offset.unwrap_or(n - 1);
-                Ok((0..rows as u64).map(|row| if row % n == offset { set.clone() } else { rest.clone() }).collect())
+                let stops = (0u64..).zip(stops(recording));
+                let dealt = stops.flat_map(|(k, stop)| std::iter::repeat_n(if k % n == offset { set } else { rest }, stop.len()));
+                Ok(dealt.cloned().collect())
             }
             Self::Blocks { count, length, sets } => {
                 let mut dealt = Vec::with_capacity(rows);
@@ -252,13 +256,32 @@ impl SplitBy {
     }
 }
 
-/// Stretches of neighbouring rows with identical joints.
+/// Rows one by one, or where targets are named, all that were measured one after the other in a pose.
+fn stops(recording: &Recording) -> Vec<Range<usize>> {
+    let mut stops: Vec<Range<usize>> = Vec::new();
+    for row in 0..recording.rows() {
+        let joins = |stop: &Range<usize>| {
+            let Some(targets) = &recording.target else { return false };
+            let new = stop.clone().all(|other| targets[other] != targets[row]);
+            new && near(recording.q(stop.start), recording.q(row), NEAR)
+        };
+        match stops.last_mut() {
+            Some(last) if joins(last) => last.end = row + 1,
+            _ => stops.push(row..row + 1),
+        }
+    }
+    stops
+}
+
+/// Stretches of neighbouring rows with the same joints, the targets of a pose together.
 fn poses(recording: &Recording) -> Vec<Range<usize>> {
     let mut poses: Vec<Range<usize>> = Vec::new();
-    for row in 0..recording.rows() {
+    for stop in stops(recording) {
+        let (named, joints) = (stop.len() > 1, recording.q(stop.start));
+        let limit = if named { NEAR } else { SAME };
         match poses.last_mut() {
-            Some(last) if recording.q(last.start) == recording.q(row) => last.end = row + 1,
-            _ => poses.push(row..row + 1),
+            Some(last) if near(recording.q(last.start), joints, limit) => last.end = stop.end,
+            _ => poses.push(stop),
         }
     }
     poses

@@ -45,7 +45,7 @@ impl Stage for Stiffness {
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {
         let robot = RobotModel::new(reads.robot.to_description()?);
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let mut model = reads.parameters.model(robot, &[JointCompliance::NAME], self.load.into())?;
         let compliance = model.stack.effects().find(|(effect, _)| effect.name() == JointCompliance::NAME);

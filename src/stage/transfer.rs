@@ -3,11 +3,12 @@
 use crate::effect::{BaseFrame, LONG_AFTER};
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, align_points};
-use crate::robot::RobotModel;
+use crate::robot::{Measurements, RobotModel, Visited};
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
-use crate::stage::{Context, Stage};
-use crate::table::{CovarianceTable, Parameters, Recording, Robot, Split};
+use crate::stage::{Context, Labelled, Stage};
+use crate::table::{CovarianceTable, ParameterRow, Parameters, Recording, Robot, Split};
+use nalgebra::Vector3;
 
 crate::stage::identified::identification! {
     /// Settings of `transfer`.
@@ -23,13 +24,14 @@ fn fit_set() -> Vec<String> {
 }
 
 crate::stage::reads! {
-    /// Input ports of [`Transfer`]: another recording with its split, and the model to try on it.
+    /// Input ports of [`Transfer`]: another recording with its split, and the model to try on it; all recordings that there are.
     pub struct TransferReads {
         robot: Robot,
         recording: Recording,
         split: Split,
         parameters: Parameters,
         covariance: Option<CovarianceTable>,
+        recordings: Vec<Labelled<Recording>>,
     }
 }
 
@@ -45,7 +47,7 @@ impl Stage for Transfer {
     }
 
     fn run(&self, reads: TransferReads, context: &Context) -> Result<Identified> {
-        let mut data = reads.recording.measurements(&self.tracker);
+        let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let earlier = reads.parameters.of_the_arm()?;
         let left = reads.parameters.0.len() - earlier.0.len();
@@ -84,6 +86,92 @@ impl Stage for Transfer {
             repeatability,
             folds: self.folds,
         };
-        Ok(Identified::of(context, &model, &fitted, &fitting))
+        let mut identified = Identified::of(context, &model, &fitted, &fitting);
+        let judges = judges(&data, &rows, &screening.kept);
+        if earlier.0.iter().any(|row| !is_geometry(row)) {
+            let geometry = geometry_alone(&earlier, &reads.robot, &data, &rows, self)?;
+            compare(context, &data, &judges, [&model.predict(&data), &geometry]);
+        }
+        let remarks = remarks(&reads.recordings, &reads.recording, &data, context);
+        identified.prediction = identified.prediction.with_remarks(remarks.into_iter());
+        Ok(identified)
     }
+}
+
+/// Effects of the rigid arm and its gears, which a model was first identified with.
+const GEOMETRY: [&str; 7] =
+    ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
+
+fn is_geometry(row: &ParameterRow) -> bool {
+    row.form.is_none() && GEOMETRY.contains(&row.effect.as_str())
+}
+
+/// Whole points by which a carried model is judged: those that did not place its base, or where there are none, all.
+fn judges(data: &Measurements, asked: &[usize], kept: &[usize]) -> Vec<usize> {
+    let others: Vec<usize> = (0..data.rows()).filter(|row| !asked.contains(row) && data.whole(*row)).collect();
+    if others.is_empty() { kept.iter().copied().filter(|row| data.whole(*row)).collect() } else { others }
+}
+
+/// What the geometry of a model predicts without what else was found, its base where these rows have it.
+fn geometry_alone(
+    earlier: &Parameters,
+    robot: &Robot,
+    data: &Measurements,
+    rows: &[usize],
+    settings: &Transfer,
+) -> Result<Vec<Vector3<f64>>> {
+    let geometry = Parameters(earlier.0.iter().filter(|row| is_geometry(row)).cloned().collect());
+    let model = geometry.model(RobotModel::new(robot.to_description()?), &[], settings.load.into())?;
+    let predicted = model.predict(data);
+    let whole = || rows.iter().copied().filter(|row| data.whole(*row));
+    let moved = align_points(
+        &whole().map(|row| predicted[row]).collect::<Vec<_>>(),
+        &whole().map(|row| data.position[row]).collect::<Vec<_>>(),
+    );
+    Ok(predicted.iter().map(|point| moved.point(point)).collect())
+}
+
+/// Beyond this the difference is not that of two ways to place a base.
+const WORSE: f64 = 1.02;
+
+/// Says where a carried model is worse than its own geometry.
+fn compare(context: &Context, data: &Measurements, judges: &[usize], [whole, geometry]: [&[Vector3<f64>]; 2]) {
+    let rms = |predicted: &[Vector3<f64>]| {
+        let squares = judges.iter().map(|row| (data.position[*row] - predicted[*row]).norm_squared());
+        (squares.sum::<f64>() / judges.len().max(1) as f64).sqrt() * 1e3
+    };
+    let (whole, geometry) = (rms(whole), rms(geometry));
+    if whole > WORSE * geometry {
+        context.services.warn(format!(
+            "the carried model leaves {whole:.3} mm rms on this recording, its geometry alone {geometry:.3} mm: what was found besides \
+             does not hold here"
+        ));
+    }
+}
+
+/// What of each row was never visited by the other recordings; nothing where there is no other.
+fn remarks(all: &[Labelled<Recording>], own: &Recording, data: &Measurements, context: &Context) -> Vec<Option<String>> {
+    let mut others = all.iter().map(|one| &one.table).filter(|table| table.q != own.q && table.joints == own.joints);
+    let Some(first) = others.next() else { return vec![None; data.rows()] };
+    let mut visited = first.measurements();
+    for more in others.map(Recording::measurements) {
+        visited.q.extend(more.q);
+        visited.position.extend(more.position);
+        visited.payload.extend(more.payload);
+        visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
+    }
+    let visited = Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>());
+    let said = |row: usize| {
+        let beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
+        (!beyond.is_empty()).then(|| beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+    };
+    let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();
+    let outside = remarks.iter().flatten().count();
+    if outside > 0 {
+        let rows = counted(data.rows(), "row");
+        context
+            .services
+            .note(format!("{outside} of {rows} lie outside of what the model was measured at: see the remarks of `prediction`"));
+    }
+    remarks
 }

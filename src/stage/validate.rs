@@ -1,6 +1,7 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
 use crate::error::{Error, Result};
+use crate::robot::NoiseBasis;
 use crate::stage::{Context, Labelled, Stage, computed, reads, writes};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
@@ -153,6 +154,7 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
     let suspects = rows.len() - without.len();
     let at = |share: f64| quantile(&error, share).unwrap_or(f64::NAN);
     let some = suspects > 0 && !without.is_empty();
+    let basis = rows.iter().filter_map(|row| NoiseBasis::parse(row.noise_basis.as_deref()?)).max();
     let average = |power: i32| without.iter().map(|e| e.powi(power)).sum::<f64>() / without.len() as f64;
     StatisticsRow {
         order,
@@ -170,6 +172,7 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         rms_y_mm: rms(|row| row.dy_mm),
         rms_z_mm: rms(|row| row.dz_mm),
         noise_rms_mm: rms(|row| row.noise_mm),
+        noise_basis: basis.map(|basis| basis.name().into()),
         expected_rms_mm: None,
         suspects: suspects as i64,
         mean_without_mm: some.then(|| average(1)),

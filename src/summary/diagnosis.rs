@@ -111,7 +111,9 @@ impl DiagnosisSummary {
         let lines = |text: &str| text.lines().map(String::from).collect::<Vec<_>>();
         json!({
             "verdict": v.verdict,
+            "statement": v.statement,
             "noise_floor_mm": v.noise_floor_mm,
+            "noise_basis": v.noise_basis,
             "before": errors(v.before_mean_mm, v.before_rms_mm, v.before_max_mm),
             "after": errors(v.after_mean_mm, v.after_rms_mm, v.after_max_mm),
             "held_out": v.held_out,
@@ -137,7 +139,10 @@ impl DiagnosisSummary {
         let v = &self.verdict;
         let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
         let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
-        let mut text = format!("{}\n\n", v.verdict.replace('_', " "));
+        let basis = v.noise_basis.as_ref().map(|basis| format!(" (noise basis: {basis})")).unwrap_or_default();
+        let mut text = format!("{}{basis}\n", v.verdict.replace('_', " "));
+        v.statement.iter().for_each(|statement| text.push_str(&format!("{statement}\n")));
+        text.push('\n');
         text.push_str(&format!("error in mm, {rows}: mean / rms / max\n"));
         for (name, mean, rms, max) in [
             ("before", v.before_mean_mm, v.before_rms_mm, v.before_max_mm),

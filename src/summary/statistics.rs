@@ -34,6 +34,11 @@ pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &S
             text.push_str(&block(title, &rows));
         }
     }
+    if rows.iter().any(StatisticsRow::is_inferred) {
+        text.push_str(
+            "expected rests on inferred noise: the recording states none, and no `instrument` is stated in `ingest`\n\n",
+        );
+    }
     text.push_str(&folds(&rows));
     text.push_str(&references(&rows));
     Ok(text)
@@ -162,6 +167,7 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points,
             "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
             "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
+            "noise_basis": row.noise_basis,
             "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
             "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
             "fold_expected_mm": row.fold_expected_mm,

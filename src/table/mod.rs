@@ -99,7 +99,7 @@ pub use network::{Network, NetworkRow};
 pub use observability::{FitContext, Observability, ObservabilityRow};
 pub use parameters::{Corrected, ParameterRow, Parameters};
 pub use prediction::{Prediction, PredictionRow};
-pub use recording::{Recording, columns as recording_columns, frame as recording_frame};
+pub use recording::{Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame};
 pub use rejected::{Rejected, RejectedRow};
 pub use robot::{Robot, RobotRow};
 pub use scoreboard::{Scoreboard, ScoreboardRow};

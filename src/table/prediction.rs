@@ -22,6 +22,8 @@ crate::table::rows! { "prediction",
         error_mm: f64,
         /// One-sigma length of the measurement noise that the row is weighted by (root of the summed variances).
         noise_mm: f64,
+        /// What `noise_mm` rests on: `repeats`, `instrument` or `inferred`; null in tables of before.
+        noise_basis: Option<String>,
         /// One-sigma length of the predicted position's uncertainty from the parameters'; null where this step does not know it.
         sigma_mm: Option<f64>,
         /// Length of the residual under a fit of this step without the row's fold, folds drawn at random by pose; null where the step
@@ -34,6 +36,8 @@ crate::table::rows! { "prediction",
         measured: Option<String>,
         /// Angle between what was measured and predicted of the orientation; null where nothing was.
         turn_rad: Option<f64>,
+        /// What of the row lies outside of where the model was measured; null inside, or where that is not known.
+        remark: Option<String>,
     }
 }
 
@@ -85,11 +89,13 @@ impl Prediction {
                     _ => residual.norm(),
                 },
                 noise_mm: noise(data, row) * 1e3,
+                noise_basis: Some(data.noise_basis.name().into()),
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
                 fold_error_mm: None,
                 block_error_mm: None,
                 measured: (!whole).then(|| measured(data, row)),
                 turn_rad: error.and_then(|error| error.angle),
+                remark: None,
             }
         });
         Self(rows.collect())
@@ -122,6 +128,12 @@ impl Prediction {
             self.0[*row].fold_error_mm = Some(fold * 1e3);
             self.0[*row].block_error_mm = Some(block * 1e3);
         }
+        self
+    }
+
+    /// The same with a remark for each row; nothing where there is none.
+    pub fn with_remarks(mut self, remarks: impl Iterator<Item = Option<String>>) -> Self {
+        self.0.iter_mut().zip(remarks).for_each(|(row, remark)| row.remark = remark);
         self
     }
 

@@ -6,7 +6,7 @@ pub use columns::columns;
 
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{Instrument, Measurements, Named};
+use crate::robot::{Measurements, Named, NoiseBasis, START, SigmaSource};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
@@ -30,8 +30,10 @@ pub struct Recording {
     pub q: Vec<f64>,
     /// Measured point in the tracker's frame, m; NaN along an axis that was not measured.
     pub position: Vec<[f64; 3]>,
-    /// Its standard deviation per axis, m, where the recording has it.
+    /// Its standard deviation per axis, m; NaN along an axis that was not measured.
     pub position_sigma: Option<Vec<[f64; 3]>>,
+    /// Where that comes from; without it, from the recording.
+    pub sigma_source: Option<Vec<SigmaSource>>,
     /// The same point by another simulation, in a frame fixed to the robot's base, m; NaN where it says nothing.
     pub simulated: Option<Vec<[f64; 3]>>,
     /// s.
@@ -65,24 +67,23 @@ impl Recording {
 }
 
 impl Recording {
-    /// What the numerics need, with the instrument's noise; where the recording has standard deviations they are added to it.
-    pub fn measurements(&self, instrument: &Instrument) -> Measurements {
+    /// What the numerics need; a point without a standard deviation has the weight that one starts from.
+    pub fn measurements(&self) -> Measurements {
         let measured = |value: &f64| if value.is_finite() { *value } else { 0.0 };
         let position: Vec<Vector3<f64>> =
             self.position.iter().map(|point| Vector3::from_iterator(point.iter().map(measured))).collect();
-        let own = |row: usize, axis: usize| match &self.position_sigma {
-            Some(all) if all[row][axis].is_finite() => all[row][axis],
-            _ => 0.0,
+        let own = |row: usize, axis: usize| self.position_sigma.as_ref().map(|all| all[row][axis]).filter(|own| *own > 0.0);
+        let there = |row: usize, axis: usize| self.position[row][axis].is_finite();
+        let sigma = |row: usize, axis: usize| match there(row, axis) {
+            true => own(row, axis).unwrap_or_else(|| START.sigma(&position[row])),
+            false => f64::INFINITY,
         };
-        let sigma = position
-            .iter()
-            .enumerate()
-            .map(|(row, point)| {
-                let sigma = |axis: usize| instrument.sigma(point).hypot(own(row, axis));
-                let there = |axis: usize| self.position[row][axis].is_finite();
-                Vector3::from_fn(|axis, _| if there(axis) { sigma(axis) } else { f64::INFINITY })
-            })
-            .collect();
+        let sigma = (0..position.len()).map(|row| Vector3::from_fn(|axis, _| sigma(row, axis))).collect();
+        let inferred = |row: usize| {
+            let source = self.sigma_source.as_ref().is_some_and(|all| all[row] == SigmaSource::Inferred);
+            (0..3).any(|axis| there(row, axis) && (source || own(row, axis).is_none()))
+        };
+        let is_inferred = (0..position.len()).any(inferred);
         let payload = match &self.payload {
             Some(all) => all.iter().map(measured).collect(),
             None => vec![0.0; self.rows()],
@@ -98,6 +99,7 @@ impl Recording {
             temperature: self.temperature.clone(),
             direction: self.direction.clone(),
             velocity: self.velocity.clone(),
+            noise_basis: if is_inferred { NoiseBasis::Inferred } else { NoiseBasis::Instrument },
             spread: None,
             target: self.target.as_ref().map(|names| named(names)),
             readings: KINDS
@@ -124,7 +126,9 @@ impl Table for Recording {
     const KIND: &'static str = "recording";
 
     fn to_frame(&self) -> Result<Frame> {
-        let texts = [("usage", Some(&self.usage)), ("target", self.target.as_ref())];
+        let named = |all: &Vec<SigmaSource>| all.iter().map(|source| Some(source.name().to_string())).collect::<Vec<_>>();
+        let source = self.sigma_source.as_ref().map(named);
+        let texts = [("usage", Some(&self.usage)), ("target", self.target.as_ref()), (SOURCE, source.as_ref())];
         let texts = texts.into_iter().filter_map(|(name, texts)| Some((name, texts?)));
         let texts = texts.chain(self.names.iter().map(|(name, names)| (*name, names)));
         let numbers = columns().filter_map(|column| Some((column, self.numbers(column)?)));
@@ -160,6 +164,11 @@ impl Table for Recording {
                 texts.insert(column.setting, frame.read(column.setting)?);
             }
         }
+        let known = |name: Option<String>| {
+            SigmaSource::ALL.into_iter().find(|source| name.as_deref() == Some(source.name())).unwrap_or(SigmaSource::Recorded)
+        };
+        let source =
+            if has(SOURCE) { Some(frame.read::<Option<String>>(SOURCE)?.into_iter().map(known).collect()) } else { None };
         let mut take = |setting: &str| numbers.remove(setting);
         let mut points = |[x, y, z]: [&str; 3]| -> Option<Vec<[f64; 3]>> {
             let axes = [take(x)?, take(y)?, take(z)?];
@@ -173,6 +182,7 @@ impl Table for Recording {
             usage: texts.remove("usage").unwrap_or_default(),
             position: points(POINT).unwrap_or_default(),
             position_sigma: points(SIGMA),
+            sigma_source: source,
             simulated: points(SIMULATED),
             q: take("q").unwrap_or_default(),
             time: take("time"),
@@ -190,6 +200,8 @@ impl Table for Recording {
 
 const POINT: [&str; 3] = ["x", "y", "z"];
 const SIGMA: [&str; 3] = ["sigma_x", "sigma_y", "sigma_z"];
+/// The column that says where standard deviations of points come from.
+pub const SOURCE: &str = "sigma_source";
 const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 
 impl Recording {

@@ -28,6 +28,8 @@ crate::table::rows! { "statistics",
         rms_z_mm: f64,
         /// Expected rms from the measurement noise alone: root mean square of `noise_mm`.
         noise_rms_mm: f64,
+        /// What that rests on: `repeats`, `instrument` or `inferred`; null in tables of before.
+        noise_basis: Option<String>,
         /// What rms to expect if the model were complete: the noise, with the parameters' own uncertainty added (held-out rows) or
         /// taken off (training rows); null where the step does not know it.
         expected_rms_mm: Option<f64>,
@@ -53,5 +55,14 @@ crate::table::rows! { "statistics",
         reference_mean_mm: Option<f64>,
         reference_std_mm: Option<f64>,
         reference_max_mm: Option<f64>,
+    }
+}
+
+use crate::robot::NoiseBasis;
+
+impl StatisticsRow {
+    /// Whether its figures of noise rest on nothing that was stated or measured again.
+    pub fn is_inferred(&self) -> bool {
+        self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
     }
 }

@@ -6,6 +6,10 @@ crate::table::rows! { "verdict",
         step: String,
         /// `explained`, `nothing_missing`, `unexplained`, or `not_asked` of too few rows.
         verdict: String,
+        /// The same in a sentence, with what its noise rests on.
+        statement: Option<String>,
+        /// `repeats`, `instrument` or `inferred`.
+        noise_basis: Option<String>,
         /// Rms length of the noise of these rows: instrument and joint repeatability.
         noise_floor_mm: f64,
         /// Whether the errors are of rows that no model has seen.
@@ -25,7 +29,7 @@ crate::table::rows! { "verdict",
         p_after: Option<f64>,
         /// Standard deviation of every joint from move to move.
         repeatability_rad: f64,
-        /// Immediate repeats of a pose that it rests on.
+        /// Repeats of a target in a pose that it rests on.
         repeats: i64,
         /// Rows that were fitted.
         points: i64,
@@ -51,6 +55,8 @@ impl Verdict {
         Self(vec![VerdictRow {
             step: step.into(),
             verdict: diagnosis.verdict.name().into(),
+            statement: Some(diagnosis.statement.clone()),
+            noise_basis: Some(diagnosis.noise_basis.name().into()),
             noise_floor_mm: diagnosis.noise_floor * 1e3,
             held_out: diagnosis.held_out,
             before_mean_mm: mm(diagnosis.before, |e| e.mean),

@@ -40,6 +40,10 @@ impl Trouble {
         };
         Self { clue: Some(Clue::Key(found.into())), ..Self::new(message) }
     }
+    /// Whether the fault is a key that is not known.
+    pub fn is_unknown_key(&self) -> bool {
+        matches!(self.clue, Some(Clue::Key(_)))
+    }
     /// Sets the place unless an inner one is known.
     pub fn at(mut self, mark: Mark) -> Self {
         self.mark.get_or_insert(mark);

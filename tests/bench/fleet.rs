@@ -1,7 +1,6 @@
 //! Many robots, Parquet in and out through the store: CPU time against that of the fits alone.
 
 use crate::problem::Case;
-use calib::robot::Instrument;
 use calib::store::key::{KEY_FORMAT, StageKey};
 use calib::store::{Account, PendingTable, Store};
 use calib::table::{Fit, FitContext, Observability, Parameters, Recording, Table};
@@ -26,7 +25,7 @@ pub fn fleet(robots: usize) -> calib::error::Result<()> {
     for (robot, table) in recordings.iter().enumerate() {
         let clock = cpu_seconds();
         let read = Recording::from_frame(&store.load(table)?)?;
-        let case = Case { data: read.measurements(&Instrument::default()), ..template.clone() };
+        let case = Case { data: read.measurements(), ..template.clone() };
         let clock = add(&mut spent, "1 read", clock);
         let (model, fitted) = case.fit();
         let clock = add(&mut spent, "2 fit", clock);

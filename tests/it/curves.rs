@@ -3,7 +3,7 @@
 use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::effect::{Effect, Form, Load};
-use calib::robot::{Instrument, RobotModel};
+use calib::robot::RobotModel;
 use calib::stage::{Labelled, Report, ReportReads};
 use calib::table::*;
 use serde_json::json;
@@ -82,8 +82,8 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
         position: vec![[0.0; 3]; ROWS],
         ..Recording::default()
     };
-    recording.position = model.predict(&recording.measurements(&Instrument::default())).into_iter().map(Into::into).collect();
-    let data = recording.measurements(&Instrument::default());
+    recording.position = model.predict(&recording.measurements()).into_iter().map(Into::into).collect();
+    let data = recording.measurements();
     let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "validate".into() };
     let split = Split((0..ROWS).map(split).collect());
     let prediction = Prediction::of("diagnose", &model, &data, &recording, &split, &[true; ROWS], None);

@@ -9,7 +9,7 @@ use crate::suspects::{Inputs, pipeline};
 use calib::effect::{Effect, Form, Load};
 use calib::estimate::choose::{Site, median};
 use calib::estimate::{FitOptions, Model, fit};
-use calib::robot::{Instrument, Measurements, RobotModel};
+use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Diagnose, DiagnoseReads};
 use calib::table::{Findings, ParameterRow, Parameters, Prediction, Recording, Robot, Verdict};
 use nalgebra::Vector3;
@@ -34,7 +34,7 @@ fn the_practice_cases_are_solved() {
         let want: Value = serde_json::from_str(&want).expect("JSON");
         let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
         let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
-        let data = inputs.recording.measurements(&stage.tracker);
+        let data = inputs.recording.measurements();
         let reads = DiagnoseReads { robot: inputs.robot, recording: inputs.recording, split: inputs.split };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
         let findings: Findings = table(&tables).remove(0);
@@ -187,7 +187,7 @@ fn what_another_simulation_knows_is_not_missing_from_it() {
     let diagnosed = |simulated: Option<Vec<[f64; 3]>>| {
         let (inputs, stage): (Inputs, Diagnose) = pipeline("case", &[("case", &case.display().to_string())], "diagnose");
         let robot = RobotModel::new(inputs.robot.to_description().expect("a robot"));
-        let data = inputs.recording.measurements(&stage.tracker);
+        let data = inputs.recording.measurements();
         let reads = DiagnoseReads { recording: inputs.recording, robot: inputs.robot, split: inputs.split };
         let reads = DiagnoseReads { recording: calib::table::Recording { simulated, ..reads.recording }, ..reads };
         let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
@@ -379,7 +379,7 @@ fn proposed_poses_tell_a_finding_from_its_rival_three_times_better_than_random_o
     let robot = table_of::<Robot>(here, "robot.robot.parquet").to_description().expect("a robot");
     let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
     let truth = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model");
-    let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements(&Instrument::default());
+    let data = table_of::<Recording>(here, "ingest.recording.parquet").measurements();
     let prediction: Prediction = table_of(here, "diagnose.prediction.parquet");
     let rows: Vec<usize> = (0..data.rows()).filter(|row| !prediction.0[*row].held_out && !prediction.0[*row].suspect).collect();
     let form = told["rival"]["form"].to_string();

@@ -2,6 +2,7 @@
 
 mod laws;
 mod level;
+mod stops;
 mod tables;
 
 use crate::fixture;

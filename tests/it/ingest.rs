@@ -3,11 +3,13 @@
 mod foreign;
 mod kinds;
 mod moving;
+mod noise;
 mod refusals;
 mod together;
 
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};
+use calib::robot::SigmaSource;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::table::{Intake, Recording, Rejected, Robot, RobotRow};
 
@@ -108,7 +110,7 @@ fn quantities_arrive_in_si_under_the_names_of_the_file() {
     assert_eq!(recording.sequence, [1, 2]);
     assert_eq!(recording.q(0), [std::f64::consts::PI, -std::f64::consts::FRAC_PI_2]);
     assert_eq!(recording.position[0], [1.0, -2.0005, 0.003]);
-    assert_eq!((&recording.time, &recording.current, &recording.position_sigma), (&None, &None, &None));
+    assert_eq!((&recording.time, &recording.current), (&None, &None));
     assert_eq!(recording.usage, [None, None]);
 }
 
@@ -228,7 +230,8 @@ fn the_ur10_recordings_are_read_to_the_last_row() {
         let taken = take(&Desk::default(), &yaml, robot("rrrrrr", 2.0)).unwrap();
         let intake = &taken.intake.0[0];
         assert_eq!((intake.lines, intake.read, intake.accepted, intake.rejected), (rows + 1, rows, rows, 0));
-        assert_eq!(taken.recording.position_sigma.is_some(), sigma);
+        let source = if sigma { SigmaSource::Recorded } else { SigmaSource::Inferred };
+        assert!(taken.recording.sigma_source.iter().flatten().filter(|own| **own == source).count() as i64 > rows - 5);
         assert_eq!(taken.recording.point_id[16], "row 17");
         if sigma {
             assert_eq!(taken.recording.q(1), [-4.08444, -2.6946, 1.69873, -2.031, 0.99275, -0.0673035]);

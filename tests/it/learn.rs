@@ -95,11 +95,13 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
             dz_mm,
             error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
             noise_mm: 0.02,
+            noise_basis: None,
             sigma_mm: None,
             fold_error_mm: None,
             block_error_mm: None,
             measured: None,
             turn_rad: None,
+            remark: None,
         });
     }
     (recording, split, prediction)

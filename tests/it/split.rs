@@ -109,3 +109,22 @@ fn faulty_settings_are_named_by_their_place() {
     assert_eq!(places("{by: random, fraction: 1.5}"), ["fraction"]);
     assert_eq!(places("{by: order, sets: [{set: a}, {set: b, rows: 0}]}"), ["sets[0].rows", "sets[1].rows"]);
 }
+
+/// Three targets a pose, whose logs differ in the last digits.
+fn targets(poses: usize) -> Recording {
+    let mut recording = recording(&(0..poses as i32).flat_map(|pose| [100 * pose; 3]).collect::<Vec<_>>());
+    recording.q.iter_mut().enumerate().for_each(|(row, q)| *q += 1e-6 * row as f64);
+    recording.target = Some((0..3 * poses).map(|row| Some(["A", "B", "C"][row % 3].into())).collect());
+    recording
+}
+
+#[test]
+fn no_choice_parts_the_targets_of_a_pose() {
+    for yaml in ["{by: every, n: 4}", "{by: random, fraction: 0.3}", "{by: blocks, count: 4, sets: [fit, fit, fit, validate]}"] {
+        let sets = sets(yaml, targets(20)).unwrap();
+        assert!(sets.chunks(3).all(|pose| pose[0] == pose[1] && pose[1] == pose[2]), "{yaml}: {sets:?}");
+        assert!(sets.iter().any(|set| set == "validate"), "{yaml}");
+    }
+    let every = sets("{by: every, n: 4}", targets(8)).unwrap();
+    assert_eq!(every.iter().filter(|set| *set == "validate").count(), 6);
+}

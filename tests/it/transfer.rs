@@ -4,13 +4,13 @@ use crate::desk::{Desk, table};
 use calib::effect::Load;
 use calib::error::Result;
 use calib::estimate::Model;
-use calib::robot::{Instrument, RobotModel};
+use calib::robot::RobotModel;
 use calib::spatial::Pose;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{
-    Context, Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads, LearnWrites, ReadRobot, RobotReads, Simulate,
-    SimulateReads, Stage, Transfer, TransferReads,
+    Context, Diagnose, DiagnoseReads, Identify, IdentifyReads, Labelled, Learn, LearnReads, LearnWrites, ReadRobot, RobotReads,
+    Simulate, SimulateReads, Stage, Transfer, TransferReads,
 };
 use calib::store::frame::Frame;
 use calib::table::{Parameters, Prediction, Recording, Robot, Split};
@@ -101,7 +101,7 @@ fn after_base(points: &[Vector3<f64>], measured: &[[f64; 3]]) -> [f64; 2] {
 
 /// Mean and largest error on the rows of `to`, mm, without and with what was learnt on `from`.
 fn carried(from: &Series, to: &Series) -> [[f64; 2]; 2] {
-    let plain = from.model.predict(&to.recording.measurements(&Instrument::default()));
+    let plain = from.model.predict(&to.recording.measurements());
     let correction = from.learnt.network.correction(&from.recording.prismatic).unwrap().expect("something was learnt");
     let corrected: Vec<Vector3<f64>> =
         plain.iter().enumerate().map(|(row, p)| p + Vector3::from(correction.at(to.recording.q(row)).delta)).collect();
@@ -117,6 +117,7 @@ fn transferred(parameters: &Parameters, to: &Series) -> Result<[f64; 2]> {
         split: to.split.clone(),
         parameters: parameters.clone(),
         covariance: None,
+        recordings: Vec::new(),
     };
     let prediction: Prediction = table(&Desk::default().run(&stage, reads)?).remove(0);
     let errors = || prediction.0.iter().map(|row| row.error_mm);
@@ -204,7 +205,14 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         *position = moved.point(&Vector3::from(*position)).into();
     }
     let stage = settings::<Transfer>(json!({"folds": 0}));
-    let reads = TransferReads { robot, recording: later, split, parameters: parameters.clone(), covariance: None };
+    let reads = TransferReads {
+        robot,
+        recording: later,
+        split,
+        parameters: parameters.clone(),
+        covariance: None,
+        recordings: Vec::new(),
+    };
     let tables = desk.run(&stage, reads).unwrap();
     let mean = unseen(&tables);
     assert!(mean < 1.2 * own, "{mean} mm, {own} mm in the recording it was identified by");
@@ -215,4 +223,56 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         assert_eq!(before.value == after.value, !base || before.status == "redundant", "{}", before.name);
         assert!(!base || after.status == "free", "{}: {}", after.name, after.status);
     }
+}
+
+#[test]
+fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is_better() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    let read = settings::<ReadRobot>(json!({"file": file}));
+    let desk = Desk::default();
+    let robot: Robot = table(&desk.run(&read, RobotReads {}).unwrap()).remove(0);
+    let (recording, split) = measured(&robot, 3);
+    let identify = settings::<Identify>(json!({"folds": 0}));
+    let reads = IdentifyReads { robot: robot.clone(), recording: recording.clone(), split: split.clone() };
+    let mut parameters: Parameters = table(&desk.run(&identify, reads).unwrap()).remove(0);
+    // Where the first joint stood on its negative side, as if nothing else had been measured.
+    let there: Vec<usize> = (0..recording.rows()).filter(|row| recording.q(*row)[0] < 0.0).collect();
+    let earlier = Recording {
+        sequence: there.iter().map(|row| recording.sequence[*row]).collect(),
+        point_id: there.iter().map(|row| recording.point_id[*row].clone()).collect(),
+        usage: vec![None; there.len()],
+        q: there.iter().flat_map(|row| recording.q(*row).to_vec()).collect(),
+        position: there.iter().map(|row| recording.position[*row]).collect(),
+        joints: recording.joints,
+        prismatic: recording.prismatic.clone(),
+        ..Recording::default()
+    };
+    let label = |stage: &str, table: Recording| Labelled { stage: stage.into(), table };
+    let carry = |parameters: &Parameters| {
+        let desk = Desk::default();
+        let reads = TransferReads {
+            robot: robot.clone(),
+            recording: recording.clone(),
+            split: split.clone(),
+            parameters: parameters.clone(),
+            covariance: None,
+            recordings: vec![label("ingest", earlier.clone()), label("later", recording.clone())],
+        };
+        let tables = desk.run(&settings::<Transfer>(json!({"folds": 0})), reads).unwrap();
+        let warnings = desk.warnings.lock().unwrap().join("\n");
+        (table::<Prediction>(&tables).remove(0), warnings)
+    };
+    let worse = "what was found besides does not hold here";
+    let (prediction, warnings) = carry(&parameters);
+    assert!(!warnings.contains(worse), "{warnings}");
+    for (row, predicted) in prediction.0.iter().enumerate() {
+        let q1 = recording.q(row)[0];
+        let beyond = predicted.remark.as_ref().is_some_and(|remark| remark.starts_with("joint 1") && remark.contains("beyond"));
+        // Two hundredths of the range on either side are still inside.
+        assert!(beyond == (q1 > 0.1) || (-0.05..0.1).contains(&q1), "{q1}: {:?}", predicted.remark);
+    }
+    let compliance = parameters.0.iter_mut().filter(|row| row.effect == "joint_compliance");
+    compliance.for_each(|row| row.value = 3e-6);
+    let (_, warnings) = carry(&parameters);
+    assert!(warnings.contains(worse), "{warnings}");
 }

@@ -1,7 +1,7 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
 use super::base_model::base_model;
-use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
+use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{Memory, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
@@ -78,7 +78,7 @@ pub(crate) struct Fitter<'a> {
     pub repeatability: JointRepeatability,
     /// Covariance of every row's point per squared joint deviation.
     spread: Vec<Matrix3<f64>>,
-    /// Whether the repeatability is that of a residual.
+    /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
     /// Noise that lasts from row to row of standing points.
     pub memory: Option<Memory>,
@@ -110,7 +110,8 @@ impl<'a> Fitter<'a> {
         let statuses = &now.fitted.statuses;
         fitter.free = Some((0..statuses.len()).filter(|k| matches!(statuses[*k], ParameterStatus::Free(_))).collect());
         fitter.spread = spreads(&now.model, &fitter.data);
-        fitter.repeatability = from_repeats(&fitter.data, &now.screening.kept, &fitter.spread);
+        let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
+        fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
         if fitter.repeatability.sigma > 0.0 {
             fitter.data.spread = Some(scaled(&fitter.spread, fitter.repeatability.sigma));
             now = fitter.fit(&base, Vec::new());
@@ -124,13 +125,18 @@ impl<'a> Fitter<'a> {
     }
 
     /// How well the joints repeat (rad) by what is left of a residual without structure, if that is news: it is asked once, and where
-    /// repeats are too few to tell.
+    /// repeats are too few to tell. Where the arm was elsewhere between repeats, by what the model leaves between those.
     pub fn noise_left_by(&self, settled: &FitState) -> Option<f64> {
-        if self.asked || self.repeatability.repeats >= REPEATS {
+        let FitState { model, fitted, screening, .. } = settled;
+        let pairs = (self.repeatability.repeats >= REPEATS).then(|| RepeatPairs::of(&self.data, &screening.kept));
+        if self.asked || pairs.as_ref().is_some_and(|pairs| !pairs.are_returns) {
             return None;
         }
-        let FitState { model, fitted, screening, .. } = settled;
-        let (now, other) = (self.repeatability.sigma, by_residual(model, fitted, &screening.kept, &self.data, &self.spread));
+        let other = match pairs {
+            Some(pairs) => pairs.repeatability(model, &self.data, &self.spread).sigma,
+            None => by_residual(model, fitted, &screening.kept, &self.data, &self.spread),
+        };
+        let now = self.repeatability.sigma;
         ((other - now).abs() > SETTLED * other.max(now)).then_some(other)
     }
 

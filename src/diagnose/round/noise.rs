@@ -2,7 +2,7 @@
 
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::estimate::{Fitted, Model};
+use crate::estimate::{Fitted, Model, Poses};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -29,25 +29,50 @@ pub(super) fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
     spread.iter().map(|matrix| matrix * (sigma * sigma)).collect()
 }
 
-/// From immediate repeats among `rows`: row i measured the pose of the row before again. `spread` as of [`spreads`].
-pub(super) fn from_repeats(data: &Measurements, rows: &[usize], spread: &[Matrix3<f64>]) -> JointRepeatability {
-    if data.in_motion(rows) {
-        // Rows of a halt tell nothing of what the joints do on the way.
-        return JointRepeatability { sigma: 0.0, repeats: 0 };
+/// Pairs of rows that measured one target in one pose again.
+pub(super) struct RepeatPairs {
+    pairs: Vec<[usize; 2]>,
+    /// Whether the arm was elsewhere between the rows of some: what changes with time or side of approach is then in their difference.
+    pub are_returns: bool,
+}
+
+impl RepeatPairs {
+    /// Right after each other, where those are enough; else also returns, those after a shorter time, which drifts spoil least.
+    pub fn of(data: &Measurements, rows: &[usize]) -> Self {
+        if data.in_motion(rows) {
+            // Rows of a halt tell nothing of what the joints do on the way.
+            return Self { pairs: Vec::new(), are_returns: false };
+        }
+        let poses = Poses::of(data, rows);
+        let pairs = poses.repeated().flat_map(|rows| rows.windows(2).map(|pair| [pair[0], pair[1]]));
+        let at_once = |[a, b]: &[usize; 2]| (a + 1..*b).all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a));
+        let (mut pairs, mut returns): (Vec<[usize; 2]>, Vec<[usize; 2]>) = pairs.partition(at_once);
+        if pairs.len() >= REPEATS || returns.is_empty() {
+            pairs.sort_unstable_by_key(|pair| pair[1]);
+            return Self { pairs, are_returns: false };
+        }
+        returns.sort_unstable_by_key(|[a, b]| (b - a, *b));
+        returns.truncate(returns.len().div_ceil(2).max(REPEATS));
+        pairs.extend(returns);
+        pairs.sort_unstable_by_key(|pair| pair[1]);
+        Self { pairs, are_returns: true }
     }
-    let pairs: Vec<(Vector3<f64>, Matrix3<f64>, Matrix3<f64>)> = rows
-        .windows(2)
-        .filter(|pair| pair[1] == pair[0] + 1 && data.same_pose(pair[0], pair[1]))
-        .map(|pair| {
+
+    /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them. `spread` as of [`spreads`].
+    pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &[Matrix3<f64>]) -> JointRepeatability {
+        let repeats = self.pairs.len();
+        if repeats < FEW {
+            return JointRepeatability { sigma: 0.0, repeats };
+        }
+        let predicted = model.predict(data);
+        let one = |[a, b]: &[usize; 2]| {
             let variance = |row: usize| Matrix3::from_diagonal(&data.sigma[row].map(|s| s * s));
-            let fixed = variance(pair[0]) + variance(pair[1]);
-            (data.position[pair[1]] - data.position[pair[0]], fixed, spread[pair[1]] * 2.0)
-        })
-        .collect();
-    if pairs.len() < FEW {
-        return JointRepeatability { sigma: 0.0, repeats: pairs.len() };
+            let known =
+                if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
+            (data.position[*b] - data.position[*a] - known, variance(*a) + variance(*b), spread[*b] * 2.0)
+        };
+        JointRepeatability { sigma: likeliest(&self.pairs.iter().map(one).collect::<Vec<_>>(), 2.0), repeats }
     }
-    JointRepeatability { sigma: likeliest(&pairs, 2.0), repeats: pairs.len() }
 }
 
 /// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.

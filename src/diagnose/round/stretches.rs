@@ -10,10 +10,10 @@ const SEARCHED: usize = 800;
 const ALONE: f64 = 1.2;
 const STRETCHES: usize = 40;
 
-/// Rows that the search looks at: all but the recording's first, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
+/// Rows that the search looks at: all but those of the recording's first stop, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
 /// that keeps no step with any design of the recording; the model is fitted to all.
-pub(super) fn thinned(rows: &[usize]) -> Vec<usize> {
-    let rows = rows.strip_prefix(&[0]).unwrap_or(rows);
+pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
+    let rows = &rows[rows.partition_point(|row| data.stop(*row) == 0)..];
     if rows.len() <= SEARCHED {
         return rows.to_vec();
     }
@@ -39,7 +39,7 @@ pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f
     let mut out = Vec::with_capacity(rows.len());
     let mut number = 0;
     for (i, row) in rows.iter().enumerate() {
-        if i > 0 && !data.same_pose(rows[i - 1], *row) {
+        if i > 0 && !data.same_pose(rows[i - 1], *row) && data.stop(*row) > rows[i - 1] {
             number += 1;
         }
         out.push(number);

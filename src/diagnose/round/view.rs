@@ -20,7 +20,7 @@ pub(crate) struct RoundView<'a> {
 impl<'a> RoundView<'a> {
     pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
         let compliance = compliance(&now.model);
-        let mut problem = WhitenedProblem::new(&now.model, &fitter.data, thinned(&now.screening.kept));
+        let mut problem = WhitenedProblem::new(&now.model, &fitter.data, thinned(&fitter.data, &now.screening.kept));
         if compliance.iter().any(|compliance| *compliance > 0.0) {
             problem = problem.with_currents();
         }

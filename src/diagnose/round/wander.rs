@@ -19,7 +19,7 @@ pub(crate) fn memory_left_by(settled: &FitState, fitter: &Fitter) -> Option<Opti
     if !fitter.may_recall(settled) {
         return None;
     }
-    let problem = WhitenedProblem::new(&settled.model, &fitter.data, thinned(&settled.screening.kept));
+    let problem = WhitenedProblem::new(&settled.model, &fitter.data, thinned(&fitter.data, &settled.screening.kept));
     let n = problem.residual_rows() as f64;
     let cost = |residual: &[f64], memory: Option<Memory>| {
         memory.unwrap_or(Memory::NONE).cost(residual, &problem.rows) + n.ln() * if memory.is_some() { 2.0 } else { 0.0 }

@@ -11,8 +11,10 @@ use crate::diagnose::misfit::{Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
+use crate::diagnose::verdict_statement::statement;
 use crate::effect::Unknown;
 use crate::estimate::{Session, cross_validate};
+use crate::robot::NoiseBasis;
 use nalgebra::Vector3;
 
 /// With structure left, a residual this much larger than the noise is not explained.
@@ -46,7 +48,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         FOLDS,
         fitter.question.seed,
     );
+    let basis = basis(fitter);
+    let ground = misfit.ground(data, basis, fitter.repeatability.repeats);
     Diagnosis {
+        statement: statement(verdict, &ground),
+        noise_basis: basis,
         verdict,
         noise_floor: misfit.noise_floor,
         before: ErrorLengths::of(data, before, &misfit.rows),
@@ -70,6 +76,16 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         screening: state.screening,
         model: state.model,
         fitted: state.fitted,
+    }
+}
+
+/// What the noise rests on: enough repeats, or what is stated where that is all of it.
+fn basis(fitter: &Fitter) -> NoiseBasis {
+    let JointRepeatability { sigma, repeats } = fitter.repeatability;
+    match fitter.data.noise_basis {
+        _ if repeats >= REPEATS => NoiseBasis::Repeats,
+        _ if sigma > 0.0 => NoiseBasis::Inferred,
+        stated => stated,
     }
 }
 

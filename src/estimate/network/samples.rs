@@ -1,9 +1,7 @@
 //! What a correction is learnt from.
 
 use super::perceptron::OUTPUTS;
-
-/// Sources (rad, m, kg) closer than this are the same: below any controller's resolution.
-const SAME: f64 = 1e-9;
+use crate::robot::pose_groups::{NEAR, grouped};
 
 /// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
 #[derive(Debug, Clone, Default)]
@@ -18,30 +16,14 @@ impl TrainingSamples {
     }
     /// The pose of each row, numbered in the order of their first rows: several targets measured in one pose share it.
     pub fn poses(&self) -> Vec<usize> {
-        let by_source = |a: &usize, b: &usize| {
-            let pairs = self.sources[*a].iter().zip(&self.sources[*b]).map(|(x, y)| x.total_cmp(y));
-            pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then).then(a.cmp(b))
-        };
-        let mut sorted: Vec<usize> = (0..self.rows()).collect();
-        sorted.sort_unstable_by(by_source);
-        let same = |a: &usize, b: &usize| self.sources[*a].iter().zip(&self.sources[*b]).all(|(x, y)| (x - y).abs() < SAME);
-        let mut first = vec![0; self.rows()];
-        for pose in sorted.chunk_by(same) {
-            let least = pose.iter().min().copied().unwrap_or(0);
-            pose.iter().for_each(|row| first[*row] = least);
+        let rows: Vec<usize> = (0..self.rows()).collect();
+        let mut number = vec![0; self.rows()];
+        // A payload (kg) as near as joints (rad, m) are is the same one.
+        let poses = grouped(&rows, |row| &self.sources[row], NEAR, |_, _| true);
+        for (pose, rows) in poses.iter().enumerate() {
+            rows.iter().for_each(|row| number[*row] = pose);
         }
-        let mut number = vec![usize::MAX; self.rows()];
-        let mut count = 0;
-        first
-            .into_iter()
-            .enumerate()
-            .map(|(row, first)| {
-                if first == row {
-                    (number[row], count) = (count, count + 1);
-                }
-                number[first]
-            })
-            .collect()
+        number
     }
 
     pub fn pick(&self, rows: &[usize]) -> Self {

@@ -34,7 +34,7 @@ const ZERO: f64 = 1e-4;
 const BETTER: f64 = 4.0;
 /// Of all rows whose joints fit a point, so many nearest in the recording are looked at: enough for any number of repeats.
 const CANDIDATES: usize = 64;
-/// Rows in a row that make a shifted block or an event.
+/// Stops in a row that make a shifted block or an event; a stop is a row, or all targets that were measured in one pose.
 const RUN: usize = 3;
 /// A run of this length is no coincidence of outliers even where every tenth row is one.
 const LONG_RUN: usize = 6;
@@ -61,7 +61,7 @@ pub(super) fn name(
     let fits: BTreeMap<usize, Vec<(usize, f64)>> =
         moved.iter().map(|row| (*row, index.fits(data, standings, *row, limit))).collect();
     exchange(&fits, &mut kinds);
-    shift(&fits, &mut kinds);
+    shift(data, &fits, &mut kinds);
     for (row, candidates) in &fits {
         let nearest = candidates.iter().min_by(|a, b| a.1.total_cmp(&b.1));
         if let (false, Some((partner, _))) = (kinds.contains_key(row), nearest) {
@@ -72,7 +72,7 @@ pub(super) fn name(
     for run in runs(&unexplained) {
         let kind = match beyond_the_log(run, &kinds, standings.len()) {
             Some(offset) => SuspectKind::ShiftedBlock(offset),
-            None if is_event(run, standings) => SuspectKind::Event,
+            None if is_event(data, run, standings) => SuspectKind::Event,
             None => SuspectKind::Outlier,
         };
         kinds.extend(run.iter().map(|row| (*row, (kind, None))));
@@ -152,7 +152,7 @@ fn exchange(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
 
 /// Runs of rows whose points all belong to the joints the same number of rows away; a row at the end of a run that belongs to
 /// a row of it closes the circle.
-fn shift(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
+fn shift(data: &Measurements, fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
     let offsets = |row: usize| -> BTreeSet<i64> {
         fits.get(&row).into_iter().flatten().map(|(other, _)| *other as i64 - row as i64).collect()
     };
@@ -170,7 +170,7 @@ fn shift(fits: &BTreeMap<usize, Vec<(usize, f64)>>, kinds: &mut Kinds) {
             end += 1;
         }
         let (first, last) = (rows[at], rows[end - 1]);
-        if end - at >= RUN
+        if stops(data, &rows[at..end]) >= RUN
             && let Some(offset) = common.into_iter().min_by_key(|offset| (offset.abs(), *offset))
         {
             let to = |row: usize| usize::try_from(row as i64 + offset).ok();
@@ -205,8 +205,14 @@ fn beyond_the_log(run: &[usize], kinds: &Kinds, rows: usize) -> Option<i64> {
     (!run.iter().any(|row| logged(*row))).then_some(offset)
 }
 
-fn is_event(run: &[usize], standings: &[LeaveOneOut]) -> bool {
+/// So many stops of the arm some rows are of.
+pub(super) fn stops(data: &Measurements, rows: &[usize]) -> usize {
+    rows.iter().map(|row| data.stop(*row)).collect::<BTreeSet<usize>>().len()
+}
+
+fn is_event(data: &Measurements, run: &[usize], standings: &[LeaveOneOut]) -> bool {
     let sizes = run.iter().map(|row| standings[*row].residual.norm());
     let (least, most) = sizes.fold((f64::INFINITY, 0.0f64), |(least, most), size| (least.min(size), most.max(size)));
-    run.len() >= LONG_RUN || run.len() >= RUN && most <= ALIKE * least
+    let stops = stops(data, run);
+    stops >= LONG_RUN || stops >= RUN && most <= ALIKE * least
 }

@@ -149,8 +149,9 @@ fn screen(
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);
     let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();
-    let named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
-    let crowded = crowded(&named, set);
+    let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
+    named.extend(beside(data, &named));
+    let crowded = crowded(data, &named, set);
     let mut crowd = 0;
     let mut suspects = Vec::new();
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
@@ -199,14 +200,33 @@ fn bulk(standings: &[LeaveOneOut]) -> Vec<f64> {
     standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
 }
 
-/// Sets with more unexplained rows than mistakes would make.
-fn crowded(named: &[(usize, SuspectKind, Option<usize>)], set: &[usize]) -> BTreeSet<usize> {
+/// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
+fn beside(data: &Measurements, named: &[Named]) -> Vec<Named> {
+    let off: Vec<usize> = named.iter().filter(|(_, kind, _)| *kind == SuspectKind::Outlier).map(|(row, ..)| *row).collect();
+    let listed = |row: &usize| named.iter().any(|(other, ..)| other == row);
+    let mut found = Vec::new();
+    for stop in off.chunk_by(|a, b| data.stop(*a) == data.stop(*b)).filter(|stop| stop.len() > 1) {
+        let first = data.stop(stop[0]);
+        let rows: Vec<usize> = (first..data.rows()).take_while(|row| data.stop(*row) == first).collect();
+        if 2 * stop.len() > rows.len() {
+            found.extend(rows.into_iter().filter(|row| !listed(row)).map(|row| (row, SuspectKind::Outlier, None)));
+        }
+    }
+    found
+}
+
+/// A row that stands out, why, and its partner.
+type Named = (usize, SuspectKind, Option<usize>);
+
+/// Sets with more stops of unexplained rows than mistakes would make.
+fn crowded(data: &Measurements, named: &[Named], set: &[usize]) -> BTreeSet<usize> {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     sets.into_iter()
         .filter(|number| {
-            let all = set.iter().filter(|of| *of == number).count() as f64;
-            let unexplained =
-                named.iter().filter(|(row, kind, _)| set[*row] == *number && *kind == SuspectKind::Outlier).count() as f64;
+            let stops = |rows: &[usize]| kind::stops(data, rows) as f64;
+            let all = stops(&(0..set.len()).filter(|row| set[*row] == *number).collect::<Vec<_>>());
+            let outlier = |(row, kind, _): &&Named| set[*row] == *number && *kind == SuspectKind::Outlier;
+            let unexplained = stops(&named.iter().filter(outlier).map(|(row, ..)| *row).collect::<Vec<_>>());
             unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
         })
         .collect()

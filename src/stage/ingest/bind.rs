@@ -1,6 +1,7 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::RobotJoints;
+use super::columns::Columns;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
 use crate::error::{Error, Fault, Result, counted, nearest};
@@ -47,6 +48,8 @@ pub(super) struct NumberBinding {
     /// A direction: 1, -1 or 0.
     pub is_direction: bool,
     pub optional: bool,
+    /// What the file's number is divided by: how many standard deviations an uncertainty is.
+    pub divisor: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
     pub name: String,
     /// What is added to it.
@@ -125,6 +128,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
             binder.binding.cells.push(NumberBinding { optional: scalar.optional, difference, ..cell });
         }
     }
+    binder.uncertainties(columns, arm)?;
     for (declared, conventions, mapped) in columns.conventions() {
         let Some((convention, references)) = mapped.chosen(conventions) else { continue };
         let unit = unit(mapped.unit.as_deref())?;
@@ -229,11 +233,29 @@ impl Binder<'_> {
         }
         text
     }
+    /// Uncertainties, each as the standard deviations that it stands for.
+    fn uncertainties(&mut self, columns: &Columns, arm: &RobotJoints) -> Result<()> {
+        for (declared, mapped, of, divisor) in columns.uncertainties() {
+            let unit = unit(mapped.unit.as_deref())?;
+            let places: Vec<usize> = of.iter().map(|setting| arm.slots.of(setting).start).collect();
+            if let Some(value) = mapped.value {
+                self.binding.constants.extend(places.into_iter().map(|index| (index, unit.to_si(value) / divisor)));
+            } else if let Some(reference) = &mapped.column
+                && let Some(column) = self.column(reference, declared.setting, mapped.optional)
+            {
+                for index in places {
+                    let cell = self.cell(declared, false, index, column, unit);
+                    self.binding.cells.push(NumberBinding { optional: mapped.optional, divisor, ..cell });
+                }
+            }
+        }
+        Ok(())
+    }
     /// A cell that may not be blank.
     fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
         let (quantity, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
-        NumberBinding { index, column, unit, range, is_direction, optional: false, name, difference: None }
+        NumberBinding { index, column, unit, range, is_direction, optional: false, divisor: 1.0, name, difference: None }
     }
     fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &RobotJoints) -> Result<()> {
         let name = declared.setting;

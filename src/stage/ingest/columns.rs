@@ -1,6 +1,6 @@
 //! Which column of a file holds which quantity: the block `columns`, by the columns that a recording declares.
 
-use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn};
+use super::mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
 use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
 use crate::table::recording_columns;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -24,6 +24,7 @@ enum Mapped {
     Number(ScalarColumn),
     Joints(JointColumns),
     Conventions(ConventionColumns),
+    Uncertainty(UncertaintyColumn),
 }
 
 macro_rules! mapped {
@@ -77,6 +78,18 @@ impl Columns {
     ) -> impl Iterator<Item = (&'static DeclaredColumn, &'static Conventions, &ConventionColumns)> {
         self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
             (ColumnShape::Conventions(conventions), Mapped::Conventions(mapped)) => Some((*column, conventions, mapped)),
+            _ => None,
+        })
+    }
+
+    /// The mapped uncertainties, with the settings that each stands for and how many standard deviations it is.
+    pub(super) fn uncertainties(
+        &self,
+    ) -> impl Iterator<Item = (&'static DeclaredColumn, &UncertaintyColumn, &'static [&'static str], f64)> {
+        self.0.iter().filter_map(|(column, mapped)| match (column.shape, mapped) {
+            (ColumnShape::Uncertainty { of, coverage }, Mapped::Uncertainty(mapped)) => {
+                Some((*column, mapped, of, mapped.coverage_factor.unwrap_or(coverage)))
+            }
             _ => None,
         })
     }
@@ -152,6 +165,7 @@ impl<'de> Visitor<'de> for Block {
                 ColumnShape::Count => access.next_value::<Option<_>>()?.map(Mapped::Count),
                 ColumnShape::Number => access.next_value::<Option<_>>()?.map(Mapped::Number),
                 ColumnShape::Joints { .. } => access.next_value::<Option<_>>()?.map(Mapped::Joints),
+                ColumnShape::Uncertainty { .. } => access.next_value::<Option<_>>()?.map(Mapped::Uncertainty),
                 ColumnShape::Conventions(_) => access.next_value_seed(OneConvention(column))?.map(Mapped::Conventions),
             };
             if mapped.is_some_and(|mapped| found.insert(column.setting, mapped).is_some()) {
@@ -224,6 +238,7 @@ impl JsonSchema for Columns {
                 ColumnShape::Count => generator.subschema_for::<Option<CountColumn>>(),
                 ColumnShape::Number => generator.subschema_for::<Option<ScalarColumn>>(),
                 ColumnShape::Joints { .. } => generator.subschema_for::<Option<JointColumns>>(),
+                ColumnShape::Uncertainty { .. } => generator.subschema_for::<Option<UncertaintyColumn>>(),
                 ColumnShape::Conventions(conventions) => {
                     let block = convention_schema(column.setting, conventions, generator);
                     generator.definitions_mut().insert(conventions.name.into(), block.to_value());

@@ -101,6 +101,27 @@ pub struct ScalarColumn {
     pub optional: bool,
 }
 
+/// A column of uncertainties, or the same uncertainty for every row of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UncertaintyColumn {
+    /// Name or number of the column.
+    #[serde(default)]
+    pub column: Option<ColumnRef>,
+    /// The uncertainty of every row, instead of a column.
+    #[serde(default)]
+    pub value: Option<f64>,
+    /// Unit of the file's numbers, e.g. `mm`.
+    #[serde(default)]
+    pub unit: Option<String>,
+    /// How many standard deviations the numbers are; without it 2 for `u95`, 1 for `u`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coverage_factor: Option<f64>,
+    /// The column may be missing from the file, and its cells may be blank.
+    #[serde(default)]
+    pub optional: bool,
+}
+
 /// Columns of numbers, one for each joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

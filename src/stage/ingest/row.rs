@@ -143,6 +143,7 @@ impl RowReader<'_> {
                 let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
                 value += other.sign * other.unit.to_si(added);
             }
+            value /= cell.divisor;
             let joint = cell.index.wrapping_sub(self.arm.slots.q.start);
             if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > TURNS {
                 row.turned.get_or_insert((joint, value));
@@ -154,7 +155,7 @@ impl RowReader<'_> {
                 let allowed = if direction {
                     "1, -1 or 0".to_string()
                 } else {
-                    format!("{} to {} {unit}", round(unit.from_si(lower)), round(unit.from_si(upper)))
+                    format!("{} to {} {unit}", round(unit.from_si(lower)), round(unit.from_si(cell.divisor * upper)))
                 };
                 let text = |column: usize| shown(record, column);
                 let found = match &cell.difference {

@@ -2,15 +2,17 @@
 
 use super::arm::RobotJoints;
 use super::layout::{FileLayout, Join};
+use super::noise::NoiseSlots;
 use super::pair::{FileDecision, NONE};
 use super::reading::{OpenedFile, ProgressCounter};
 use super::row::{Reason, RecordedRow, RowRefusal};
 use super::scan::Scan;
 use super::{Ingest, verdict};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::observation::{KINDS, Part};
+use crate::robot::{START, SigmaSource};
 use crate::stage::{Context, Sink, StreamedTable};
-use crate::table::{Recording, Rejected, RejectedRow, Table, recording_frame};
+use crate::table::{Recording, Rejected, RejectedRow, SIGMA_SOURCE, Table, recording_frame};
 use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
@@ -171,6 +173,11 @@ struct Chunks<'a> {
     texts: Vec<(&'static str, Option<Vec<Option<String>>>)>,
     numbers: Vec<Stored>,
     merged: Vec<f64>,
+    noise: NoiseSlots,
+    /// Where the standard deviation of each row's point comes from; none where no file has points.
+    sources: Option<Vec<SigmaSource>>,
+    /// Rows without a stated noise.
+    inferred: u64,
     /// The file with the joints.
     moving: usize,
     /// The farthest that joints were carried to the moment of their point, s.
@@ -193,10 +200,15 @@ impl<'a> Chunks<'a> {
         if decided.settings.motion.is_some() {
             has[slots.velocity.clone()].fill(true);
         }
+        let noise = NoiseSlots::new(slots, decided.settings.instrument);
         let files = &decided.settings.files;
+        let points = || KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
+        let measured = files.iter().any(|file| points().any(|column| file.columns.has(column.setting)));
+        if measured {
+            noise.sigma().into_iter().for_each(|place| has[place] = true);
+        }
         // Every recording has points and the names of its rows.
-        let always: Vec<&str> =
-            KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value)).map(|column| column.setting).collect();
+        let always: Vec<&str> = points().map(|column| column.setting).collect();
         let text = |name: &&'static str| {
             let named = *name == "usage" || files.iter().any(|file| file.columns.has(name));
             (*name, named.then(Vec::new))
@@ -216,6 +228,9 @@ impl<'a> Chunks<'a> {
             texts: slots.texts().iter().map(text).collect(),
             numbers,
             merged: Vec::new(),
+            noise,
+            sources: measured.then(Vec::new),
+            inferred: 0,
             moving: files.iter().position(|file| file.columns.has("q")).unwrap_or_default(),
             carried: 0.0,
             last_sequence: None,
@@ -244,6 +259,11 @@ impl<'a> Chunks<'a> {
             }
         }
         self.carry(decided, index, row, fate);
+        let source = self.noise.fill(&mut self.merged);
+        if let Some(sources) = &mut self.sources {
+            self.inferred += u64::from(source == SigmaSource::Inferred);
+            sources.push(source);
+        }
         let number = self.before + row.number;
         let sequence = row.sequence.unwrap_or(number as i64);
         if let Some(last) = self.last_sequence.replace(sequence)
@@ -294,6 +314,8 @@ impl<'a> Chunks<'a> {
     }
     fn flush(&mut self) -> Result<()> {
         let texts = self.texts.iter_mut().filter_map(|(name, texts)| Some((*name, std::mem::take(texts.as_mut()?))));
+        let source = self.sources.as_mut().map(|all| (SIGMA_SOURCE, all.drain(..).map(|one| Some(one.name().into())).collect()));
+        let texts = texts.chain(source);
         let numbers = self.numbers.iter().map(|Stored { name, unit, values, .. }| (name.clone(), *unit, values.iter()));
         let frame = recording_frame(std::mem::take(&mut self.sequence), std::mem::take(&mut self.ids), texts, numbers)?;
         self.numbers.iter_mut().for_each(|stored| stored.values.clear());
@@ -308,6 +330,14 @@ impl<'a> Chunks<'a> {
             context
                 .services
                 .note(format!("joints were carried by their velocity to the moment of their point, over {ms:.2} ms at most"));
+        }
+        if self.inferred > 0 {
+            let (rows, least) = (counted(self.inferred, "row"), START);
+            context.services.note(format!(
+                "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, and what figures rest on it is \
+                 inferred; say `instrument`, or map sigma_x or u95",
+                least.constant_um, least.per_metre_um, least.coverage
+            ));
         }
         Ok(StreamedTable::new(self.sink.finish()?))
     }

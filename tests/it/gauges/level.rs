@@ -7,7 +7,7 @@ use crate::fixture;
 use crate::identify::normal;
 use crate::ingest::robot;
 use calib::estimate::{Fitted, Model, ParameterStatus};
-use calib::robot::{Instrument, Measurements};
+use calib::robot::Measurements;
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::table::Recording;
 use nalgebra::Vector3;
@@ -62,11 +62,11 @@ fn a_level_beside_a_tracker_sharpens_the_estimate() {
     let all = truth.rows(300);
     let rows = upright(&all);
     let fresh = select(&all, &rows[20..]);
-    let tracker = Instrument { constant_um: SIGMA * 1e6, per_metre_um: 0.0, coverage: 1.0 };
     let mut sums = [[0.0; 2]; 2];
     for seed in 0..6 {
-        let recording = ingested(&select(&all, &rows[..14]), seed);
-        let both = recording.measurements(&tracker);
+        let mut recording = ingested(&select(&all, &rows[..14]), seed);
+        recording.position_sigma = Some(vec![[SIGMA; 3]; recording.rows()]);
+        let both = recording.measurements();
         let points = Measurements { readings: Vec::new(), ..both.clone() };
         for (sum, data) in sums.iter_mut().zip([points, both]) {
             let (model, fitted) = truth.fit(&data, |_| true);
@@ -89,7 +89,7 @@ fn a_level_alone_finds_the_offsets_of_joints_that_tilt_it() {
     let so: BTreeMap<&str, f64> = specs.iter().map(|spec| spec.name.as_str()).zip(truth.model.x.clone()).collect();
     let all = truth.rows(200);
     let recording = ingested(&select(&all, &upright(&all)), 1);
-    let mut data = recording.measurements(&Instrument::default());
+    let mut data = recording.measurements();
     data.position.fill(Vector3::zeros());
     data.sigma.fill(Vector3::repeat(f64::INFINITY));
     let (model, fitted) = truth.fit(&data, |name| is_offset(name) || name.starts_with("tool_offset.r"));

@@ -76,7 +76,7 @@ fn a_model_read_back_from_its_table_measures_what_was_measured() {
     assert!((x + 60.0).abs() < 1.5 && (y + 80.0).abs() < 1.5, "{x} mm, {y} mm");
     assert!((placed("anchor.N.x") - 4000.0).abs() < 0.5, "{} mm", placed("anchor.N.x"));
     let model = parameters.model(RobotModel::new(description), &[], Load::GravityTorque).expect("a model");
-    let own = recording.measurements(&Default::default());
+    let own = recording.measurements();
     let errors = model.row_errors(&own);
     let prediction = table::<Prediction>(&tables).remove(0);
     for (row, error) in prediction.0.iter().zip(&errors) {

@@ -22,11 +22,13 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         dz_mm,
         error_mm: (dx_mm * dx_mm + dy_mm * dy_mm + dz_mm * dz_mm).sqrt(),
         noise_mm: 0.03 + 0.01 * (sequence % 2) as f64,
+        noise_basis: None,
         sigma_mm: None,
         fold_error_mm: None,
         block_error_mm: None,
         measured: None,
         turn_rad: None,
+        remark: None,
     }
 }
 
@@ -136,6 +138,8 @@ fn verdict() -> Verdict {
     Verdict(vec![VerdictRow {
         step: "diagnose".into(),
         verdict: "explained".into(),
+        statement: None,
+        noise_basis: Some("repeats".into()),
         noise_floor_mm: 0.035,
         held_out: true,
         before_mean_mm: Some(0.31),

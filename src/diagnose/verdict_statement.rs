@@ -1,0 +1,160 @@
+//! The verdict in a sentence that claims no more than its noise does: known by repeats, stated by the instrument, or inferred.
+
+use crate::diagnose::types::VerdictKind;
+use crate::error::counted;
+use crate::robot::NoiseBasis;
+
+/// What a verdict rests on; lengths of a point's error, rms, m.
+pub(crate) struct Ground {
+    pub basis: NoiseBasis,
+    /// Repeats that the noise was learnt from.
+    pub repeats: usize,
+    /// The noise of all that moves a point at random.
+    pub noise: f64,
+    /// What the instrument explains of it; none where neither it nor standard deviations were stated.
+    pub instrument: Option<f64>,
+    /// What is left at fitted rows.
+    pub left: f64,
+    /// Whether the arm moved while it was measured: no pose can be measured twice.
+    pub in_motion: bool,
+}
+
+impl Ground {
+    /// Names the noise with its size and where that is from.
+    fn of_noise(&self) -> String {
+        match self.basis {
+            NoiseBasis::Repeats => format!("the noise that {} show, {} um", counted(self.repeats, "repeat"), um(self.noise)),
+            NoiseBasis::Instrument => format!("the noise that the instrument states, {} um", um(self.noise)),
+            NoiseBasis::Inferred => format!("{}: {}", self.at_random(), self.advice()),
+        }
+    }
+
+    /// What scatters without a reason that was measured or stated.
+    fn at_random(&self) -> String {
+        let scatter = um(self.scatter());
+        match self.instrument {
+            Some(instrument) => format!("{scatter} um scatter at random, of which the instrument explains {}", um(instrument)),
+            None => format!("{scatter} um scatter at random, and no instrument is stated that explains any of it"),
+        }
+    }
+
+    /// Without a stated instrument the noise is but a weight: what is left is what scatters.
+    fn scatter(&self) -> f64 {
+        if self.instrument.is_some() { self.noise } else { self.left }
+    }
+
+    fn advice(&self) -> &'static str {
+        match (self.instrument.is_some(), self.in_motion) {
+            (true, false) => "measure ten poses twice",
+            (true, true) => "measure ten poses twice with the arm at rest",
+            (false, false) => "state `instrument` in `ingest`, and measure ten poses twice",
+            (false, true) => "state `instrument` in `ingest`",
+        }
+    }
+}
+
+/// The verdict in a sentence without its full stop.
+pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
+    let inferred = ground.basis == NoiseBasis::Inferred;
+    match verdict {
+        VerdictKind::NothingMissing if inferred => format!("nothing found; {}", ground.of_noise()),
+        VerdictKind::NothingMissing => format!("nothing found; what is left is {}", ground.of_noise()),
+        VerdictKind::Explained if inferred => format!("what was found explains the error but for noise; {}", ground.of_noise()),
+        VerdictKind::Explained => format!("what was found explains the error; what is left is {}", ground.of_noise()),
+        VerdictKind::Unexplained if inferred => {
+            format!("{} um are left that the findings do not explain; {}", um(ground.left), ground.of_noise())
+        }
+        VerdictKind::Unexplained => {
+            format!("{} um are left that the findings do not explain, beside {}", um(ground.left), ground.of_noise())
+        }
+        VerdictKind::NotAsked => "too few rows were fitted to ask what the simulation lacks".into(),
+    }
+}
+
+/// Micrometres, with a decimal where there are few.
+fn um(metres: f64) -> String {
+    let um = metres * 1e6;
+    if um < 9.95 { format!("{um:.1}") } else { format!("{um:.0}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ground(basis: NoiseBasis, instrument: Option<f64>) -> Ground {
+        Ground { basis, repeats: 24, noise: 31e-6, instrument, left: 32e-6, in_motion: false }
+    }
+
+    #[test]
+    fn nothing_found_says_what_its_noise_rests_on() {
+        let said = |basis, instrument| statement(VerdictKind::NothingMissing, &ground(basis, instrument));
+        assert_eq!(
+            said(NoiseBasis::Repeats, Some(17e-6)),
+            "nothing found; what is left is the noise that 24 repeats show, 31 um"
+        );
+        assert_eq!(
+            said(NoiseBasis::Instrument, Some(17e-6)),
+            "nothing found; what is left is the noise that the instrument states, 31 um"
+        );
+        assert_eq!(
+            said(NoiseBasis::Inferred, Some(17e-6)),
+            "nothing found; 31 um scatter at random, of which the instrument explains 17: measure ten poses twice"
+        );
+        assert_eq!(
+            said(NoiseBasis::Inferred, None),
+            "nothing found; 32 um scatter at random, and no instrument is stated that explains any of it: state `instrument` in \
+             `ingest`, and measure ten poses twice"
+        );
+    }
+
+    #[test]
+    fn findings_and_what_they_leave_say_what_their_noise_rests_on() {
+        let said = |verdict, basis| statement(verdict, &ground(basis, Some(8.2e-6)));
+        for (verdict, basis, sentence) in [
+            (
+                VerdictKind::Explained,
+                NoiseBasis::Repeats,
+                "what was found explains the error; what is left is the noise that 24 repeats show, 31 um",
+            ),
+            (
+                VerdictKind::Explained,
+                NoiseBasis::Instrument,
+                "what was found explains the error; what is left is the noise that the instrument states, 31 um",
+            ),
+            (
+                VerdictKind::Explained,
+                NoiseBasis::Inferred,
+                "what was found explains the error but for noise; 31 um scatter at random, of which the instrument explains 8.2: \
+                 measure ten poses twice",
+            ),
+            (
+                VerdictKind::Unexplained,
+                NoiseBasis::Repeats,
+                "32 um are left that the findings do not explain, beside the noise that 24 repeats show, 31 um",
+            ),
+            (
+                VerdictKind::Unexplained,
+                NoiseBasis::Instrument,
+                "32 um are left that the findings do not explain, beside the noise that the instrument states, 31 um",
+            ),
+            (
+                VerdictKind::Unexplained,
+                NoiseBasis::Inferred,
+                "32 um are left that the findings do not explain; 31 um scatter at random, of which the instrument explains 8.2: \
+                 measure ten poses twice",
+            ),
+        ] {
+            assert_eq!(said(verdict, basis), sentence);
+        }
+    }
+
+    #[test]
+    fn with_an_inferred_noise_nothing_is_ever_said_to_be_complete() {
+        for verdict in [VerdictKind::NothingMissing, VerdictKind::Explained, VerdictKind::Unexplained] {
+            for instrument in [None, Some(17e-6)] {
+                let said = statement(verdict, &ground(NoiseBasis::Inferred, instrument));
+                assert!(said.contains("scatter at random") && !said.contains("nothing is missing"), "{said}");
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Instruments: how far a measured point scatters, as makers publish it or as a person states it in numbers.
+//!
+//! One sigma of every axis is (constant + per_metre * range) / coverage. Where a maker states a maximum permissible error (MPE) the
+//! divisor is 2: makers call half of it typical (Leica AT500 manual, 2.8.1). A calibration certificate says more than any of these.
+
+use nalgebra::Vector3;
+
+/// Noise of a point by its range.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Instrument {
+    /// Constant part of the stated figure, um.
+    pub constant_um: f64,
+    /// Part that grows with range, um per metre.
+    pub per_metre_um: f64,
+    /// How many sigmas the stated figures are; the divisor.
+    pub coverage: f64,
+}
+
+/// An instrument by its name, with the document that states its figures.
+#[derive(Debug, Clone, Copy)]
+pub struct Published {
+    pub name: &'static str,
+    pub figures: Instrument,
+    pub source: &'static str,
+}
+
+const fn published(name: &'static str, [constant_um, per_metre_um, coverage]: [f64; 3], source: &'static str) -> Published {
+    Published { name, figures: Instrument { constant_um, per_metre_um, coverage }, source }
+}
+
+/// What may be named, one line each: constant part (um), growth (um/m) and divisor, and where they stand.
+pub const INSTRUMENTS: &[Published] = &[
+    published("api_radian", [10.0, 5.0, 2.0], "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma"),
+    published("faro_vantage", [20.0, 5.0, 2.0], "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE"),
+    published("leica_at402", [15.0, 6.0, 2.0], "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE"),
+    published(
+        "leica_at500",
+        [15.0, 6.0, 2.0],
+        "Leica, AT500, user manual, 2.8.2: transverse 15 um + 6 um/m, MPE by ISO 10360-10:2021",
+    ),
+    published("leica_at960", [15.0, 6.0, 2.0], "Leica, AT960, product sheet: U(x, y, z) 15 um + 6 um/m, MPE"),
+    published(
+        "mocap_optitrack",
+        [100.0, 0.0, 2.0],
+        "OptiTrack, PrimeX 41, data sheet: 3-D accuracy +-0.10 mm; its extreme counts as MPE",
+    ),
+];
+
+/// The weight to start from where a recording states neither standard deviations nor an instrument: a laser tracker of 10 um + 2.5 um/m,
+/// two sigma (Wang et al. 2020, Sec. 6). How far such points scatter is then inferred from what a model leaves.
+pub const START: Instrument = Instrument { constant_um: 10.0, per_metre_um: 2.5, coverage: 2.0 };
+
+impl Instrument {
+    /// The figures of an instrument by name.
+    pub fn named(name: &str) -> Option<Self> {
+        INSTRUMENTS.iter().find(|known| known.name == name).map(|known| known.figures)
+    }
+
+    /// One standard deviation per axis (m) at a point in the tracker's frame.
+    pub fn sigma(&self, position: &Vector3<f64>) -> f64 {
+        (self.constant_um + self.per_metre_um * position.norm()) * 1e-6 / self.coverage
+    }
+
+    /// What is wrong with the figures, if anything.
+    pub fn fault(&self) -> Option<&'static str> {
+        let fine = self.constant_um >= 0.0 && self.per_metre_um >= 0.0 && self.coverage > 0.0;
+        let something = self.constant_um + self.per_metre_um > 0.0;
+        (!fine || !something).then_some(
+            "expected a noise above zero and a coverage above zero, e.g. {constant_um: 10, per_metre_um: 2.5, coverage: 2}",
+        )
+    }
+}
+
+/// Where the standard deviation of a row's point comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SigmaSource {
+    /// The recording states it.
+    Recorded,
+    /// By the instrument that was named.
+    Instrument,
+    /// Neither: [`START`].
+    Inferred,
+}
+
+impl SigmaSource {
+    pub const ALL: [Self; 3] = [Self::Recorded, Self::Instrument, Self::Inferred];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Recorded => "recorded",
+            Self::Instrument => "instrument",
+            Self::Inferred => "inferred",
+        }
+    }
+}
+
+/// What figures of noise rest on, the firmest first.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NoiseBasis {
+    /// Poses that were measured again.
+    Repeats,
+    /// Standard deviations that were recorded, or an instrument that was stated.
+    #[default]
+    Instrument,
+    /// What a model leaves.
+    Inferred,
+}
+
+impl NoiseBasis {
+    pub const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Repeats => "repeats",
+            Self::Instrument => "instrument",
+            Self::Inferred => "inferred",
+        }
+    }
+
+    pub fn parse(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|basis| basis.name() == name)
+    }
+}
