@@ -3,7 +3,7 @@
 use crate::effect::{BaseFrame, Load};
 use crate::error::Result;
 use crate::estimate::{FitOptions, Fitted, Model, Prior, Session, align, changes};
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::repeated::Repeatability;
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, RawFile, Stage, reads, writes};
@@ -156,6 +156,10 @@ impl Compare {
     ) -> Result<FittedRecording> {
         let mut data = recording.measurements();
         let rows: Vec<usize> = (0..data.rows()).collect();
+        if data.noise_basis == NoiseBasis::Inferred {
+            let which = if split.is_some() { "this" } else { "the earlier" };
+            context.services.note(format!("{which} recording states no noise: rows are weighted by an inferred one"));
+        }
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;
         let base: Vec<usize> = model.stack.parameters_of(BaseFrame::NAME).collect();

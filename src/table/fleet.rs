@@ -24,6 +24,8 @@ crate::table::rows! { "fleet",
         after_max_mm: Option<f64>,
         /// Rms length of the noise alone.
         floor_mm: Option<f64>,
+        /// What that rests on: `repeats`, `instrument` or `inferred`.
+        noise_basis: Option<String>,
         /// Rms error after every step, mm, separated by blanks.
         course: Option<String>,
         verdict: Option<String>,

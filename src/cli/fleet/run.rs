@@ -222,7 +222,7 @@ fn document(
     let robots = fleet.roster.0.iter().zip(records).zip(&told.fleet.0).map(|((robot, record), row)| {
         json!({
             "robot": robot.name, "status": row.status, "reason": row.reason, "exit_code": record.as_ref().map(|r| r.exit_code),
-            "before_rms_mm": row.before_rms_mm, "after_rms_mm": row.after_rms_mm, "floor_mm": row.floor_mm,
+            "before_rms_mm": row.before_rms_mm, "after_rms_mm": row.after_rms_mm, "floor_mm": row.floor_mm, "noise_basis": row.noise_basis,
             "verdict": row.verdict, "causes": row.causes, "flags": row.flags, "run": record.as_ref().and_then(|r| r.run.clone()),
         })
     });

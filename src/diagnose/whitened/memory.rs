@@ -35,9 +35,9 @@ impl Memory {
         residual.iter_mut().for_each(|value| *value = value.clamp(-GROSS * scale, GROSS * scale));
     }
 
-    /// -2 ln of the likelihood of whitened residuals, three a row, up to a constant and with their scale estimated.
-    pub fn cost(self, residual: &[f64], rows: &[usize]) -> f64 {
-        self.filter(rows).cost(residual)
+    /// How much wanders and for how long: the share times the autocorrelation time.
+    pub fn wander(self) -> f64 {
+        self.share * (1.0 + self.lasts) / (1.0 - self.lasts)
     }
 
     /// Rows of the recording, ascending.
@@ -79,12 +79,9 @@ impl Innovations {
         }
     }
 
-    fn cost(&self, column: &[f64]) -> f64 {
-        let mut innovations = column.to_vec();
-        self.apply(&mut innovations);
-        let square: f64 = innovations.iter().map(|value| value * value).sum();
-        let n = innovations.len() as f64;
-        n * (square / n).ln() + 3.0 * self.0.iter().map(|step| step.whole.ln()).sum::<f64>()
+    /// ln of the determinant of the points' covariance, three a row.
+    pub fn determinant(&self) -> f64 {
+        3.0 * self.0.iter().map(|step| step.whole.ln()).sum::<f64>()
     }
 }
 
@@ -131,16 +128,21 @@ mod tests {
     }
 
     #[test]
-    fn the_likeliest_memory_is_that_of_the_noise() {
+    fn innovations_have_the_likelihood_of_the_noise() {
         let rows: Vec<usize> = (0..80).collect();
-        let likeliest = |noise: &[f64]| {
-            let cost = |memory: &Option<Memory>| memory.unwrap_or(Memory::NONE).cost(noise, &rows);
-            Memory::all().min_by(|a, b| cost(a).total_cmp(&cost(b))).flatten()
+        let cost = |memory: Memory, noise: &[f64]| {
+            let (mut column, innovations) = (noise.to_vec(), memory.filter(&rows));
+            innovations.apply(&mut column);
+            column.iter().map(|value| value * value).sum::<f64>() + innovations.determinant()
         };
-        let found = likeliest(&noise(80, 0.9, 1.0)).expect("memory");
+        let likeliest = |noise: &[f64]| {
+            let all = Memory::all().map(|memory| memory.unwrap_or(Memory::NONE));
+            all.min_by(|a, b| cost(*a, noise).total_cmp(&cost(*b, noise))).expect("some")
+        };
+        let found = likeliest(&noise(80, 0.9, 1.0));
         assert!((0.8..=0.96).contains(&found.lasts) && found.share > 0.6, "{found:?}");
         let white = noise(80, 0.0, 0.0);
-        let gain = Memory::NONE.cost(&white, &rows) - likeliest(&white).unwrap_or(Memory::NONE).cost(&white, &rows);
+        let gain = cost(Memory::NONE, &white) - cost(likeliest(&white), &white);
         assert!(gain < 8.0, "{gain}");
     }
 }

@@ -4,12 +4,11 @@ use super::Ingest;
 use super::columns::Columns;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
-use super::noise::InstrumentSetting;
+use super::noise;
 use crate::error::{Fault, counted, nearest};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
-use std::collections::BTreeMap;
 
 /// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
 fn needed(settings: &Ingest) -> Vec<&'static str> {
@@ -40,10 +39,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
     }
     together(settings, &mut faults);
     motion_faults(settings, &mut faults);
-    uncertainty_faults(settings, &mut faults);
-    if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument {
-        faults.extend(figures.fault().map(|fault| Fault::new("instrument", fault)));
-    }
+    faults.extend(noise::faults(settings));
     faults
 }
 
@@ -342,28 +338,6 @@ fn optional_key(file: &FileLayout, key: &str) -> bool {
     let id = file.columns.text("point_id").is_some_and(|id| id.optional);
     let time = file.columns.number("time").is_some_and(|time| time.optional || time.column.is_none());
     if key == "time" { time } else { id }
-}
-
-/// A standard deviation is stated once: as such, or by an uncertainty; in files that are joined by one of them.
-fn uncertainty_faults(settings: &Ingest, faults: &mut Vec<Fault>) {
-    let appended = settings.join == Some(Join::Append {});
-    let mut stated: BTreeMap<&str, &str> = BTreeMap::new();
-    for (index, file) in settings.files.iter().enumerate() {
-        if appended {
-            stated.clear();
-        }
-        let own = file.columns.numbers().filter(|(declared, _)| declared.part == Part::Sigma);
-        let own = own.map(|(declared, _)| (declared.setting, declared.setting));
-        let by = file.columns.uncertainties();
-        let by = by.flat_map(|(declared, _, of, _)| of.iter().map(|setting| (*setting, declared.setting)));
-        for (sigma, setting) in own.chain(by) {
-            if let Some(other) = stated.insert(sigma, setting).filter(|other| *other != setting) {
-                let message = format!("states the standard deviation that `{other}` states already; map one of them");
-                faults.push(Fault::new(format!("files[{index}].columns.{setting}"), message));
-            }
-        }
-    }
-    faults.dedup();
 }
 
 /// Velocities by the joints over time need both in one file.

@@ -1,6 +1,10 @@
 //! The noise of the recording: standard deviations as they were recorded, else by the instrument, else a weight to start from.
 
+use super::Ingest;
+use super::layout::Join;
 use super::slots::Slots;
+use crate::error::Fault;
+use crate::observation::Part;
 use crate::robot::{INSTRUMENTS, Instrument, START, SigmaSource};
 use nalgebra::Vector3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -8,6 +12,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// The instrument by which points were measured: its name, or its figures.
@@ -79,6 +84,34 @@ impl JsonSchema for InstrumentSetting {
     }
 }
 
+/// What is wrong with how noise is stated: a standard deviation is stated once, as such or by an uncertainty; in files that are
+/// joined by one of them.
+pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if let Some(InstrumentSetting::Figures(figures)) = &settings.instrument {
+        faults.extend(figures.fault().map(|fault| Fault::new("instrument", fault)));
+    }
+    let appended = settings.join == Some(Join::Append {});
+    let mut stated: BTreeMap<&str, &str> = BTreeMap::new();
+    for (index, file) in settings.files.iter().enumerate() {
+        if appended {
+            stated.clear();
+        }
+        let own = file.columns.numbers().filter(|(declared, _)| declared.part == Part::Sigma);
+        let own = own.map(|(declared, _)| (declared.setting, declared.setting));
+        let by = file.columns.uncertainties();
+        let by = by.flat_map(|(declared, _, of, _)| of.iter().map(|setting| (*setting, declared.setting)));
+        for (sigma, setting) in own.chain(by) {
+            if let Some(other) = stated.insert(sigma, setting).filter(|other| *other != setting) {
+                let message = format!("states the standard deviation that `{other}` states already; map one of them");
+                faults.push(Fault::new(format!("files[{index}].columns.{setting}"), message));
+            }
+        }
+    }
+    faults.dedup();
+    faults
+}
+
 /// Where a row's point and its standard deviations are.
 pub(super) struct NoiseSlots {
     point: [usize; 3],
@@ -113,7 +146,7 @@ impl NoiseSlots {
         for (axis, place) in point.iter().zip(self.sigma) {
             if axis.is_nan() {
                 values[place] = f64::NAN;
-            } else if !(values[place] > 0.0) {
+            } else if values[place].is_nan() || values[place] <= 0.0 {
                 // None was recorded, or zero, which nothing measures to.
                 values[place] = figures.sigma(&whole);
                 source = source.max(otherwise);

@@ -25,6 +25,7 @@ fn row(number: usize) -> FleetRow {
         after_rms_mm: some(after),
         after_max_mm: some(after * 2.0),
         floor_mm: some(0.015),
+        noise_basis: Some("instrument".into()),
         course: Some(format!("2.0000 0.3000 {after:.4}")),
         verdict: Some("explained".into()),
         findings: Some(1),
