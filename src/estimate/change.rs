@@ -5,20 +5,10 @@
 //! taken in as long as they explain more than chance; sigmas include what the earlier recording did not know.
 
 use super::factor::TriangularFactor;
-use super::fit::Fitted;
-use super::model::Model;
 use super::problem::Problem;
+use super::session::Session;
 use crate::effect::BaseFrame;
-use crate::robot::Measurements;
 use faer::Mat;
-
-/// A recording with the model fitted to it; both models of a comparison have the same parameters.
-pub struct Session<'a> {
-    pub data: &'a Measurements,
-    pub rows: &'a [usize],
-    pub model: &'a Model,
-    pub fitted: &'a Fitted,
-}
 
 /// A parameter's step from one recording to the other, SI.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +32,7 @@ const DISTINCT: f64 = 1e-6;
 /// Steps nearly as good as the best: an earlier one in the list is the better known cause.
 const TIE: f64 = 0.99;
 
-/// Tests every parameter but the base's, in order of precedence.
+/// Tests every parameter but the base's, in order of precedence; both models have the same parameters.
 pub fn changes(before: &Session, after: &Session, precedence: impl Fn(usize) -> usize) -> Vec<ParameterChange> {
     let stack = &before.model.stack;
     let base: Vec<usize> = stack.parameters_of(BaseFrame::NAME).collect();

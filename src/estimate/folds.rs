@@ -10,6 +10,7 @@ use super::model::Model;
 use super::problem::Problem;
 use super::repeats::Poses;
 use super::row_error::row_error;
+use super::session::Session;
 use super::term::ObservationTerm;
 use crate::observation::KINDS;
 use crate::robot::Measurements;
@@ -40,16 +41,9 @@ pub struct Folds {
 /// Takes `2 * count` parts of its rows off a fit, each in turn. `None` where the poses are too few for it.
 ///
 /// What the whole fit saw is estimated; which rows were set aside is taken over.
-pub fn cross_validate(
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-    count: usize,
-    seed: u64,
-) -> Option<Folds> {
+pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds> {
+    let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
-    let whole = Whole { model, data, rows, fitted };
     let order = whole.divisible(&parts, count)?;
     let blocks = deal(&order, rows.len(), count);
     let random = at_random(order, rows.len(), count, seed);
@@ -69,16 +63,9 @@ pub(crate) enum FoldKind {
 }
 
 /// One kind of [`Folds`] alone.
-pub(crate) fn folds_of(
-    kind: FoldKind,
-    model: &Model,
-    data: &Measurements,
-    rows: &[usize],
-    fitted: &Fitted,
-    count: usize,
-) -> Option<Vec<f64>> {
+pub(crate) fn folds_of(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<f64>> {
+    let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
-    let whole = Whole { model, data, rows, fitted };
     let order = whole.divisible(&parts, count)?;
     let folds = match kind {
         FoldKind::Random(seed) => at_random(order, rows.len(), count, seed),
@@ -94,15 +81,7 @@ fn at_random(mut order: Vec<&Vec<usize>>, rows: usize, count: usize, seed: u64) 
     deal(&order, rows, count)
 }
 
-/// A fit to all of its rows.
-struct Whole<'a> {
-    model: &'a Model,
-    data: &'a Measurements,
-    rows: &'a [usize],
-    fitted: &'a Fitted,
-}
-
-impl Whole<'_> {
+impl Session<'_> {
     fn candidates(&self) -> Vec<usize> {
         let estimated = |k: &usize| matches!(self.fitted.statuses[*k], ParameterStatus::Free(_) | ParameterStatus::Bound(_));
         (0..self.fitted.statuses.len()).filter(estimated).collect()

@@ -2,7 +2,7 @@
 
 use crate::effect::Load;
 use crate::error::counted;
-use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Suspect, cross_validate};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect, cross_validate};
 use crate::observation::noise;
 use crate::robot::{Measurements, RobotModel};
 use crate::stage::advice::advice;
@@ -168,7 +168,8 @@ impl Identified {
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
         let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
-        let folds = cross_validate(model, fitting.data, fitting.rows, fitted, fitting.folds, context.seed);
+        let folds =
+            cross_validate(&Session { data: fitting.data, rows: fitting.rows, model, fitted }, fitting.folds, context.seed);
         let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));

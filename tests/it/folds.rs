@@ -4,7 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{FitOptions, Fitted, Folds, Model, align, cross_validate, fit};
+use calib::estimate::{FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit};
 use calib::robot::{Measurements, RobotModel};
 use calib::stage::{Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
@@ -20,7 +20,7 @@ fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
 fn folds(data: &Measurements, effects: &[&str], count: usize) -> Option<Folds> {
     let (model, fitted) = identify(data, effects);
     let rows: Vec<usize> = (0..data.rows()).collect();
-    cross_validate(&model, data, &rows, &fitted, count, 7)
+    cross_validate(&Session { data, rows: &rows, model: &model, fitted: &fitted }, count, 7)
 }
 
 fn rms(errors: &[f64]) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
-use crate::estimate::{FoldKind, autocorrelation_time, folds_of};
+use crate::estimate::{FoldKind, Session, autocorrelation_time, folds_of};
 use std::collections::BTreeMap;
 
 /// Parts of the rows that were fitted, the same for every model that is compared.
@@ -35,7 +35,7 @@ impl FoldErrors {
         // Where noise lasts, its neighbours in time would lend a row what wanders: whole stretches are left out.
         let random = FoldKind::Random(fitter.question.seed);
         let kind = if fitter.memory.is_some() { FoldKind::Blocks } else { random };
-        let errors = folds_of(kind, &now.model, data, rows, &now.fitted, FOLDS)?;
+        let errors = folds_of(kind, &Session { data, rows, model: &now.model, fitted: &now.fitted }, FOLDS)?;
         let squares = rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
         Some(Self { squares, moving: data.in_motion(rows) })
     }

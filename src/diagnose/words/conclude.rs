@@ -11,7 +11,7 @@ use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::effect::Unknown;
-use crate::estimate::cross_validate;
+use crate::estimate::{Session, cross_validate};
 use nalgebra::Vector3;
 
 /// With structure left, a residual this much larger than the noise is not explained.
@@ -39,7 +39,11 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(fitter.memory.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
-    let folds = cross_validate(&state.model, data, &state.screening.kept, &state.fitted, FOLDS, fitter.question.seed);
+    let folds = cross_validate(
+        &Session { data, rows: &state.screening.kept, model: &state.model, fitted: &state.fitted },
+        FOLDS,
+        fitter.question.seed,
+    );
     Diagnosis {
         verdict,
         noise_floor: misfit.noise_floor,
