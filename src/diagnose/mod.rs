@@ -24,14 +24,14 @@ pub use outside::against_simulation;
 pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
 pub use types::{
-    Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Question, RivalCause, SpectrumLine,
-    VerdictKind,
+    Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question, RivalCause,
+    SpectrumLine, VerdictKind,
 };
 pub use words::other_means;
 
 use judge::{ModelComparison, judge};
 use locate::locate;
-use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView};
+use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, memory_left_by};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
@@ -61,7 +61,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = next;
             continue;
         }
-        if let Some(memory) = fitter.memory_left_by(&next) {
+        if let Some(memory) = memory_left_by(&next, &fitter) {
             fitter.recall(memory);
             tell(words::of_the_memory(&fitter));
             now = fitter.fit(&next.model, Vec::new());

@@ -48,6 +48,19 @@ pub struct RivalCause {
     pub effect: &'static str,
     pub place: Place,
     pub delta_bic: f64,
+    /// That it is this cause and not the finding's, see [`Probabilities`].
+    pub probability: f64,
+}
+
+/// How probable it is that a finding is what it is called; with those of its rivals, `name` and `none` add up to one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Probabilities {
+    /// That it is the named effect at the named place.
+    pub name: f64,
+    /// That it acts at the named place, whatever it is.
+    pub place: f64,
+    /// That it is neither what it is called nor any of the rivals.
+    pub none: f64,
 }
 
 /// A cause of what the base model leaves.
@@ -60,6 +73,7 @@ pub struct Finding {
     /// None for faults of single rows.
     pub evidence: Option<Evidence>,
     pub rivals: Vec<RivalCause>,
+    pub probabilities: Probabilities,
     /// Joint (from 0) and range (rad) over which it holds, for joint errors.
     pub valid: Option<(usize, [f64; 2])>,
     pub forms: Vec<Form>,

@@ -24,6 +24,11 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
     }
 }
 
+/// The unit behind a number; none of ratios.
+fn unit(number: &ParameterEstimate) -> String {
+    if number.unit == "1" { String::new() } else { format!(" {}", number.unit) }
+}
+
 /// A finding: its place, its forms and their fitted numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Summary<'a> {
@@ -54,12 +59,12 @@ impl<'a> Summary<'a> {
 
     /// The first number with its unit.
     pub(super) fn value(&self) -> String {
-        self.parameters.first().map_or_else(String::new, |n| format!("{:.3e} {}", n.value, n.unit))
+        self.parameters.first().map_or_else(String::new, |n| format!("{:.3e}{}", n.value, unit(n)))
     }
 
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
-        self.parameters.first().map_or_else(String::new, |n| format!("{} {}", figure(n.value.abs(), 0), n.unit))
+        self.parameters.first().map_or_else(String::new, |n| format!("{}{}", figure(n.value.abs(), 0), unit(n)))
     }
 
     /// When the first term of a cause changes, if it does.

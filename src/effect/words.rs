@@ -21,23 +21,28 @@ pub fn figure(value: f64, decimals: usize) -> String {
 /// Below this, zeros are hard to count.
 const SMALL: f64 = 1e-4;
 
+/// A clock that shows more than this (s, a year) counts since an epoch, not since the recording began.
+const EPOCH: f64 = 3e7;
+
 /// What counts time in a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Clock {
-    Seconds,
+    /// What the clock shows at the recording's first row.
+    Seconds { first: f64 },
     /// No time was recorded: the order of the rows stands for it.
     Rows,
 }
 
 impl Clock {
     pub fn of(data: &Measurements) -> Self {
-        if data.has_clock() { Self::Seconds } else { Self::Rows }
+        let times = data.time.iter().flatten().copied().filter(|time| time.is_finite());
+        times.reduce(f64::min).map_or(Self::Rows, |first| Self::Seconds { first })
     }
 
     /// What time is called: `time`, or `row`.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Seconds => "time",
+            Self::Seconds { .. } => "time",
             Self::Rows => "row",
         }
     }
@@ -47,10 +52,12 @@ impl Clock {
         if variable == Variable::Time { self.name().into() } else { variable.to_string() }
     }
 
-    /// When something changed for good: ` at 447 s`, or the first row (from 1) after it.
+    /// When something changed for good: ` at 447 s`, of a clock that counts since an epoch after the first row, or the first row (from 1)
+    /// after it.
     pub fn since(self, time: f64) -> String {
         match self {
-            Self::Seconds => format!(" at {} s", figure(time, 0)),
+            Self::Seconds { first } if first.abs() > EPOCH => format!(" {} s after the first row", figure(time - first, 0)),
+            Self::Seconds { .. } => format!(" at {} s", figure(time, 0)),
             Self::Rows => format!(" from row {:.0}", time.floor() + 2.0),
         }
     }
@@ -58,7 +65,7 @@ impl Clock {
     /// A length of time.
     pub fn span(self, length: f64) -> String {
         match self {
-            Self::Seconds => format!("{} s", figure(length, 0)),
+            Self::Seconds { .. } => format!("{} s", figure(length, 0)),
             Self::Rows => format!("{} rows", figure(length, 0)),
         }
     }
@@ -79,7 +86,9 @@ mod tests {
     fn rows_count_where_no_clock_ran() {
         // Between the 290th and the 291st row, which are numbers 289 and 290 from 0.
         assert_eq!(Clock::Rows.since(289.5), " from row 291");
-        assert_eq!(Clock::Seconds.since(289.5), " at 290 s");
-        assert_eq!([Clock::Rows.span(173.2), Clock::Seconds.span(3.21)], ["173 rows", "3.2 s"]);
+        let clock = Clock::Seconds { first: 12.0 };
+        assert_eq!(clock.since(289.5), " at 290 s");
+        assert_eq!([Clock::Rows.span(173.2), clock.span(3.21)], ["173 rows", "3.2 s"]);
+        assert_eq!(Clock::Seconds { first: 1_709_564_908.0 }.since(1_709_565_355.2), " 447 s after the first row");
     }
 }

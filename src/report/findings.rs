@@ -4,7 +4,7 @@ use super::Tables;
 use super::axis::{Area, Scale, baseline, label, name_x, name_y};
 use super::number::{count, mm, significant};
 use super::svg::Svg;
-use crate::table::{CurveRow, FindingRow, VerdictRow};
+use crate::table::{CurveRow, FindingRow, RivalRow, VerdictRow};
 use crate::units::Unit;
 use serde::Serialize;
 
@@ -112,7 +112,15 @@ fn chance(p: f64) -> String {
 fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
     let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
     let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
+    let share = |p: Option<f64>| p.map(|p| format!("{p:.2}"));
     let evidence = [
+        (
+            "probability of the name",
+            share(row.probability),
+            "that it is this effect at this place; what is missing to 1 is below",
+        ),
+        ("of the place", share(row.place_probability), "that it acts at this place, whatever it is"),
+        ("of none", share(row.none_probability), "that it is neither this effect nor any that is named beside it"),
         ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
         ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
         ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),
@@ -142,10 +150,15 @@ fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
             })
             .collect(),
         evidence: evidence.into_iter().filter_map(|(name, value, meaning)| Some((name, value?, meaning))).collect(),
-        rivals: rivals.map(|r| format!("{} at {} (BIC {} from it)", r.effect, r.place, significant(r.delta_bic, 2))).collect(),
+        rivals: rivals.map(rival).collect(),
         valid,
         pictures: pictures(row, &curve),
     }
+}
+
+fn rival(row: &RivalRow) -> String {
+    let probability = row.probability.map(|p| format!("probability {p:.2}, ")).unwrap_or_default();
+    format!("{} at {} ({probability}BIC {} from it)", row.effect, row.place, significant(row.delta_bic, 2))
 }
 
 /// Before with the fitted curve and its band, and after on the same scales.

@@ -18,9 +18,10 @@ pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, jud
         let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
         json!({
             "rank": row.rank, "effect": row.effect, "where": row.place, "statement": row.statement,
+            "probability": row.probability, "place_probability": row.place_probability, "none_probability": row.none_probability,
             "numbers": numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma })).collect::<Vec<_>>(),
             "evidence": { "f_statistic": row.f_statistic, "p_value": row.p_value, "delta_bic": row.delta_bic, "heldout_gain_mm": row.heldout_gain_mm },
-            "rivals": rivals.map(|r| json!({ "effect": r.effect, "where": r.place, "delta_bic": r.delta_bic })).collect::<Vec<_>>(),
+            "rivals": rivals.map(|r| json!({ "effect": r.effect, "where": r.place, "delta_bic": r.delta_bic, "probability": r.probability })).collect::<Vec<_>>(),
         })
     });
     let parameters = tables.parameters.0.iter().map(|row| {

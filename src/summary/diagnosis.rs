@@ -32,6 +32,11 @@ fn table<T: Table + Default>(stage: &StageReport, store: &Store) -> Result<T> {
     own.map_or_else(|| Ok(T::default()), |output| T::from_frame(&store.load(&output.table)?))
 }
 
+fn rival_words(rival: &RivalRow) -> String {
+    let probability = rival.probability.map(|value| format!(" {value:.2}")).unwrap_or_default();
+    format!("{} at {}{probability}", rival.effect, rival.place)
+}
+
 impl DiagnosisSummary {
     /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
@@ -84,7 +89,7 @@ impl DiagnosisSummary {
             let numbers = numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma }));
             let rivals = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank);
             let rivals =
-                rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic }));
+                rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic, "probability": rival.probability }));
             let valid = match (finding.valid_joint, finding.valid_from_rad, finding.valid_to_rad) {
                 (Some(joint), Some(from), Some(to)) => {
                     json!({ format!("q{joint}_deg"): [from.to_degrees(), to.to_degrees()] })
@@ -93,6 +98,8 @@ impl DiagnosisSummary {
             };
             json!({
                 "effect": finding.effect, "where": finding.place, "statement": finding.statement,
+                "probability": finding.probability, "place_probability": finding.place_probability,
+                "none_probability": finding.none_probability,
                 "parameters": numbers.collect::<Vec<_>>(),
                 "evidence": {
                     "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
@@ -151,11 +158,15 @@ impl DiagnosisSummary {
         }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));
-            let rivals: Vec<String> = (self.rivals.0.iter().filter(|rival| rival.rank == finding.rank))
-                .map(|rival| format!("{} at {}", rival.effect, rival.place))
-                .collect();
+            if let (Some(name), Some(place), Some(none)) =
+                (finding.probability, finding.place_probability, finding.none_probability)
+            {
+                let (effect, at) = (&finding.effect, &finding.place);
+                text.push_str(&format!("   probability: {effect} {name:.2}, at {at} {place:.2}, none of the names {none:.2}\n"));
+            }
+            let rivals: Vec<String> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).map(rival_words).collect();
             if !rivals.is_empty() {
-                text.push_str(&format!("   these data cannot tell it from: {}\n", rivals.join(", ")));
+                text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }
         }
         for line in v.withdrawn.iter().flat_map(|text| text.lines()) {

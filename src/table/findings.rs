@@ -22,6 +22,10 @@ crate::table::rows! { "findings",
         heldout_gain_mm: Option<f64>,
         /// Rms of the whole effect over the fitted rows.
         effect_rms_mm: Option<f64>,
+        /// That it is this effect at this place; that it acts at this place; that it is none of the names, rivals among them.
+        probability: Option<f64>,
+        place_probability: Option<f64>,
+        none_probability: Option<f64>,
         /// Joint whose range bounds it, from 1.
         valid_joint: Option<i64>,
         valid_from_rad: Option<f64>,
@@ -51,6 +55,8 @@ crate::table::rows! { "rivals",
         place: String,
         /// Criterion with the rival in place of the finding, minus that of the finding.
         delta_bic: f64,
+        /// That it is the rival and not the finding.
+        probability: Option<f64>,
     }
 }
 
@@ -75,6 +81,9 @@ impl Findings {
             delta_bic: finding.evidence.map(|e| e.delta_bic),
             heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).map(|gain| gain * 1e3),
             effect_rms_mm: finding.evidence.map(|e| e.effect_rms * 1e3),
+            probability: Some(finding.probabilities.name),
+            place_probability: Some(finding.probabilities.place),
+            none_probability: Some(finding.probabilities.none),
             valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
             valid_from_rad: finding.valid.map(|(_, range)| range[0]),
             valid_to_rad: finding.valid.map(|(_, range)| range[1]),
@@ -109,6 +118,7 @@ impl Rivals {
                 effect: rival.effect.into(),
                 place: rival.place.to_string(),
                 delta_bic: rival.delta_bic,
+                probability: Some(rival.probability),
             })
         });
         let mut rows: Vec<RivalRow> = rows.collect();

@@ -115,7 +115,7 @@ impl Parameters {
                     ParameterStatus::Redundant(with) => (
                         "redundant",
                         None,
-                        Some(format!("the measured points cannot tell it from {}; kept at nominal", names(with))),
+                        Some(format!("the measured points cannot separate it from {}; kept at nominal", names(with))),
                     ),
                     ParameterStatus::Unseen => (
                         "unseen",

@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, Place, Summary, Survey, cause,
-    hypotheses, people, whole,
+    CAUSES, Clock, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, ParameterEstimate, ParameterSpec, Place, Summary,
+    Survey, cause, hypotheses, people, whole,
 };
 use calib::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -199,18 +199,13 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
         let variables: Vec<String> = form.variables().iter().map(ToString::to_string).collect();
         assert!(!variables.is_empty() && variables.iter().all(|name| !name.is_empty()), "{form:?}");
         places.insert(form.place());
-        let numbers: Vec<ParameterEstimate> = specs
-            .iter()
-            .map(|spec| ParameterEstimate {
-                name: spec.name.clone(),
-                form: 0,
-                value: 1.5,
-                unit: people(spec.unit).1,
-                sigma: None,
-            })
-            .collect();
-        let summary =
-            Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock: Clock::Seconds };
+        let numbers = numbers_of(form, survey.robot);
+        let summary = Summary {
+            place: form.place(),
+            forms: std::slice::from_ref(form),
+            parameters: &numbers,
+            clock: Clock::Seconds { first: 0.0 },
+        };
         let coefficients = vec![0.0; specs.len()];
         for name in [form.name(), form.called(&coefficients, survey)] {
             let cause = cause(name).unwrap_or_else(|| panic!("{name} has no cause"));
@@ -221,6 +216,53 @@ fn a_form_has_named_numbers_a_place_variables_a_cause_and_a_sentence() {
     });
     for place in [Place::Base, Place::Tool, Place::Tracker, Place::Recording] {
         assert!(places.contains(&place), "nothing sits at the {place}");
+    }
+}
+
+fn numbers_of(form: &Form, robot: &RobotModel) -> Vec<ParameterEstimate> {
+    let estimate =
+        |spec: ParameterSpec| ParameterEstimate { name: spec.name, form: 0, value: 1.5, unit: people(spec.unit).1, sigma: None };
+    form.parameters(robot).into_iter().map(estimate).collect()
+}
+
+/// A sentence with `#` for every number.
+fn without_numbers(sentence: &str) -> String {
+    let mut out = String::new();
+    let mut before = ' ';
+    for (i, letter) in sentence.char_indices() {
+        let next = sentence[i + letter.len_utf8()..].chars().next().unwrap_or(' ');
+        let sign = letter == '-' && before == ' ' && next.is_ascii_digit();
+        let inside = before == '#' && (letter == '.' || letter == 'e' || letter == '-') && (next.is_ascii_digit() || next == '-');
+        if letter.is_ascii_digit() || sign || inside {
+            if before != '#' {
+                out.push('#');
+            }
+            before = '#';
+        } else {
+            out.push(letter);
+            before = letter;
+        }
+    }
+    out
+}
+
+#[test]
+fn every_sentence_is_as_it_was_read() {
+    let mut said: BTreeSet<String> = BTreeSet::new();
+    over_all(|survey, hypothesis| {
+        let form = &hypothesis.form;
+        let numbers = numbers_of(form, survey.robot);
+        for clock in [Clock::Seconds { first: 0.0 }, Clock::Rows] {
+            let summary = Summary { place: form.place(), forms: std::slice::from_ref(form), parameters: &numbers, clock };
+            said.insert(format!("{}: {}", form.name(), without_numbers(&form.cause().sentence(&summary))));
+        }
+    });
+    let said: String = said.into_iter().map(|line| line + "\n").collect();
+    let read = include_str!("forms/sentences.txt");
+    if said != read {
+        let path = std::env::temp_dir().join("sentences.txt");
+        std::fs::write(&path, &said).expect("a file");
+        panic!("read {} and put it in place of tests/it/forms/sentences.txt if it reads well", path.display());
     }
 }
 

@@ -15,5 +15,5 @@ pub(crate) use cholesky::gain;
 pub(crate) use conditional::Conditional;
 pub(crate) use criterion::EQUIVALENT;
 pub(crate) use hypotheses::HypothesisSet;
-pub(crate) use linear::{dot, project};
+pub(crate) use linear::{dot, orthonormal, project};
 pub(crate) use solve::Solution;

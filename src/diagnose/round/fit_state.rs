@@ -2,7 +2,6 @@
 
 use super::base_model::base_model;
 use super::noise::{REPEATS, by_residual, from_repeats, scaled, spreads};
-use super::stretches::thinned;
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{Memory, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
@@ -142,14 +141,9 @@ impl<'a> Fitter<'a> {
         self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
     }
 
-    /// How what a settled model leaves lasts from row to row (not at all: `Some(None)`), if otherwise than is believed.
-    pub fn memory_left_by(&self, settled: &FitState) -> Option<Option<Memory>> {
-        let rows = thinned(&settled.screening.kept);
-        if self.recalled >= RECALLS || self.data.in_motion(&rows) {
-            return None;
-        }
-        let problem = WhitenedProblem::new(&settled.model, &self.data, rows);
-        Memory::shown_by(problem.of_points(), &problem.rows, self.memory)
+    /// Whether noise that lasts may still be asked for: not of a moving arm, and not for ever.
+    pub fn may_recall(&self, settled: &FitState) -> bool {
+        self.recalled < RECALLS && !self.data.in_motion(&settled.screening.kept)
     }
 
     /// Takes the memory that a residual showed.

@@ -7,6 +7,7 @@ mod noise;
 mod reversed_joints;
 mod stretches;
 mod view;
+mod wander;
 
 pub use base_model::BASE;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter};
@@ -14,3 +15,4 @@ pub(crate) use history::{RoundHistory, RoundOutcome};
 pub(crate) use noise::REPEATS;
 pub(crate) use reversed_joints::REVERSED;
 pub(crate) use view::{RoundView, compliance};
+pub(crate) use wander::memory_left_by;

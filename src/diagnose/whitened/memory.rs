@@ -16,26 +16,28 @@ pub(crate) struct Memory {
 const LASTS: [f64; 10] = [0.4, 0.55, 0.7, 0.8, 0.86, 0.9, 0.93, 0.96, 0.98, 0.99];
 const SHARES: [f64; 10] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
-/// Twice the logarithm of the likelihood ratio from which memory is believed, or another one in place of what was believed.
-const PLAIN: f64 = 40.0;
-
 /// Residuals of so many standard deviations count as gross: they would hide what the others share.
 const GROSS: f64 = 5.0;
 
 impl Memory {
     /// White noise.
-    const NONE: Self = Self { lasts: 0.0, share: 0.0 };
+    pub const NONE: Self = Self { lasts: 0.0, share: 0.0 };
 
-    /// What whitened residuals show, three a row, against what is `believed`; `None` where that stands.
-    pub fn shown_by(residual: &[f64], rows: &[usize], believed: Option<Self>) -> Option<Option<Self>> {
+    /// All that are tried, white noise (`None`) first.
+    pub fn all() -> impl Iterator<Item = Option<Self>> {
+        let some = LASTS.into_iter().flat_map(|lasts| SHARES.into_iter().map(move |share| Self { lasts, share }));
+        std::iter::once(None).chain(some.map(Some))
+    }
+
+    /// Brings gross residuals back to where they no longer hide what the others share.
+    pub fn without_gross(residual: &mut [f64]) {
         let scale = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
-        let clipped: Vec<f64> = residual.iter().map(|value| value.clamp(-GROSS * scale, GROSS * scale)).collect();
-        let cost = |memory: Self| memory.filter(rows).cost(&clipped);
-        let all = LASTS.into_iter().flat_map(|lasts| SHARES.into_iter().map(move |share| Self { lasts, share }));
-        let candidates = all.chain([Self::NONE]).map(|memory| (cost(memory), memory));
-        let (best, memory) = candidates.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let stands = cost(believed.unwrap_or(Self::NONE)) - best < PLAIN;
-        (!stands).then_some((memory != Self::NONE).then_some(memory))
+        residual.iter_mut().for_each(|value| *value = value.clamp(-GROSS * scale, GROSS * scale));
+    }
+
+    /// -2 ln of the likelihood of whitened residuals, three a row, up to a constant and with their scale estimated.
+    pub fn cost(self, residual: &[f64], rows: &[usize]) -> f64 {
+        self.filter(rows).cost(residual)
     }
 
     /// Rows of the recording, ascending.
@@ -77,7 +79,6 @@ impl Innovations {
         }
     }
 
-    /// -2 ln of the likelihood of a column up to a constant, its scale estimated.
     fn cost(&self, column: &[f64]) -> f64 {
         let mut innovations = column.to_vec();
         self.apply(&mut innovations);
@@ -130,16 +131,16 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_found_where_there_is_some_and_only_there() {
+    fn the_likeliest_memory_is_that_of_the_noise() {
         let rows: Vec<usize> = (0..80).collect();
-        assert_eq!(Memory::shown_by(&noise(80, 0.0, 0.0), &rows, None), None);
-        let found = Memory::shown_by(&noise(80, 0.9, 1.0), &rows, None).flatten().expect("memory");
+        let likeliest = |noise: &[f64]| {
+            let cost = |memory: &Option<Memory>| memory.unwrap_or(Memory::NONE).cost(noise, &rows);
+            Memory::all().min_by(|a, b| cost(a).total_cmp(&cost(b))).flatten()
+        };
+        let found = likeliest(&noise(80, 0.9, 1.0)).expect("memory");
         assert!((0.8..=0.96).contains(&found.lasts) && found.share > 0.6, "{found:?}");
-        assert_eq!(Memory::shown_by(&noise(80, 0.9, 1.0), &rows, Some(found)), None);
-        assert_eq!(
-            Memory::shown_by(&noise(80, 0.0, 0.0), &rows, Some(found)),
-            Some(None),
-            "a belief that nothing bears out goes"
-        );
+        let white = noise(80, 0.0, 0.0);
+        let gain = Memory::NONE.cost(&white, &rows) - likeliest(&white).unwrap_or(Memory::NONE).cost(&white, &rows);
+        assert!(gain < 8.0, "{gain}");
     }
 }

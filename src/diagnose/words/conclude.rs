@@ -2,6 +2,7 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
+use super::probability::weigh;
 use super::statement::{next, not_observable, slower_than_noise};
 use super::unseen::by_speed;
 use crate::diagnose::judge::FOLDS;
@@ -29,11 +30,12 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let (data, state) = (&fitter.data, &last.judged.state);
     let predicted = state.model.predict(data);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
-    let (rest, findings) = without_small_rests(findings(&last));
+    let (rest, mut findings) = without_small_rests(findings(&last));
     let something_left =
         (last.last <= SIGNIFICANT && misfit.chi_square > LOUD) || misfit.chi_square > TOO_LOUD || misfit.not_carried;
     let verdict = verdict(&findings, &misfit, something_left, fitter.repeatability);
     let signature = signature(&rest, &last, something_left, misfit.not_carried);
+    findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(by_speed(&last));
     not_observable.extend(fitter.memory.map(slower_than_noise));

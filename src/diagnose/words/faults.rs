@@ -1,7 +1,7 @@
 //! Findings that are no physics of the arm: rows that no model can follow, logs that are apart, joints that count the other way.
 
 use crate::diagnose::round::{FitState, REVERSED};
-use crate::diagnose::types::Finding;
+use crate::diagnose::types::{Finding, Probabilities};
 use crate::effect::{JointLogLag, ParameterEstimate, Place, ReductionRatio};
 use crate::error::counted;
 use crate::estimate::{ParameterStatus, Screening, Suspect, SuspectKind};
@@ -74,6 +74,7 @@ fn of_the_recording(effect: &'static str, statement: String) -> Finding {
         parameters: Vec::new(),
         evidence: None,
         rivals: Vec::new(),
+        probabilities: Probabilities::default(),
         valid: None,
         forms: Vec::new(),
     }

@@ -8,7 +8,7 @@ use super::statement::{not_so, sentence};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::pool::{HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
-use crate::diagnose::types::{Evidence, Finding};
+use crate::diagnose::types::{Evidence, Finding, Probabilities};
 use crate::effect::{Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, people};
 use crate::estimate::{ParameterStatus, tail};
 
@@ -80,7 +80,17 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
         None => (effect, sentence(effect, &summary, effect_rms)),
     };
     let valid = valid(&forms, last);
-    Finding { effect, place, statement, parameters, evidence: Some(evidence), rivals, valid, forms }
+    Finding {
+        effect,
+        place,
+        statement,
+        parameters,
+        evidence: Some(evidence),
+        rivals,
+        probabilities: Probabilities::default(),
+        valid,
+        forms,
+    }
 }
 
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows.

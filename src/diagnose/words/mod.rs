@@ -5,6 +5,7 @@ mod faults;
 mod findings;
 mod groups;
 mod last_round;
+mod probability;
 mod rivals;
 mod statement;
 mod unseen;

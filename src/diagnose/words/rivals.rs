@@ -21,7 +21,7 @@ pub(super) fn rivals(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic
         let delta = pool.bic(&set) - bic;
         // What counts is the fit: the prior's penalties are opinions.
         if delta - pool.prior_penalty[h] + own_penalty < EQUIVALENT {
-            out.push(RivalCause { effect, place, delta_bic: delta });
+            out.push(RivalCause { effect, place, delta_bic: delta, probability: 0.0 });
         }
     }
     out
@@ -31,7 +31,7 @@ pub(super) fn rivals(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic
 pub(super) fn exact(effect: &str, forms: &[Form], rivals: &mut Vec<RivalCause>) {
     for (other, place) in forms.iter().flat_map(|form| form.cause().identities(form, effect)) {
         if !rivals.iter().any(|rival| rival.effect == other && rival.place == place) {
-            rivals.push(RivalCause { effect: other, place, delta_bic: 0.0 });
+            rivals.push(RivalCause { effect: other, place, delta_bic: 0.0, probability: 0.0 });
         }
     }
 }

@@ -1,39 +1,14 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
 use super::mark::{Case, Marked, Outcome};
+use super::reliability::{Bin, Subject, reliability};
+use super::share::Share;
 use std::collections::BTreeMap;
 
 /// Lower ends of the bins of visibility L.
 pub const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
 /// From this visibility on an effect should be named.
 pub const DUE: f64 = 50.0;
-
-/// How many of how many, with Wilson's 95 % limits.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Share {
-    pub count: usize,
-    pub of: usize,
-}
-
-impl Share {
-    /// Counts what holds.
-    pub fn of(all: impl IntoIterator<Item = bool>) -> Share {
-        all.into_iter().fold(Share::default(), |share, holds| Share { count: share.count + usize::from(holds), of: share.of + 1 })
-    }
-    pub fn value(&self) -> Option<f64> {
-        (self.of > 0).then(|| self.count as f64 / self.of as f64)
-    }
-    /// E. B. Wilson, 1927.
-    pub fn limits(&self) -> [f64; 2] {
-        if self.of == 0 {
-            return [0.0, 1.0];
-        }
-        let (n, z) = (self.of as f64, 1.959_964f64);
-        let p = self.count as f64 / n;
-        let (middle, wide) = (p + z * z / (2.0 * n), z * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt());
-        [(middle - wide) / (1.0 + z * z / n), (middle + wide) / (1.0 + z * z / n)]
-    }
-}
 
 /// Outcomes of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -189,6 +164,11 @@ impl Board {
             out.entry(&interval.effect).or_default().push(interval.holds);
         }
         out.into_iter().map(|(effect, holds)| (effect, Share::of(holds))).collect()
+    }
+
+    /// Stated probabilities against what was true, with their Brier score.
+    pub fn reliability(&self, subject: Subject) -> (Vec<Bin>, Option<f64>) {
+        reliability(self.cases.iter().flat_map(|case| &case.statements), subject)
     }
 
     /// Verdicts by content.

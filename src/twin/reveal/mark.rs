@@ -1,7 +1,8 @@
 //! One case: what was found of every concealed cause, and what was said that is not there.
 
 use super::interval::{Interval, intervals};
-use super::paper::{Answer, Finding, Truth};
+use super::paper::{Answer, Atoms, Finding, Truth, atoms};
+use super::reliability::{Statement, statements};
 use std::collections::BTreeSet;
 
 /// How a cause was named.
@@ -77,6 +78,7 @@ pub struct Case {
     pub strays: Vec<String>,
     pub held_out: Option<HeldOut>,
     pub intervals: Vec<Interval>,
+    pub statements: Vec<Statement>,
 }
 
 impl Case {
@@ -84,16 +86,6 @@ impl Case {
     pub fn right(&self, strength: f64) -> bool {
         let due = |cause: &&Marked| cause.strength >= strength;
         self.strays.is_empty() && self.causes.iter().filter(due).all(|cause| cause.outcome == Outcome::Exact)
-    }
-}
-
-/// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
-fn atoms(effect: &str, place: &str) -> BTreeSet<(String, String)> {
-    let run = place.strip_prefix("link ").and_then(|rest| rest.split_once('-'));
-    let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
-    match ends {
-        Some((from, to)) => (from..=to).map(|link| (effect.to_string(), format!("link {link}"))).collect(),
-        None => BTreeSet::from([(effect.to_string(), place.to_string())]),
     }
 }
 
@@ -119,6 +111,9 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
     if !truth.tampered.is_empty() {
         known.extend(["outlier", "mislabelled_point"].into_iter().flat_map(|effect| atoms(effect, "recording")));
     }
+    let tampered = truth.tampered.iter().map(|fault| atoms(&fault.effect, &fault.place));
+    let true_names: Vec<Atoms> = truth.effects.iter().map(|cause| atoms(&cause.effect, &cause.place)).chain(tampered).collect();
+    let accepted_names: Vec<Atoms> = truth.accepted.iter().map(|name| atoms(&name.effect, &name.place)).collect();
     let stray = |finding: &&Finding| reach(finding).is_disjoint(&known);
     let strays: Vec<String> = answer.findings.iter().filter(stray).map(said).collect();
     let causes = truth.effects.iter().filter(|cause| cause.wanted).map(|cause| {
@@ -153,6 +148,7 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
         tampered: truth.tampered.iter().map(|fault| (fault.effect.clone(), named(&fault.effect))).collect(),
         held_out: held_out(truth, answer),
         intervals: truth.effects.iter().flat_map(|cause| intervals(cause, &answer.findings)).collect(),
+        statements: statements(&answer.findings, &true_names, &accepted_names),
         strays,
     }
 }

@@ -6,4 +6,6 @@ pub mod board;
 pub mod interval;
 pub mod mark;
 pub mod paper;
+pub mod reliability;
+pub mod share;
 mod text;

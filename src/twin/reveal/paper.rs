@@ -1,6 +1,7 @@
 //! The two documents of a case: the sealed truth, and what a diagnosis said (`calib diagnose --json`).
 
 use serde::Deserialize;
+use std::collections::BTreeSet;
 
 /// An effect and its place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
@@ -85,7 +86,22 @@ pub struct Finding {
     #[serde(default)]
     pub parameters: Vec<Number>,
     #[serde(default)]
-    pub rivals: Vec<Name>,
+    pub rivals: Vec<Rival>,
+    /// That it is this effect at this place, and that it acts at this place.
+    #[serde(default)]
+    pub probability: Option<f64>,
+    #[serde(default)]
+    pub place_probability: Option<f64>,
+}
+
+/// Another explanation of a finding.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct Rival {
+    pub effect: String,
+    #[serde(rename = "where")]
+    pub place: String,
+    #[serde(default)]
+    pub probability: Option<f64>,
 }
 
 /// What a diagnosis said.
@@ -97,4 +113,17 @@ pub struct Answer {
     #[serde(default)]
     pub after: Option<Errors>,
     pub findings: Vec<Finding>,
+}
+
+/// Effects and places of single links.
+pub type Atoms = BTreeSet<(String, String)>;
+
+/// One (effect, place) for each link of a run: `link 2-4` is links 2, 3 and 4.
+pub(super) fn atoms(effect: &str, place: &str) -> Atoms {
+    let run = place.strip_prefix("link ").and_then(|rest| rest.split_once('-'));
+    let ends = run.and_then(|(from, to)| Some((from.parse::<u8>().ok()?, to.parse::<u8>().ok()?)));
+    match ends {
+        Some((from, to)) => (from..=to).map(|link| (effect.to_string(), format!("link {link}"))).collect(),
+        None => BTreeSet::from([(effect.to_string(), place.to_string())]),
+    }
 }

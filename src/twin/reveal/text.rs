@@ -1,7 +1,9 @@
 //! The scoreboard for people and for programs.
 
-use super::board::{BINS, Board, Company, Counts, DUE, Share};
+use super::board::{BINS, Board, Company, Counts, DUE};
 use super::mark::Case;
+use super::reliability::{Bin, Subject};
+use super::share::Share;
 use crate::statistics::quantile;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -61,6 +63,19 @@ impl Board {
         if let Some(median) = quantile(&self.explained(), 0.5) {
             let _ = writeln!(out, "explained share of the held-out error: median {median:.4}");
         }
+        for subject in [Subject::Name, Subject::Place] {
+            let (bins, brier) = self.reliability(subject);
+            if let Some(brier) = brier {
+                let _ = writeln!(
+                    out,
+                    "\nstated probabilities of {}, Brier score {brier:.4}\n  from  to    stated  right",
+                    subject.name()
+                );
+            }
+            for Bin { from, to, stated, right } in bins {
+                let _ = writeln!(out, "  {from:<4}  {to:<4}  {stated:.3}   {}", percent(&right));
+            }
+        }
         for ((content, verdict), count) in self.verdicts() {
             let _ = writeln!(out, "{content}: {verdict} {count}");
         }
@@ -97,6 +112,11 @@ impl Board {
             let by_strength = self.by_strength(company);
             by_strength.iter().enumerate().map(|(bin, of)| json!({ "L": range(bin), "outcomes": counts(of) })).collect::<Vec<_>>()
         };
+        let reliability = [Subject::Name, Subject::Place].map(|subject| {
+            let (bins, brier) = self.reliability(subject);
+            let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
+            json!({ "of": subject.name(), "brier": brier, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
+        });
         let [due, null] = self.ratios();
         let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
         json!({
@@ -106,6 +126,7 @@ impl Board {
             "beside": bins(Company::Beside),
             "by_effect": self.by_effect().iter().map(|(name, of)| (name.to_string(), counts(of))).collect::<serde_json::Map<_, _>>(),
             "confusion": self.confusion(),
+            "reliability": reliability,
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
             "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
             "held_out_over_bound": { "due": spread(&due), "null": spread(&null) },

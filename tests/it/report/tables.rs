@@ -170,6 +170,9 @@ fn findings() -> Findings {
         delta_bic: Some(330.0),
         heldout_gain_mm: Some(0.3),
         effect_rms_mm: Some(0.28),
+        probability: Some(0.85),
+        place_probability: Some(0.95),
+        none_probability: Some(0.05),
         valid_joint: Some(2),
         valid_from_rad: Some(-0.8),
         valid_to_rad: Some(1.1),
@@ -184,7 +187,13 @@ fn numbers() -> FindingNumbers {
 }
 
 fn rivals() -> Rivals {
-    Rivals(vec![RivalRow { rank: 1, effect: "joint_table".into(), place: "joint 2".into(), delta_bic: 4.0 }])
+    Rivals(vec![RivalRow {
+        rank: 1,
+        effect: "joint_table".into(),
+        place: "joint 2".into(),
+        delta_bic: 4.0,
+        probability: Some(0.1),
+    }])
 }
 
 fn robot(name: &str) -> Robot {

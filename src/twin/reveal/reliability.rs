@@ -1,0 +1,97 @@
+//! Stated probabilities against what was true: how often what is said with a probability is right, and the mean squared error of it.
+
+use super::paper::{Atoms, Finding, atoms};
+use super::share::Share;
+use std::collections::BTreeSet;
+
+/// What a probability is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Subject {
+    /// An effect at a place: of a finding or of a rival.
+    Name,
+    /// A finding's place.
+    Place,
+}
+
+impl Subject {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Name => "names",
+            Self::Place => "places",
+        }
+    }
+}
+
+/// Something that was said with a probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Statement {
+    pub subject: Subject,
+    pub probability: f64,
+    pub right: bool,
+}
+
+/// Statements whose probability lies in a range, and how many of them are right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bin {
+    pub from: f64,
+    pub to: f64,
+    /// Mean of the stated probabilities.
+    pub stated: f64,
+    pub right: Share,
+}
+
+/// Ends of the bins.
+const ENDS: [f64; 8] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95];
+
+/// What findings say with a probability, against the names that are `true_names`, and those that are `accepted` where a finding has none of
+/// these.
+pub(super) fn statements(findings: &[Finding], true_names: &[Atoms], accepted: &[Atoms]) -> Vec<Statement> {
+    let places: BTreeSet<&str> = true_names.iter().chain(accepted).flatten().map(|(_, place)| place.as_str()).collect();
+    let mut out = Vec::new();
+    for finding in findings {
+        let own = atoms(&finding.effect, &finding.place);
+        let there = own.iter().any(|(_, place)| places.contains(place.as_str()));
+        let rivals = finding.rivals.iter().map(|rival| (rival.probability, atoms(&rival.effect, &rival.place)));
+        let names: Vec<(Option<f64>, Atoms)> = std::iter::once((finding.probability, own)).chain(rivals).collect();
+        let known = if names.iter().any(|(_, name)| true_names.contains(name)) { true_names } else { accepted };
+        let mut say = |subject, probability: Option<f64>, right| {
+            out.extend(probability.map(|probability| Statement { subject, probability, right }));
+        };
+        say(Subject::Place, finding.place_probability, there);
+        names.into_iter().for_each(|(probability, name)| say(Subject::Name, probability, known.contains(&name)));
+    }
+    out
+}
+
+/// Bins that hold statements of a subject, and their Brier score (1950): the mean squared difference of probability and outcome.
+pub(super) fn reliability<'a>(statements: impl Iterator<Item = &'a Statement>, subject: Subject) -> (Vec<Bin>, Option<f64>) {
+    let all: Vec<&Statement> = statements.filter(|statement| statement.subject == subject).collect();
+    let ends = ENDS.iter().zip(ENDS[1..].iter().chain([&1.0]));
+    let bins = ends.filter_map(|(from, to)| {
+        let within = |s: &&&Statement| s.probability >= *from && (s.probability < *to || *to == 1.0);
+        let own: Vec<&&Statement> = all.iter().filter(within).collect();
+        let stated = own.iter().map(|s| s.probability).sum::<f64>() / own.len() as f64;
+        let right = Share::of(own.iter().map(|s| s.right));
+        (!own.is_empty()).then_some(Bin { from: *from, to: *to, stated, right })
+    });
+    let miss = |s: &&Statement| (s.probability - f64::from(u8::from(s.right))).powi(2);
+    let brier = (!all.is_empty()).then(|| all.iter().map(miss).sum::<f64>() / all.len() as f64);
+    (bins.collect(), brier)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn statements_fall_into_bins_and_the_score_is_the_mean_squared_miss() {
+        let said = |probability, right| Statement { subject: Subject::Name, probability, right };
+        let all = [said(0.85, true), said(0.85, true), said(0.85, false), said(1.0, true), said(0.05, false)];
+        let (bins, brier) = reliability(all.iter(), Subject::Name);
+        let shown: Vec<(f64, usize, usize)> = bins.iter().map(|bin| (bin.from, bin.right.count, bin.right.of)).collect();
+        assert_eq!(shown, [(0.0, 0, 1), (0.8, 2, 3), (0.95, 1, 1)]);
+        // 2 x 0.15^2 + 0.85^2 + 0 + 0.05^2, by five.
+        assert!((brier.expect("a score") - 0.154).abs() < 1e-12);
+        assert!(reliability(all.iter(), Subject::Place).0.is_empty());
+    }
+}
