@@ -19,18 +19,22 @@ pub struct Instrument {
 
 /// An instrument by its name, with the document that states its figures.
 #[derive(Debug, Clone, Copy)]
-pub struct Published {
+pub struct PublishedInstrument {
     pub name: &'static str,
     pub figures: Instrument,
     pub source: &'static str,
 }
 
-const fn published(name: &'static str, [constant_um, per_metre_um, coverage]: [f64; 3], source: &'static str) -> Published {
-    Published { name, figures: Instrument { constant_um, per_metre_um, coverage }, source }
+const fn published(
+    name: &'static str,
+    [constant_um, per_metre_um, coverage]: [f64; 3],
+    source: &'static str,
+) -> PublishedInstrument {
+    PublishedInstrument { name, figures: Instrument { constant_um, per_metre_um, coverage }, source }
 }
 
 /// What may be named, one line each: constant part (um), growth (um/m) and divisor, and where they stand.
-pub const INSTRUMENTS: &[Published] = &[
+pub const INSTRUMENTS: &[PublishedInstrument] = &[
     published("api_radian", [10.0, 5.0, 2.0], "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma"),
     published("faro_vantage", [20.0, 5.0, 2.0], "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE"),
     published("leica_at402", [15.0, 6.0, 2.0], "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE"),

@@ -15,7 +15,7 @@ mod travel;
 mod visited;
 
 pub use bound::Bound;
-pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, Published, START, SigmaSource};
+pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
 pub use measurements::Measurements;
 pub use model::RobotModel;
 pub use posture::{Carried, LoadCorrection, Posture};

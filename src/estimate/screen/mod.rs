@@ -201,7 +201,7 @@ fn bulk(standings: &[LeaveOneOut]) -> Vec<f64> {
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.
-fn beside(data: &Measurements, named: &[Named]) -> Vec<Named> {
+fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
     let off: Vec<usize> = named.iter().filter(|(_, kind, _)| *kind == SuspectKind::Outlier).map(|(row, ..)| *row).collect();
     let listed = |row: &usize| named.iter().any(|(other, ..)| other == row);
     let mut found = Vec::new();
@@ -216,16 +216,16 @@ fn beside(data: &Measurements, named: &[Named]) -> Vec<Named> {
 }
 
 /// A row that stands out, why, and its partner.
-type Named = (usize, SuspectKind, Option<usize>);
+type ClassedRow = (usize, SuspectKind, Option<usize>);
 
 /// Sets with more stops of unexplained rows than mistakes would make.
-fn crowded(data: &Measurements, named: &[Named], set: &[usize]) -> BTreeSet<usize> {
+fn crowded(data: &Measurements, named: &[ClassedRow], set: &[usize]) -> BTreeSet<usize> {
     let sets: BTreeSet<usize> = set.iter().copied().collect();
     sets.into_iter()
         .filter(|number| {
             let stops = |rows: &[usize]| kind::stops(data, rows) as f64;
             let all = stops(&(0..set.len()).filter(|row| set[*row] == *number).collect::<Vec<_>>());
-            let outlier = |(row, kind, _): &&Named| set[*row] == *number && *kind == SuspectKind::Outlier;
+            let outlier = |(row, kind, _): &&ClassedRow| set[*row] == *number && *kind == SuspectKind::Outlier;
             let unexplained = stops(&named.iter().filter(outlier).map(|(row, ..)| *row).collect::<Vec<_>>());
             unexplained > CROWD * all + 2.0 * (CROWD * (1.0 - CROWD) * all).sqrt()
         })

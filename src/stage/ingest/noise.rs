@@ -73,8 +73,9 @@ impl JsonSchema for InstrumentSetting {
         "InstrumentSetting".into()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let named =
-            |known: &crate::robot::Published| json_schema!({ "const": known.name, "description": known.source }).to_value();
+        let named = |known: &crate::robot::PublishedInstrument| {
+            json_schema!({ "const": known.name, "description": known.source }).to_value()
+        };
         let mut all: Vec<serde_json::Value> = INSTRUMENTS.iter().map(named).collect();
         all.push(generator.subschema_for::<Instrument>().to_value());
         json_schema!({
