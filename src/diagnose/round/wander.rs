@@ -14,6 +14,8 @@ use rayon::prelude::*;
 
 /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
 const PLAIN: f64 = 20.0;
+/// Causes that follow time must be better than noise that lasts by strong evidence: such noise is everywhere.
+const CLEARER: f64 = 8.0;
 /// Of memories whose criterion is within this of the best the one that lasts longest is believed (95 % of chi-square with one degree of
 /// freedom): too short a memory makes causes of noise.
 const AS_GOOD: f64 = 3.84;
@@ -35,7 +37,7 @@ pub(crate) fn memory_left_by(settled: &FitState, fitter: &Fitter) -> Option<Opti
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of(&problem, settled, fitter, &kept).likeliest();
-        if cost < best && other.is_some() {
+        if cost < best + CLEARER && other.is_some() {
             (best, memory) = (cost, other);
         }
     }

@@ -162,8 +162,9 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
 
     /// A form that an earlier round refined, with the prior of the form that it was refined from.
     fn like(&self, form: &Form) -> Hypothesis {
-        let key = form.key();
-        let kin = self.pool.keys.iter().position(|other| *other == key).map(|at| self.pool.hypotheses[at].clone());
+        let (key, variables) = (form.key(), form.variables());
+        let mut same = self.pool.keys.iter().zip(&self.pool.hypotheses).filter(|(other, _)| **other == key);
+        let kin = same.find(|(_, other)| other.form.variables() == variables).map(|(_, kin)| kin.clone());
         kin.map_or_else(|| Hypothesis::new(form.clone(), 1), |kin| Hypothesis { form: form.clone(), ..kin })
     }
 
