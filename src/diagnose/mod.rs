@@ -32,7 +32,7 @@ pub use words::other_means;
 
 use judge::{ModelComparison, judge};
 use locate::locate;
-use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, memory_left_by};
+use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
@@ -62,9 +62,9 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = next;
             continue;
         }
-        if let Some(memory) = memory_left_by(&next, &fitter) {
-            fitter.recall(memory);
-            tell(words::of_the_memory(&fitter));
+        if let Some(noise) = correlation_left_by(&next, &fitter) {
+            fitter.take_correlation(noise);
+            tell(words::of_the_correlation(&fitter));
             now = fitter.fit(&next.model, Vec::new());
             history = RoundHistory::default();
             continue;

@@ -60,31 +60,31 @@ pub fn logs(store: &Path, fleet: &str) -> PathBuf {
 }
 
 /// The scripts of a run for `sbatch`, one an array.
-pub fn slurm(note: &RunNote, wishes: &ClusterOptions) -> Result<Vec<Script>> {
-    wishes.check()?;
+pub fn slurm(note: &RunNote, options: &ClusterOptions) -> Result<Vec<Script>> {
+    options.check()?;
     let count = note.tasks.len();
     let scripts = (0..count).step_by(ARRAY).map(|first| {
         let tasks = ARRAY.min(count - first);
-        let parallel = wishes.max_parallel.map(|most| format!("%{most}")).unwrap_or_default();
+        let parallel = options.max_parallel.map(|most| format!("%{most}")).unwrap_or_default();
         let mut text = format!(
             "#!/bin/sh\n#SBATCH --job-name=calib-{}\n#SBATCH --array=0-{}{parallel}\n#SBATCH --ntasks=1\n#SBATCH --cpus-per-task=1\n\
              #SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output={}/%A_%a.out\n",
             note.fleet,
             tasks - 1,
-            logs(&wishes.store, &note.fleet).display()
+            logs(&options.store, &note.fleet).display()
         );
-        for (option, word) in [("partition", &wishes.partition), ("mem", &wishes.memory), ("time", &wishes.time)] {
+        for (option, word) in [("partition", &options.partition), ("mem", &options.memory), ("time", &options.time)] {
             if let Some(word) = word {
                 text.push_str(&format!("#SBATCH --{option}={word}\n"));
             }
         }
-        for word in &wishes.more {
+        for word in &options.more {
             text.push_str(&format!("#SBATCH {word}\n"));
         }
         text.push_str(&format!(
             "exec {} fleet exec --store {} --fleet {} --run {} --task \"$((SLURM_ARRAY_TASK_ID + {first}))\"\n",
-            quoted(&wishes.program.to_string_lossy()),
-            quoted(&wishes.store.to_string_lossy()),
+            quoted(&options.program.to_string_lossy()),
+            quoted(&options.store.to_string_lossy()),
             quoted(&note.fleet),
             quoted(&note.run)
         ));
@@ -94,11 +94,11 @@ pub fn slurm(note: &RunNote, wishes: &ClusterOptions) -> Result<Vec<Script>> {
 }
 
 /// An Indexed Job for Kubernetes. Experimental: rendered, never run here.
-pub fn kubernetes(note: &RunNote, wishes: &ClusterOptions, image: &str, claim: &str) -> String {
+pub fn kubernetes(note: &RunNote, options: &ClusterOptions, image: &str, claim: &str) -> String {
     let yaml = crate::yaml::quoted;
     let name: String = format!("calib-{}-{}", note.fleet, note.run).to_lowercase().replace('_', "-").chars().take(63).collect();
     let limit =
-        wishes.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();
+        options.memory.as_ref().map(|memory| format!("            limits: {{memory: {}}}\n", yaml(memory))).unwrap_or_default();
     format!(
         "# Experimental. Memory is in Kubernetes' own spelling, e.g. 2Gi.\n\
          apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {}\nspec:\n  completionMode: Indexed\n  completions: {}\n  parallelism: {}\n  \
@@ -108,12 +108,12 @@ pub fn kubernetes(note: &RunNote, wishes: &ClusterOptions, image: &str, claim: &
          volumes:\n        - name: store\n          persistentVolumeClaim: {{claimName: {}}}\n",
         yaml(&name),
         note.tasks.len(),
-        wishes.max_parallel.unwrap_or(10),
+        options.max_parallel.unwrap_or(10),
         yaml(image),
-        yaml(&wishes.store.to_string_lossy()),
+        yaml(&options.store.to_string_lossy()),
         yaml(&note.fleet),
         yaml(&note.run),
-        yaml(&wishes.store.to_string_lossy()),
+        yaml(&options.store.to_string_lossy()),
         yaml(claim)
     )
 }

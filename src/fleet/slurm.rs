@@ -13,10 +13,10 @@ const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: u32 = 10;
 
 /// Submits the arrays of a run and notes their ids. Fails where sbatch does.
-pub fn submit(ledger: &Ledger, note: &mut RunNote, wishes: &ClusterOptions) -> Result<()> {
-    let scripts = slurm(note, wishes)?;
+pub fn submit(ledger: &Ledger, note: &mut RunNote, options: &ClusterOptions) -> Result<()> {
+    let scripts = slurm(note, options)?;
     ledger.put_run(note)?;
-    let folder = logs(&wishes.store, &note.fleet);
+    let folder = logs(&options.store, &note.fleet);
     std::fs::create_dir_all(&folder).map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     for script in scripts {
         let answer = said("sbatch", &["--parsable"], Some(&script.text))?;

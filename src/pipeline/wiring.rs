@@ -1,4 +1,4 @@
-//! Which earlier table each input port is fed from: by kind, or as `reads` wishes.
+//! Which earlier table each input port is fed from: by kind, or as `reads` options.
 
 use super::spec::{PortSources, StageDraft};
 use crate::error::nearest;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use serde_json::{Value, json};
 
 /// The document; `judgement` is that of the page.
-pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, judgement: Option<&Judgement>) -> Result<String> {
+pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, judgement: Option<&Judgement>) -> Result<String> {
     let statistics = tables.statistics.0.iter().map(|row| {
         json!({
             "step": row.step, "set": row.set, "held_out": row.held_out, "points": row.points, "mean_mm": row.mean_mm, "std_mm": row.std_mm,
@@ -51,7 +51,7 @@ pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, jud
         "title": title,
         "robot": super::data::robot_name(&tables.robot),
         "calib": env!("CARGO_PKG_VERSION"),
-        "identity": wishes.identity,
+        "identity": options.identity,
         "standing": tables.standing,
         "withdrawn": withdrawn.collect::<Vec<_>>(),
         "limits": limits,
@@ -62,7 +62,7 @@ pub(super) fn document(tables: &Tables, wishes: &ReportOptions, title: &str, jud
         "parameters": parameters.collect::<Vec<_>>(),
         "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
         "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),
-        "tables": wishes.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
+        "tables": options.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
     });
     serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
 }

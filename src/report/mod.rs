@@ -93,29 +93,29 @@ pub struct Pages {
     pub json: String,
 }
 
-/// The report; fails where `wishes.set` is no held-out set.
-pub fn pages(tables: &Tables, wishes: &ReportOptions) -> Result<Pages> {
+/// The report; fails where `options.set` is no held-out set.
+pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let steps = errors::Steps::new(&tables.statistics, tables.standing.as_deref()).without(&tables.withdrawn);
     let robot = data::robot_name(&tables.robot);
-    let judgement = limits::Judgement::new(tables, &wishes.limits, wishes.set);
-    let title = wishes.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
-    let json = json::document(tables, wishes, &title, judgement.as_ref())?;
+    let judgement = limits::Judgement::new(tables, &options.limits, options.set);
+    let title = options.title.map_or_else(|| format!("Calibration of {robot}"), str::to_owned);
+    let json = json::document(tables, options, &title, judgement.as_ref())?;
     let page = Page {
         title,
         policy: "",
         judgement: judgement.as_ref(),
-        identity: wishes.identity.iter().collect(),
-        hashes: &wishes.hashes,
+        identity: options.identity.iter().collect(),
+        hashes: &options.hashes,
         diagnosis: findings::FindingsSection::new(tables),
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
-        errors: errors::ErrorsSection::new(tables, &steps, wishes.set)?,
+        errors: errors::ErrorsSection::new(tables, &steps, options.set)?,
         workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
         parameters: parameters::ParametersSection::new(&tables.parameters),
         fits: fits::FitsSection::new(tables, &steps),
         comparisons: corrections::comparisons(tables),
         data: data::DataSection::new(tables),
-        choices: [("title", wishes.title), ("set", wishes.set)]
+        choices: [("title", options.title), ("set", options.set)]
             .into_iter()
             .filter_map(|(name, value)| value.map(|value| (name, value)))
             .collect(),

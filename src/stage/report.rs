@@ -114,8 +114,8 @@ impl Stage for Report {
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
         let limits = AcceptanceLimits { mean_mm, p95_mm, max_mm };
         let (title, set) = (self.title.as_deref(), self.set.as_deref());
-        let wishes = ReportOptions { title, set, limits, identity: &self.identity, hashes };
-        let pages = pages(&tables, &wishes).map_err(|error| placed(error, context.id))?;
+        let options = ReportOptions { title, set, limits, identity: &self.identity, hashes };
+        let pages = pages(&tables, &options).map_err(|error| placed(error, context.id))?;
         let document =
             |name: &str, media_type: &str, content| DocumentRow { name: name.into(), media_type: media_type.into(), content };
         let html = document("report.html", "text/html", pages.html);

@@ -39,7 +39,7 @@ pub(super) struct ClusterArguments {
 
 impl ClusterArguments {
     /// What to ask of the cluster; paths as all nodes know them.
-    pub(super) fn wishes(&self, store: &std::path::Path) -> Result<ClusterOptions> {
+    pub(super) fn options(&self, store: &std::path::Path) -> Result<ClusterOptions> {
         let fault = |error: std::io::Error| Error::store("--store", error.to_string());
         let program: PathBuf = std::env::current_exe().map_err(fault)?;
         Ok(ClusterOptions {
@@ -67,7 +67,7 @@ pub(super) fn on_slurm(
     arguments: &ClusterArguments,
     progress: &FleetProgress,
 ) -> Result<Option<usize>> {
-    let wishes = arguments.wishes(workshop.ledger.store.root())?;
+    let options = arguments.options(workshop.ledger.store.root())?;
     let robots = &workshop.fleet.roster.0;
     // What may work now is tried again.
     let keys: Vec<(usize, String)> = chosen.iter().map(|index| (*index, workshop.key(&robots[*index]))).collect();
@@ -92,7 +92,7 @@ pub(super) fn on_slurm(
     while !left.is_empty() {
         note.tasks = arguments.tasks(&left);
         note.jobs.clear();
-        slurm::submit(&workshop.ledger, note, &wishes)?;
+        slurm::submit(&workshop.ledger, note, &options)?;
         progress.say(&format!(
             "{} in {}: jobs {}",
             counted(left.len(), "robot"),
@@ -120,7 +120,7 @@ pub(super) fn on_slurm(
                     "without a record after {}: {}; see {}",
                     counted(round + 1, "round"),
                     counted(left.len(), "robot"),
-                    log_folder(&wishes, note)
+                    log_folder(&options, note)
                 );
                 return Err(Error::Store(Fault::new("slurm", message)));
             }
@@ -135,6 +135,6 @@ pub(super) fn on_slurm(
     Ok(Some(at_first.len() - left.len()))
 }
 
-fn log_folder(wishes: &ClusterOptions, note: &RunNote) -> String {
-    crate::fleet::cluster::logs(&wishes.store, &note.fleet).display().to_string()
+fn log_folder(options: &ClusterOptions, note: &RunNote) -> String {
+    crate::fleet::cluster::logs(&options.store, &note.fleet).display().to_string()
 }

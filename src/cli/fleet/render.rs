@@ -48,20 +48,20 @@ pub(super) fn main(arguments: &RenderArguments, command_line: &[OsString]) -> Re
         return Err(Error::spec(fleet.name(), "every robot is recorded: nothing to submit"));
     }
     note.tasks = arguments.cluster.tasks(&missing);
-    let wishes = arguments.cluster.wishes(store.root())?;
+    let options = arguments.cluster.options(store.root())?;
     let text: String = match arguments.engine {
         Scheduler::Slurm => {
             note.engine = "slurm".into();
-            cluster::slurm(&note, &wishes)?.into_iter().map(|script| script.text).collect()
+            cluster::slurm(&note, &options)?.into_iter().map(|script| script.text).collect()
         }
         Scheduler::K8s => {
             note.engine = "k8s".into();
-            cluster::kubernetes(&note, &wishes, &arguments.image, &arguments.claim)
+            cluster::kubernetes(&note, &options, &arguments.image, &arguments.claim)
         }
     };
     // The tasks find their robots there.
     workshop.ledger.put_run(&note)?;
-    let folder = cluster::logs(&wishes.store, fleet.name());
+    let folder = cluster::logs(&options.store, fleet.name());
     std::fs::create_dir_all(&folder).map_err(|error| Error::store(folder.display().to_string(), error.to_string()))?;
     emit(&text)
 }

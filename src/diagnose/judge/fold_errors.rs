@@ -32,9 +32,9 @@ impl FoldErrors {
     /// `None` where the poses are too few for folds.
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
         let (data, rows) = (&fitter.data, &now.screening.kept);
-        // Where noise lasts, its neighbours in time would lend a row what wanders: whole stretches are left out.
+        // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
         let random = FoldKind::Random(fitter.question.seed);
-        let kind = if fitter.memory.is_some() { FoldKind::Blocks } else { random };
+        let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
         let errors = folds_of(kind, &Session { data, rows, model: &now.model, fitted: &now.fitted }, FOLDS)?;
         let squares = rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
         Some(Self { squares, moving: data.in_motion(rows) })

@@ -3,7 +3,7 @@
 use super::base_model::base_model;
 use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
-use crate::diagnose::whitened::{Memory, WhitenedProblem};
+use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
 use crate::robot::{Measurements, RobotModel};
@@ -80,14 +80,14 @@ pub(crate) struct Fitter<'a> {
     spread: Vec<Matrix3<f64>>,
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
-    /// Noise that lasts from row to row of standing points.
-    pub memory: Option<Memory>,
+    /// Autocorrelated noise of standing points; none where it is white.
+    pub correlated: Option<AutocorrelatedNoise>,
     /// How often that was learned.
-    recalled: usize,
+    estimated: usize,
 }
 
-/// What lasts is learned at most so often: what it makes of slow causes changes what it is estimated from.
-const RECALLS: usize = 3;
+/// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
+const ESTIMATES: usize = 3;
 
 /// A repeatability that changes by less than this share is settled.
 const SETTLED: f64 = 0.25;
@@ -102,8 +102,8 @@ impl<'a> Fitter<'a> {
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: Vec::new(),
             asked: false,
-            memory: None,
-            recalled: 0,
+            correlated: None,
+            estimated: 0,
         };
         let base = base_model(question.robot, &fitter.data, question.fit);
         let mut now = fitter.fit(&base, Vec::new());
@@ -147,15 +147,15 @@ impl<'a> Fitter<'a> {
         self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
     }
 
-    /// Whether noise that lasts may still be asked for: not of a moving arm, and not for ever.
-    pub fn may_recall(&self, settled: &FitState) -> bool {
-        self.recalled < RECALLS && !self.data.in_motion(&settled.screening.kept)
+    /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.
+    pub fn may_estimate_correlation(&self, settled: &FitState) -> bool {
+        self.estimated < ESTIMATES && !self.data.in_motion(&settled.screening.kept)
     }
 
-    /// Takes the memory that a residual showed.
-    pub fn recall(&mut self, memory: Option<Memory>) {
-        self.memory = memory;
-        self.recalled += 1;
+    /// Takes the autocorrelation that a residual showed.
+    pub fn take_correlation(&mut self, noise: Option<AutocorrelatedNoise>) {
+        self.correlated = noise;
+        self.estimated += 1;
     }
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.

@@ -1,18 +1,18 @@
 //! A round: the recording is looked at around the present model, which is then fitted anew with the causes that were found.
 
 mod base_model;
+mod correlated_noise;
 mod fit_state;
 mod history;
 mod noise;
 mod reversed_joints;
 mod stretches;
 mod view;
-mod wander;
 
 pub use base_model::BASE;
+pub(crate) use correlated_noise::correlation_left_by;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter};
 pub(crate) use history::{RoundHistory, RoundOutcome};
 pub(crate) use noise::REPEATS;
 pub(crate) use reversed_joints::REVERSED;
 pub(crate) use view::{RoundView, compliance};
-pub(crate) use wander::memory_left_by;

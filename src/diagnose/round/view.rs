@@ -25,8 +25,8 @@ impl<'a> RoundView<'a> {
             problem = problem.with_currents();
         }
         let autocorrelation_time = bounded_autocorrelation_time(&problem);
-        if let Some(memory) = fitter.memory {
-            problem = problem.with_memory(memory);
+        if let Some(noise) = fitter.correlated {
+            problem = problem.with_autocorrelation(noise);
         }
         let pose = poses(&fitter.data, &problem.rows, autocorrelation_time);
         Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }

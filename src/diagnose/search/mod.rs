@@ -164,8 +164,8 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
     fn like(&self, form: &Form) -> Hypothesis {
         let (key, variables) = (form.key(), form.variables());
         let mut same = self.pool.keys.iter().zip(&self.pool.hypotheses).filter(|(other, _)| **other == key);
-        let kin = same.find(|(_, other)| other.form.variables() == variables).map(|(_, kin)| kin.clone());
-        kin.map_or_else(|| Hypothesis::new(form.clone(), 1), |kin| Hypothesis { form: form.clone(), ..kin })
+        let like = same.find(|(_, other)| other.form.variables() == variables).map(|(_, like)| like.clone());
+        like.map_or_else(|| Hypothesis::new(form.clone(), 1), |like| Hypothesis { form: form.clone(), ..like })
     }
 
     /// The hypothesis' position in the pool, where it is put if it is not there.

@@ -2,16 +2,16 @@
 //!
 //! Residual rows are in standard deviations: three a row of the recording for the measured point, then one for each usable motor current.
 
+mod autocorrelated;
 mod currents;
-mod memory;
 
 use crate::effect::{Deflection, Effect, Form, PointMotion};
 use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
+pub(crate) use autocorrelated::AutocorrelatedNoise;
+use autocorrelated::Innovations;
 use currents::Currents;
 use faer::Mat;
-use memory::Innovations;
-pub(crate) use memory::Memory;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ pub(crate) struct WhitenedProblem<'a> {
     currents: Option<Currents>,
     /// What a standard deviation of a current counts: that of the points as they are left by the model.
     current_weight: f64,
-    /// What each row says beyond those before it, where noise lasts from row to row.
+    /// What each row says beyond those before it, where noise is correlated.
     innovations: Option<Innovations>,
     model: &'a Model,
     /// Whitened measured - predicted.
@@ -70,15 +70,15 @@ impl<'a> WhitenedProblem<'a> {
         self
     }
 
-    /// With noise that lasts from row to row: all columns become innovations.
-    pub fn with_memory(mut self, memory: Memory) -> Self {
-        let (innovations, points) = (memory.filter(&self.rows), self.points());
+    /// With autocorrelated noise: all columns become innovations.
+    pub fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
+        let (innovations, points) = (noise.filter(&self.rows), self.points());
         innovations.apply(&mut self.residual[..points]);
         self.innovations = Some(innovations);
         self
     }
 
-    /// What is left of the points' columns once it is known what lasts from row to row.
+    /// Takes a column's points to their innovations.
     fn innovate(&self, column: &mut [f64]) {
         if let Some(innovations) = &self.innovations {
             innovations.apply(&mut column[..3 * self.rows.len()]);
@@ -129,7 +129,7 @@ impl<'a> WhitenedProblem<'a> {
         out
     }
 
-    /// The same whatever lasts from row to row: whitened motions of the points per unit of each parameter.
+    /// The same whether noise is correlated or not: whitened motions of the points per unit of each parameter.
     pub fn motions_by(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];

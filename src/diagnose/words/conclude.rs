@@ -40,7 +40,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(by_speed(&last));
-    not_observable.extend(fitter.memory.map(slower_than_noise));
+    not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
     let folds = cross_validate(

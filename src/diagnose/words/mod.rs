@@ -17,7 +17,7 @@ pub use statement::other_means;
 
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
-use super::whitened::Memory;
+use super::whitened::AutocorrelatedNoise;
 use crate::effect::Form;
 use crate::error::counted;
 
@@ -31,13 +31,13 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
 }
 
 /// What the noise does from point to point.
-pub(crate) fn of_the_memory(fitter: &Fitter) -> String {
-    match fitter.memory {
-        Some(Memory { lasts, share }) => format!(
-            "noise lasts from point to point: {:.0} % of its variance with a correlation of {lasts:.2}; slow causes are judged against it",
+pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
+    match fitter.correlated {
+        Some(AutocorrelatedNoise { correlation, share }) => format!(
+            "noise is correlated from point to point: {:.0} % of its variance by {correlation:.2}; slow causes are judged against it",
             100.0 * share
         ),
-        None => "noise does not last from point to point".into(),
+        None => "noise is not correlated from point to point".into(),
     }
 }
 

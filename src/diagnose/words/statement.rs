@@ -1,7 +1,7 @@
 //! Findings in a sentence that a mechanic understands, and what the recording cannot show.
 
 use crate::diagnose::types::Finding;
-use crate::diagnose::whitened::Memory;
+use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Clock, Summary, Survey, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
@@ -62,12 +62,12 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     out
 }
 
-/// What noise that lasts from point to point hides.
-pub(super) fn slower_than_noise(memory: Memory) -> String {
+/// What noise that is correlated from point to point hides.
+pub(super) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
     format!(
-        "small slow causes (drift, steps, warm-up): noise lasts from point to point (correlation {:.2}), as moving air or a tripod leaves \
+        "small slow causes (drift, steps, warm-up): noise is correlated from point to point ({:.2}), as moving air or a tripod leaves \
          it; measure a fixed target every few poses",
-        memory.lasts
+        noise.correlation
     )
 }
 

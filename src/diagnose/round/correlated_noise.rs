@@ -1,28 +1,28 @@
-//! Whether what changes slowly is a cause that follows time, or noise that lasts from point to point.
+//! Whether what changes slowly is a cause that follows time, or noise that is correlated from point to point.
 //!
 //! Two explanations of the same points are compared: all causes with noise as it is believed, and the causes that do not follow time with noise
-//! that lasts. Searched causes take a part of what wanders with them, so that what they leave alone would show too little of it; likelihoods
+//! that is correlated. Searched causes take a part of such noise with them, so that what they leave alone would show too little of it; likelihoods
 //! are restricted ones (Patterson and Thompson, 1971), as the base model takes its part, too.
 
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
 use crate::diagnose::pool::{orthonormal, project};
-use crate::diagnose::whitened::{Memory, WhitenedProblem};
+use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{Form, Variable};
 use faer::Mat;
 use rayon::prelude::*;
 
 /// The criterion must be better by this much for another belief: strong evidence (Kass and Raftery, 1995), doubled.
 const PLAIN: f64 = 20.0;
-/// Causes that follow time must be better than noise that lasts by strong evidence: such noise is everywhere.
+/// Causes that follow time must be better than correlated noise by strong evidence: such noise is everywhere.
 const CLEARER: f64 = 8.0;
-/// Of memories whose criterion is within this of the best the one that lasts longest is believed (95 % of chi-square with one degree of
-/// freedom): too short a memory makes causes of noise.
+/// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree of
+/// freedom): too short a noise makes causes of noise.
 const AS_GOOD: f64 = 3.84;
 
 /// What noise does from row to row (nothing: `Some(None)`), if the settled model shows it to be otherwise than believed.
-pub(crate) fn memory_left_by(settled: &FitState, fitter: &Fitter) -> Option<Option<Memory>> {
-    if !fitter.may_recall(settled) {
+pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<Option<AutocorrelatedNoise>> {
+    if !fitter.may_estimate_correlation(settled) {
         return None;
     }
     let rows = thinned(&fitter.data, &settled.screening.kept);
@@ -31,17 +31,17 @@ pub(crate) fn memory_left_by(settled: &FitState, fitter: &Fitter) -> Option<Opti
     let numbers = |(cause, slow): (&_, &bool)| if *slow { numbers(cause) } else { 0 };
     let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().zip(&slow).map(numbers).sum::<usize>() as f64;
     let with_all = Regression::of(&problem, settled, fitter, &vec![true; slow.len()]);
-    let believed = with_all.cost(fitter.memory) + price;
-    let (mut best, mut memory) = with_all.likeliest();
+    let believed = with_all.cost(fitter.correlated) + price;
+    let (mut best, mut noise) = with_all.likeliest();
     best += price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of(&problem, settled, fitter, &kept).likeliest();
         if cost < best + CLEARER && other.is_some() {
-            (best, memory) = (cost, other);
+            (best, noise) = (cost, other);
         }
     }
-    (best < believed - PLAIN && memory != fitter.memory).then_some(memory)
+    (best < believed - PLAIN && noise != fitter.correlated).then_some(noise)
 }
 
 fn follows_time(form: &Form) -> bool {
@@ -85,7 +85,7 @@ impl<'a> Regression<'a> {
         let mut left = points.clone();
         project(orthonormal(&matrix(&columns, rows)).as_ref(), &mut left);
         let gross = left.clone();
-        Memory::without_gross(&mut left);
+        AutocorrelatedNoise::without_gross(&mut left);
         points.iter_mut().zip(gross.iter().zip(&left)).for_each(|(value, (gross, left))| *value += left - gross);
         let mut own = Self { rows: &problem.rows, columns, count, points, white: 0.0 };
         own.white = pivots(&matrix(&own.columns, rows));
@@ -93,8 +93,8 @@ impl<'a> Regression<'a> {
     }
 
     /// -2 ln of the restricted likelihood, its scale estimated, up to a constant of the points.
-    fn cost(&self, memory: Option<Memory>) -> f64 {
-        let believed = memory.unwrap_or(Memory::NONE);
+    fn cost(&self, noise: Option<AutocorrelatedNoise>) -> f64 {
+        let believed = noise.unwrap_or(AutocorrelatedNoise::NONE);
         let rows = self.points.len();
         let innovations = believed.filter(self.rows);
         let (mut columns, mut left) = (self.columns.clone(), self.points.clone());
@@ -104,18 +104,18 @@ impl<'a> Regression<'a> {
         project(orthonormal(&design).as_ref(), &mut left);
         let freedom = (rows.saturating_sub(self.count)).max(1) as f64;
         let square: f64 = left.iter().map(|value| value * value).sum();
-        let shapes = if memory.is_some() { 2.0 * freedom.ln() } else { 0.0 };
+        let shapes = if noise.is_some() { 2.0 * freedom.ln() } else { 0.0 };
         freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * (pivots(&design) - self.white) + shapes
     }
 
-    /// The least cost, and of the memories that are as good the one that lasts longest.
-    fn likeliest(&self) -> (f64, Option<Memory>) {
-        let all: Vec<Option<Memory>> = Memory::all().collect();
-        let costs: Vec<f64> = all.par_iter().map(|memory| self.cost(*memory)).collect();
+    /// The least cost, and of the autocorrelations that are as good the longest.
+    fn likeliest(&self) -> (f64, Option<AutocorrelatedNoise>) {
+        let all: Vec<Option<AutocorrelatedNoise>> = AutocorrelatedNoise::all().collect();
+        let costs: Vec<f64> = all.par_iter().map(|noise| self.cost(*noise)).collect();
         let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
-        let as_good = all.into_iter().zip(costs).filter(|(_, cost)| *cost < best + AS_GOOD).map(|(memory, _)| memory);
-        let wander = |memory: &Option<Memory>| memory.map_or(0.0, Memory::wander);
-        (best, as_good.max_by(|a, b| wander(a).total_cmp(&wander(b))).flatten())
+        let as_good = all.into_iter().zip(costs).filter(|(_, cost)| *cost < best + AS_GOOD).map(|(noise, _)| noise);
+        let length = |noise: &Option<AutocorrelatedNoise>| noise.map_or(0.0, AutocorrelatedNoise::length);
+        (best, as_good.max_by(|a, b| length(a).total_cmp(&length(b))).flatten())
     }
 }
 
