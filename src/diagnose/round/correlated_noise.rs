@@ -32,13 +32,13 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().zip(&slow).map(numbers).sum::<usize>() as f64;
     let with_all = Regression::of(&problem, settled, fitter, &vec![true; slow.len()]);
     let believed = with_all.cost(fitter.correlated) + price;
-    let (mut best, mut noise) = with_all.likeliest();
-    best += price;
+    let (best, noise) = with_all.likeliest();
+    let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of(&problem, settled, fitter, &kept).likeliest();
-        if cost < best + CLEARER && other.is_some() {
-            (best, noise) = (cost, other);
+        if cost < best.min(believed) + CLEARER && other.is_some() {
+            return (other != fitter.correlated).then_some(other);
         }
     }
     (best < believed - PLAIN && noise != fitter.correlated).then_some(noise)
