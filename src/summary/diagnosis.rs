@@ -155,11 +155,11 @@ impl DiagnosisSummary {
             let all = self.located(by);
             let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
             if !all.is_empty() {
-                text.push_str(&format!("{what:9}  {}\n", all.join(", ")));
+                text.push_str(&format!("{what:10}  {}\n", all.join(", ")));
             }
         }
         if !self.shares.0.is_empty() {
-            text.push_str("           (of the squared residual, what one cause there could explain at most)\n\n");
+            text.push_str("            (of the squared residual, what one cause there could explain at most)\n\n");
         }
         for finding in &self.findings.0 {
             text.push_str(&format!("{}. {}\n", finding.rank, finding.statement));

@@ -72,10 +72,13 @@ fn two_runs_at_once_share_the_robots() {
     let (cases, store) = (folder.path().join("cases"), folder.path().join("store"));
     recordings(&cases, 8);
     let file = file(folder.path(), "line", "robots:\n  - folders: cases/recordings/*\n");
-    let start = || fleet("run", &file, &store).args(["--json", "--quiet", "-j", "1"]).stdout(Stdio::piped()).spawn().unwrap();
+    let start = || {
+        let mut run = fleet("run", &file, &store);
+        run.args(["--json", "--quiet", "-j", "1"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
     let computed = [start(), start()].map(|child| {
         let output = child.wait_with_output().unwrap();
-        assert!(output.status.success());
+        assert!(output.status.success(), "{}: {}", output.status, String::from_utf8_lossy(&output.stderr));
         let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         told["computed"].as_u64().unwrap()
     });
