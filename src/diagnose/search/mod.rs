@@ -154,18 +154,10 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
 
     /// From causes to the best set.
     pub fn run_from<'f>(&mut self, causes: impl Iterator<Item = &'f Form>) -> SearchResult {
-        let mut start: Vec<usize> = causes.map(|form| self.position(self.like(form))).collect();
+        let mut start: Vec<usize> = causes.map(|form| self.position(Hypothesis::new(form.clone(), 1))).collect();
         start.sort_unstable();
         start.dedup();
         self.run(start)
-    }
-
-    /// A form that an earlier round refined, with the prior of the form that it was refined from.
-    fn like(&self, form: &Form) -> Hypothesis {
-        let (key, variables) = (form.key(), form.variables());
-        let mut same = self.pool.keys.iter().zip(&self.pool.hypotheses).filter(|(other, _)| **other == key);
-        let like = same.find(|(_, other)| other.form.variables() == variables).map(|(_, like)| like.clone());
-        like.map_or_else(|| Hypothesis::new(form.clone(), 1), |like| Hypothesis { form: form.clone(), ..like })
     }
 
     /// The hypothesis' position in the pool, where it is put if it is not there.
