@@ -13,19 +13,13 @@ pub(super) fn of(
     learned: Option<&StageReport>,
     load: impl Fn(&TableRef) -> Result<Frame>,
 ) -> Result<Scatter> {
-    let table = |stage: &StageReport, kind: &str| {
-        stage.outputs.iter().find(|output| output.kind == kind).map(|output| load(&output.table)).transpose()
-    };
-    let diagnosed = table(stage, Verdict::KIND)?.map(|frame| Verdict::from_frame(&frame)).transpose()?;
-    let fitted = table(stage, Observability::KIND)?.map(|frame| Observability::from_frame(&frame)).transpose()?;
+    let diagnosed: Option<Verdict> = written(stage, &load)?;
+    let fitted: Option<Observability> = written(stage, &load)?;
+    let prediction: Option<Prediction> = written(stage, &load)?;
+    let corrections: Option<Corrections> = learned.map_or(Ok(None), |learned| written(learned, &load))?;
     let repeatability = diagnosed
         .and_then(|verdict| verdict.0.first().map(|row| row.repeatability_rad))
         .or_else(|| fitted?.0.iter().find(|row| row.quantity == "joint_repeatability_rad").map(|row| row.value));
-    let prediction = table(stage, Prediction::KIND)?.map(|frame| Prediction::from_frame(&frame)).transpose()?;
-    let corrections = match learned {
-        Some(learned) => table(learned, Corrections::KIND)?.map(|frame| Corrections::from_frame(&frame)).transpose()?,
-        None => None,
-    };
     let mut unexplained = prediction.as_ref().map_or(0.0, Prediction::unexplained_mm);
     if let (Some(rms), Some(prediction)) = (corrections.as_ref().and_then(Corrections::rms_mm), &prediction) {
         // The errors of a correction's folds hold the noise, the parameters' uncertainty and what is left.
@@ -33,4 +27,10 @@ pub(super) fn of(
         unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
     }
     Ok(Scatter { unexplained: unexplained * 1e-3, repeatability: repeatability.unwrap_or(0.0) })
+}
+
+/// The table of a kind that a stage wrote, if it wrote one.
+fn written<T: Table>(stage: &StageReport, load: impl Fn(&TableRef) -> Result<Frame>) -> Result<Option<T>> {
+    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
+    own.map(|output| T::from_frame(&load(&output.table)?)).transpose()
 }

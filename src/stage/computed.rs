@@ -38,7 +38,7 @@ mod tests {
 
     #[test]
     fn only_a_residual_far_below_the_noise_is_suspected() {
-        assert!(suspicion(points(20, 0.0003), 30).unwrap().contains("3.00e-4 mm rms, far below the instrument's 2.00e-2 mm"));
+        assert!(suspicion(points(20, 0.0003), 30).unwrap().contains("3.00e-4 mm rms, far below the 2.00e-2 mm"));
         assert!(suspicion(points(20, 0.005), 30).is_none());
         // Ten points and thirty parameters: a fit passes through all of them.
         assert!(suspicion(points(10, 0.0), 30).is_none());

@@ -1,6 +1,7 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
 
-use crate::effect::{BaseFrame, LONG_AFTER};
+use crate::diagnose::BASE;
+use crate::effect::{AnchorShift, BaseFrame, LONG_AFTER};
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, align_points};
 use crate::robot::{Measurements, RobotModel, Visited};
@@ -98,12 +99,9 @@ impl Stage for Transfer {
     }
 }
 
-/// Effects of the rigid arm and its gears, which a model was first identified with.
-const GEOMETRY: [&str; 7] =
-    ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
-
+/// Whether a parameter is of the rigid arm, its gears or what it was measured to.
 fn is_geometry(row: &ParameterRow) -> bool {
-    row.form.is_none() && GEOMETRY.contains(&row.effect.as_str())
+    row.form.is_none() && (row.effect == AnchorShift::NAME || BASE.contains(&row.effect.as_str()))
 }
 
 /// Whole points by which a carried model is judged: those that did not place its base, or where there are none, all.

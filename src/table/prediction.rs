@@ -101,11 +101,16 @@ impl Prediction {
         Self(rows.collect())
     }
 
+    /// Whole points that the step was fitted to.
+    fn fitted_points(&self) -> impl Iterator<Item = &PredictionRow> {
+        self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none())
+    }
+
     /// Standard deviation per axis (mm) of what the model leaves beyond the noise, by the residuals of the points that its step was
     /// fitted to, with what the fit took up put back. Zero where it is within two standard errors of none.
     pub fn unexplained_mm(&self) -> f64 {
         let (mut excess, mut noise, mut count) = (0.0, 0.0, 0usize);
-        for row in self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none()) {
+        for row in self.fitted_points() {
             excess += row.error_mm.powi(2) + row.sigma_mm.unwrap_or(0.0).powi(2) - row.noise_mm.powi(2);
             noise += row.noise_mm.powi(2);
             count += 1;
@@ -117,8 +122,7 @@ impl Prediction {
 
     /// Mean squared one-sigma length of the noise of the points that the step was fitted to, mm2; zero of none.
     pub fn mean_square_noise_mm2(&self) -> f64 {
-        let fitted = self.0.iter().filter(|row| !row.held_out && !row.suspect && row.measured.is_none());
-        let (sum, count) = fitted.fold((0.0, 0usize), |(sum, count), row| (sum + row.noise_mm.powi(2), count + 1));
+        let (sum, count) = self.fitted_points().fold((0.0, 0usize), |(sum, count), row| (sum + row.noise_mm.powi(2), count + 1));
         sum / count.max(1) as f64
     }
 

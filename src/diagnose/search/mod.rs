@@ -163,10 +163,10 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
     /// The hypothesis' position in the pool, where it is put if it is not there.
     fn position(&mut self, hypothesis: Hypothesis) -> usize {
         let same = |other: &Hypothesis| other.form == hypothesis.form;
-        if let Some(at) = self.pool.hypotheses.iter().position(same) {
-            return at;
+        match self.pool.hypotheses.iter().position(same) {
+            Some(at) => at,
+            None => self.pool.add(vec![hypothesis]),
         }
-        self.pool.add(vec![hypothesis])
     }
 }
 
