@@ -1,6 +1,7 @@
 //! The pool with what was computed of its sets: a search meets most of them more than once.
 
-use super::conditional::Conditional;
+use super::cholesky::PivotedCholesky;
+use super::conditional::{Conditional, SetProducts};
 use super::hypotheses::HypothesisSet;
 use super::solve::{Solution, solve};
 use crate::effect::{Form, Hypothesis};
@@ -13,6 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub(crate) struct CachedHypotheses<'a> {
     pool: HypothesisSet<'a>,
     products: Mutex<Products>,
+    /// Products of the columns of hypotheses that were in a set with the columns of all, for one column of the pool after another.
+    across: Mutex<HashMap<usize, Vec<f64>>>,
     scores: Mutex<HashMap<Vec<usize>, f64>>,
     conditionals: Mutex<HashMap<Vec<usize>, Arc<Conditional>>>,
 }
@@ -22,7 +25,13 @@ type Products = HashMap<(usize, usize), Arc<Mat<f64>>>;
 
 impl<'a> From<HypothesisSet<'a>> for CachedHypotheses<'a> {
     fn from(pool: HypothesisSet<'a>) -> Self {
-        Self { pool, products: Mutex::default(), scores: Mutex::default(), conditionals: Mutex::default() }
+        Self {
+            pool,
+            products: Mutex::default(),
+            across: Mutex::default(),
+            scores: Mutex::default(),
+            conditionals: Mutex::default(),
+        }
     }
 }
 
@@ -51,9 +60,14 @@ impl CachedHypotheses<'_> {
         products
     }
 
+    /// The factor of the Gram matrix of a set's columns.
+    pub(super) fn factor(&self, set: &[usize]) -> PivotedCholesky {
+        PivotedCholesky::of(self.gram_of(set, |a, b| self.products(a, b)), self.columns_of(set).len())
+    }
+
     /// Estimates a set of hypotheses together, beside the base model.
     pub fn solve(&self, set: &[usize]) -> Solution {
-        solve(&self.pool, set, self.gram_of(set, |a, b| self.products(a, b)))
+        solve(&self.pool, set, &self.factor(set))
     }
 
     /// Coefficients of every member of a set.
@@ -72,9 +86,26 @@ impl CachedHypotheses<'_> {
         if let Some(conditional) = lock(&self.conditionals).get(set) {
             return conditional.clone();
         }
-        let conditional = Arc::new(Conditional::of(&self.pool, set));
+        let conditional = Arc::new(self.conditional(set));
         lock(&self.conditionals).insert(set.to_vec(), conditional.clone());
         conditional
+    }
+
+    fn conditional(&self, set: &[usize]) -> Conditional {
+        let count = |h: &usize| self.first[h + 1] - self.first[*h];
+        let mut across = lock(&self.across);
+        for h in set {
+            // Hypotheses that were added since are not among those known.
+            let known = across.entry(*h).or_default();
+            let more = self.pool.products_with_all(*h, known.len() / count(h).max(1));
+            known.extend(more);
+        }
+        let of = |h: &usize| {
+            let (of_hypothesis, count) = (across[h].as_slice(), count(h));
+            (0..count).map(move |own| SetProducts { of_hypothesis, count, own })
+        };
+        let products: Vec<SetProducts> = set.iter().flat_map(of).collect();
+        Conditional::of(&self.pool, set, &self.factor(set), &products)
     }
 
     /// Drops remembered conditional problems but those of `keep`.

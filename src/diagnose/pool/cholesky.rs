@@ -1,6 +1,6 @@
 //! Least squares by a pivoted Cholesky factor of a small Gram matrix: what the data do not see is left out.
 
-use super::linear::{INVISIBLE, dot, gram};
+use super::linear::INVISIBLE;
 
 /// A pivoted Cholesky factor of a small Gram matrix: what is below [`INVISIBLE`] is left out.
 pub(super) struct PivotedCholesky {
@@ -79,11 +79,4 @@ impl PivotedCholesky {
         }
         out
     }
-}
-
-/// By how much columns (one after another, unit raw length, projected) lower a squared residual.
-pub(crate) fn gain(columns: &[f64], rows: usize, residual: &[f64]) -> f64 {
-    let own: Vec<&[f64]> = columns.chunks(rows).collect();
-    let factor = PivotedCholesky::of(gram(&own), own.len());
-    factor.forward(|k| dot(own[k], residual)).iter().map(|value| value * value).sum()
 }

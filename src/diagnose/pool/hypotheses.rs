@@ -7,7 +7,7 @@ use super::linear::{dot, gram, orthonormal, project, span};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::Hypothesis;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 use std::ops::Deref;
 
@@ -126,7 +126,7 @@ impl<'a> HypothesisSet<'a> {
         self.base.ncols()
     }
 
-    fn column(&self, column: usize) -> &[f64] {
+    pub(super) fn column(&self, column: usize) -> &[f64] {
         &self.columns[column * self.residual_rows..(column + 1) * self.residual_rows]
     }
 
@@ -143,6 +143,19 @@ impl<'a> HypothesisSet<'a> {
         let (down, across) = (self.columns_from(a), self.columns_from(b));
         let mut products = Mat::zeros(down.ncols(), across.ncols());
         matmul(products.as_mut(), Accum::Replace, down.transpose(), across, 1.0, Par::Seq);
+        products
+    }
+
+    /// Products of the columns of a hypothesis with those of the pool from `begin` on, for one column of the pool after another.
+    pub fn products_with_all(&self, h: usize, begin: usize) -> Vec<f64> {
+        let own = self.columns_from(h);
+        let mut products = vec![0.0; own.ncols() * (self.scale.len() - begin)];
+        products.par_chunks_mut(CHUNK * own.ncols().max(1)).enumerate().for_each(|(chunk, products)| {
+            let count = products.len() / own.ncols();
+            let some = self.all().subcols(begin + chunk * CHUNK, count);
+            let products = MatMut::from_column_major_slice_mut(products, own.ncols(), count);
+            matmul(products, Accum::Replace, own.transpose(), some, 1.0, Par::Seq);
+        });
         products
     }
 

@@ -52,11 +52,6 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
-/// A column of a matrix, which are stored one after another.
-pub(super) fn column(matrix: &Mat<f64>, k: usize) -> &[f64] {
-    matrix.col(k).try_as_col_major().map_or(&[], |column| column.as_slice())
-}
-
 /// Columns that are made orthonormal at once.
 const BLOCK: usize = 16;
 

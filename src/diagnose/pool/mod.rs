@@ -2,6 +2,7 @@
 //!
 //! Sets are ascending lists of positions in the pool.
 
+mod beside;
 mod cached;
 mod cholesky;
 mod conditional;
@@ -10,8 +11,8 @@ mod hypotheses;
 mod linear;
 mod solve;
 
+pub(crate) use beside::Beside;
 pub(crate) use cached::CachedHypotheses;
-pub(crate) use cholesky::gain;
 pub(crate) use conditional::Conditional;
 pub(crate) use criterion::EQUIVALENT;
 pub(crate) use hypotheses::HypothesisSet;

@@ -15,11 +15,10 @@ pub(crate) struct Solution {
     pub errors: Vec<f64>,
 }
 
-/// Estimates a set of hypotheses together, beside the base model, from the [`HypothesisSet::gram_of`] them.
-pub(super) fn solve(pool: &HypothesisSet, set: &[usize], gram: Vec<f64>) -> Solution {
+/// Estimates a set of hypotheses together, beside the base model, from the factor of their Gram matrix.
+pub(super) fn solve(pool: &HypothesisSet, set: &[usize], factor: &PivotedCholesky) -> Solution {
     let columns = pool.columns_of(set);
     let q = columns.len();
-    let factor = PivotedCholesky::of(gram, q);
     let forward = factor.forward(|k| pool.gradient[columns[k]]);
     let gain: f64 = forward.iter().map(|value| value * value).sum();
     let solved = factor.backward(&forward);

@@ -1,10 +1,8 @@
 //! Shapes of hypotheses refined: on the grid on which they are proposed the right one may look poor.
 
 use super::{CauseSearch, with};
-use crate::diagnose::pool::{dot, gain, project};
-use crate::effect::{Effect, Form, Hypothesis};
-use faer::Mat;
-use rayon::prelude::*;
+use crate::diagnose::pool::Beside;
+use crate::effect::{Effect, Hypothesis};
 use std::collections::BTreeSet;
 
 /// Levels of refinement, and how many may bring nothing.
@@ -39,16 +37,14 @@ impl CauseSearch<'_, '_> {
                 continue;
             }
             let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
-            let beside = self.pool.span(&rest);
-            let mut residual = self.pool.residual.clone();
-            project(beside.as_ref(), &mut residual);
+            let beside = Beside::of(self.pool, &rest);
             let mut form = self.pool.hypotheses[h].form.clone();
-            let mut most = self.gain(&form, &beside, &residual);
+            let mut most = beside.gains(std::slice::from_ref(&form))[0];
             let mut idle = 0;
             for level in 0..LEVELS {
-                let near = form.near(self.survey, level).into_par_iter();
-                let near: Vec<(f64, Form)> = near.map(|form| (self.gain(&form, &beside, &residual), form)).collect();
-                match near.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                let near = form.near(self.survey, level);
+                let gains = beside.gains(&near);
+                match gains.into_iter().zip(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
                     Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
                     _ => idle += 1,
                 }
@@ -68,18 +64,5 @@ impl CauseSearch<'_, '_> {
             }
         }
         set
-    }
-
-    /// By how much a form would lower the squared `residual` beside what the columns of `beside` span.
-    fn gain(&self, form: &Form, beside: &Mat<f64>, residual: &[f64]) -> f64 {
-        let rows = self.pool.residual_rows;
-        let mut columns = self.pool.problem.columns(form);
-        for column in columns.chunks_mut(rows) {
-            let norm = dot(column, column).sqrt().max(1e-300);
-            column.iter_mut().for_each(|value| *value /= norm);
-        }
-        project(self.pool.base.as_ref(), &mut columns);
-        project(beside.as_ref(), &mut columns);
-        gain(&columns, rows, residual)
     }
 }

@@ -1,0 +1,98 @@
+//! New forms judged beside a set of hypotheses and the base model, without a place in the pool.
+
+use super::cached::CachedHypotheses;
+use super::cholesky::PivotedCholesky;
+use super::linear::dot;
+use crate::effect::Form;
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, Mat, MatRef, Par};
+use rayon::prelude::*;
+
+/// A set of hypotheses and the base model, beside which forms are tried.
+pub(crate) struct Beside<'p, 'a> {
+    pool: &'p CachedHypotheses<'a>,
+    /// Columns of the set that the data see, residual rows x rank.
+    columns: Mat<f64>,
+    /// Cholesky factor of their Gram matrix.
+    lower: Mat<f64>,
+    /// What base model and set leave.
+    residual: Vec<f64>,
+}
+
+impl<'p, 'a> Beside<'p, 'a> {
+    pub fn of(pool: &'p CachedHypotheses<'a>, set: &[usize]) -> Self {
+        let (factor, own) = (pool.factor(set), pool.columns_of(set));
+        let rank = factor.rank();
+        let lower = Mat::from_fn(rank, rank, |i, j| if j <= i { factor.row(i)[j] } else { 0.0 });
+        let mut columns = Mat::zeros(pool.residual_rows, rank);
+        for (k, column) in factor.order.iter().enumerate() {
+            columns.col_as_slice_mut(k).copy_from_slice(pool.column(own[*column]));
+        }
+        let coefficients = factor.backward(&factor.forward(|k| pool.gradient[own[k]]));
+        let mut residual = pool.residual.clone();
+        for (k, coefficient) in coefficients.iter().enumerate() {
+            residual.iter_mut().zip(columns.col_as_slice(k)).for_each(|(value, c)| *value -= coefficient * c);
+        }
+        Self { pool, columns, lower, residual }
+    }
+
+    /// By how much each form would lower the squared residual.
+    pub fn gains(&self, forms: &[Form]) -> Vec<f64> {
+        let half = forms.len().div_ceil(rayon::current_num_threads()).max(1);
+        forms.par_chunks(half).flat_map_iter(|forms| self.gains_of(forms)).collect()
+    }
+
+    fn gains_of(&self, forms: &[Form]) -> Vec<f64> {
+        let rows = self.pool.residual_rows;
+        let (mut all, mut counts) = (Vec::new(), Vec::new());
+        for form in forms {
+            let columns = self.pool.problem.columns(form);
+            counts.push(columns.len() / rows.max(1));
+            all.extend(columns);
+        }
+        for column in all.chunks_mut(rows.max(1)) {
+            let norm = dot(column, column).sqrt().max(1e-300);
+            column.iter_mut().for_each(|value| *value /= norm);
+        }
+        let all = MatRef::from_column_major_slice(&all, rows, all.len() / rows.max(1));
+        let by_base = product(self.pool.base.as_ref(), all);
+        let mut by_set = product(self.columns.as_ref(), all);
+        if self.lower.ncols() > 0 {
+            solve_lower_triangular_in_place(self.lower.as_ref(), by_set.as_mut(), Par::Seq);
+        }
+        let mut first = 0;
+        let one = |count| {
+            let own = first..first + count;
+            first += count;
+            self.gain([all, by_base.as_ref(), by_set.as_ref()].map(|of| of.subcols(own.start, count)))
+        };
+        counts.into_iter().map(one).collect()
+    }
+
+    /// By how much columns lower the squared residual: their entries, and what base model and set take off them.
+    fn gain(&self, [own, by_base, by_set]: [MatRef<'_, f64>; 3]) -> f64 {
+        let count = own.ncols();
+        let mut gram = vec![0.0; count * count];
+        for i in 0..count {
+            for j in 0..=i {
+                let product = |of: MatRef<'_, f64>| dot(slice(of, i), slice(of, j));
+                gram[i * count + j] = product(own) - product(by_base) - product(by_set);
+            }
+        }
+        let factor = PivotedCholesky::of(gram, count);
+        factor.forward(|k| dot(slice(own, k), &self.residual)).iter().map(|value| value * value).sum()
+    }
+}
+
+/// A column of a matrix that is stored column by column.
+fn slice(of: MatRef<'_, f64>, k: usize) -> &[f64] {
+    of.get(.., k).try_as_col_major().map_or(&[], |column| column.as_slice())
+}
+
+/// Transpose of `a` times `b`.
+fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut products = Mat::zeros(a.ncols(), b.ncols());
+    matmul(products.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    products
+}
