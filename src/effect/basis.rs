@@ -108,9 +108,13 @@ impl Basis {
                 let beyond = (low - u).max(u - high).clamp(0.0, wave);
                 let share = if beyond > 0.0 { 0.5 + 0.5 * libm::cos(PI * beyond / wave) } else { 1.0 };
                 let [(a, own), (b, other)] = gaps.ends(u);
-                let (from, to) = (cosines(a, [low, high], count), cosines(b, [low, high], count));
-                let straight = from.zip(to).map(|(from, to)| own * from + other * to);
-                straight.enumerate().for_each(|(k, value)| each(k, share * value));
+                let from = cosines(a, [low, high], count);
+                if other == 0.0 {
+                    from.enumerate().for_each(|(k, value)| each(k, share * value));
+                } else {
+                    let straight = from.zip(cosines(b, [low, high], count)).map(|(from, to)| own * from + other * to);
+                    straight.enumerate().for_each(|(k, value)| each(k, share * value));
+                }
             }
             Self::Bump { centre, width } => {
                 let distance = (u - centre) / width;
@@ -137,7 +141,10 @@ impl Basis {
 /// Cosines of `u` held within the range, see [`Basis::Cosines`].
 pub(super) fn cosines(u: f64, [low, high]: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
     let phase = PI * ((u - low) / (high - low).max(1e-12)).clamp(0.0, 1.0);
-    (1..=count).map(move |k| libm::cos(k as f64 * phase))
+    // Turned on by the phase each time: rounding grows in proportion to the order.
+    let (sine, cosine) = libm::sincos(phase);
+    let turned = move |(c, s): &(f64, f64)| Some((c * cosine - s * sine, s * cosine + c * sine));
+    std::iter::successors(Some((cosine, sine)), turned).take(count).map(|(c, _)| c)
 }
 
 /// A number divided and multiplied by a step that shrinks from `first` towards 1 with the level, kept within bounds; the number
@@ -150,6 +157,14 @@ pub(super) fn around(value: f64, first: f64, pace: f64, level: i32, [low, high]:
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cosines_of_high_orders_are_those_of_the_library() {
+        for (u, order) in [(0.3, 1), (1.7, 40), (2.9, 180), (3.0, 200)] {
+            let value = cosines(u, [0.0, PI], order).last().expect("one");
+            assert!((value - libm::cos(order as f64 * u)).abs() < 1e-13, "{u} {order}");
+        }
+    }
 
     #[test]
     fn a_curve_is_straight_across_a_gap_and_as_before_beside_it() {

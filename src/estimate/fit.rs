@@ -70,6 +70,11 @@ pub struct Fitted {
 }
 
 impl Fitted {
+    /// Parameters that were estimated.
+    pub(crate) fn free(&self) -> Vec<usize> {
+        (0..self.statuses.len()).filter(|k| matches!(self.statuses[*k], ParameterStatus::Free(_))).collect()
+    }
+
     /// What the rows show beyond their own noise.
     pub(crate) fn excess(&self) -> ExcessSigma {
         ExcessSigma { length: self.excess_sigma, angle: self.excess_sigma_angle.unwrap_or_default() }

@@ -1,32 +1,23 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
 //! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do.
 //!
-//! A fold's fit is the whole one less the fold's rows, one Gauss-Newton step away: of G = J R^-1 of these rows (R'R = J'J of all) and
-//! their errors e it is R^-1 (1 - G'G)^-1 (Q'r - G'e). Where that step is not small, the fit is repeated instead.
+//! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
+//! instead.
 
-use super::factor::TriangularFactor;
-use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
+use super::fit::{FitOptions, ParameterStatus, fit};
 use super::model::Model;
-use super::problem::Problem;
+use super::nearby::NearbyFits;
 use super::repeats::Poses;
 use super::row_error::row_error;
 use super::session::Session;
-use super::term::ObservationTerm;
-use crate::observation::KINDS;
 use crate::robot::Measurements;
-use faer::Mat;
-use nalgebra::{DMatrix, DVector, Vector3};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
-/// Least share of what is known in any direction that must be left without a fold: with less, other parameters may be seen.
-const LEFT: f64 = 0.02;
 /// Stretches into which the recording of a moving arm is cut.
 const STRETCHES: usize = 40;
-/// Departure from a straight line (of the fold's errors) up to which a step is small.
-const STRAIGHT: f64 = 0.01;
 
 /// Errors (m) of rows under fits without them, in the order of the fitted rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,10 +38,8 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     let order = whole.divisible(&parts, count)?;
     let blocks = deal(&order, rows.len(), count);
     let random = at_random(order, rows.len(), count, seed);
-    let folds: Vec<&Vec<usize>> = random.iter().chain(&blocks).collect();
-    let errors = whole.without_each(&folds);
-    let (one, other) = errors.split_at(count);
-    Some(Folds { count, random: gather(data, rows, &random, one), blocks: gather(data, rows, &blocks, other) })
+    let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds));
+    Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
 }
 
 /// How rows are dealt into folds.
@@ -62,17 +51,15 @@ pub(crate) enum FoldKind {
     Blocks,
 }
 
-/// One kind of [`Folds`] alone.
-pub(crate) fn folds_of(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<f64>> {
+/// Rows of one kind of [`Folds`], each sorted. `None` where the poses are too few.
+pub(crate) fn dealt(kind: FoldKind, whole: &Session, count: usize) -> Option<Vec<Vec<usize>>> {
     let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
     let order = whole.divisible(&parts, count)?;
-    let folds = match kind {
+    Some(match kind {
         FoldKind::Random(seed) => at_random(order, rows.len(), count, seed),
         FoldKind::Blocks => deal(&order, rows.len(), count),
-    };
-    let errors = whole.without_each(&folds.iter().collect::<Vec<_>>());
-    Some(gather(data, rows, &folds, &errors))
+    })
 }
 
 /// Poses dealt in an order that `seed` draws.
@@ -95,16 +82,15 @@ impl Session<'_> {
     }
 
     /// Errors (m) of the rows of each fold under a fit to the others.
-    fn without_each(&self, folds: &[&Vec<usize>]) -> Vec<Vec<f64>> {
+    pub(crate) fn without_each(&self, folds: &[Vec<usize>]) -> Vec<Vec<f64>> {
         let Self { model, data, rows, fitted } = *self;
         let candidates = self.candidates();
-        let problem = Problem { data, rows, excess: fitted.excess() };
-        let near = Near::of(&problem, model, fitted);
-        let one = |fold: &&Vec<usize>| {
-            let close = near.as_ref().and_then(|near| near.without(&problem, model, fold));
+        let nearby = NearbyFits::of(self, folds, &fitted.free());
+        let close = nearby.as_ref().and_then(NearbyFits::alone).unwrap_or_else(|| vec![None; folds.len()]);
+        let repeated = |(fold, close): (&Vec<usize>, Option<Vec<f64>>)| {
             close.unwrap_or_else(|| without(model, data, rows, &candidates, fold))
         };
-        folds.par_iter().map(one).collect()
+        folds.par_iter().zip(close).map(repeated).collect()
     }
 }
 
@@ -134,98 +120,6 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
     folds
 }
 
-/// The problem at the whole fit's solution.
-struct Near {
-    free: Vec<usize>,
-    factor: TriangularFactor,
-    inverse: Mat<f64>,
-}
-
-impl Near {
-    /// `None` where bounds are in the way or the factor is singular.
-    fn of(problem: &Problem, model: &Model, fitted: &Fitted) -> Option<Self> {
-        if model.known.values().any(|known| known.bounds.is_some()) {
-            return None;
-        }
-        let free: Vec<usize> =
-            (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
-        let factor = problem.evaluate(model, &free).factor;
-        let inverse = factor.inverse()?;
-        let inverse = Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j));
-        Some(Self { free, factor, inverse })
-    }
-
-    /// Errors of the rows `part` under a fit to the others. `None` where that is farther than a small step.
-    fn without(&self, problem: &Problem, model: &Model, part: &[usize]) -> Option<Vec<f64>> {
-        let p = self.free.len();
-        let (jacobian, errors, shares) = self.linear(problem, model, part);
-        let seen = &jacobian * &self.inverse;
-        let taken = seen.transpose() * &seen;
-        let left = DMatrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)) - taken[(i, j)]);
-        let factor = left.cholesky()?;
-        if factor.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < LEFT) {
-            return None;
-        }
-        let gradient = |j: usize| errors.iter().zip(seen.col_as_slice(j)).map(|(error, seen)| error * seen).sum::<f64>();
-        let along = factor.solve(&DVector::from_fn(p, |j, _| self.factor.entry(j, p) - gradient(j)));
-        let mut other = model.clone();
-        for (i, parameter) in self.free.iter().enumerate() {
-            other.x[*parameter] += (i..p).map(|j| self.inverse[(i, j)] * along[j]).sum::<f64>();
-        }
-        let mut scratch = other.stack.scratch(&other.robot);
-        let after = part.iter().flat_map(|row| {
-            let placed = other.place(problem.data, *row, &mut scratch);
-            let terms = KINDS.iter().filter_map(|kind| ObservationTerm::of(*kind, problem.data, *row, &placed, problem.excess));
-            terms.map(|(term, _)| term.error).collect::<Vec<_>>()
-        });
-        let after: Vec<f64> = after.zip(&shares).flat_map(|(error, share)| <[f64; 3]>::from(error * *share)).collect();
-        let (mut bend, mut whole) = (0.0, 0.0);
-        for (i, (before, after)) in errors.iter().zip(&after).enumerate() {
-            let straight = before - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>();
-            whole += straight * straight;
-            bend += (after - straight).powi(2);
-        }
-        if bend > STRAIGHT * STRAIGHT * whole {
-            return None;
-        }
-        Some(part.iter().map(|row| row_error(&other, problem.data, *row, &mut scratch).length).collect())
-    }
-
-    /// Whitened derivatives and errors of the terms of some rows, three lines each, and the root of each one's Huber weight.
-    fn linear(&self, problem: &Problem, model: &Model, part: &[usize]) -> (Mat<f64>, Vec<f64>, Vec<f64>) {
-        let p = self.free.len();
-        let mut column = vec![usize::MAX; model.stack.specs().len()];
-        for (j, parameter) in self.free.iter().enumerate() {
-            column[*parameter] = j;
-        }
-        let mut scratch = model.stack.scratch(&model.robot);
-        let (mut lines, mut errors, mut shares) = (Vec::new(), Vec::new(), Vec::new());
-        for row in part {
-            let mut placed = model.place(problem.data, *row, &mut scratch);
-            for kind in KINDS {
-                let Some((term, _)) = ObservationTerm::of(*kind, problem.data, *row, &placed, problem.excess) else { continue };
-                let share = term.share();
-                let mut line = vec![Vector3::zeros(); p];
-                term.derivatives(&mut placed, |parameter, derivative| {
-                    if let Some(sum) = line.get_mut(column[parameter]) {
-                        *sum += derivative * share;
-                    }
-                });
-                lines.push(line);
-                errors.extend(<[f64; 3]>::from(term.error * share));
-                shares.push(share);
-            }
-        }
-        let mut jacobian = Mat::zeros(errors.len(), p);
-        for j in 0..p {
-            for (to, line) in jacobian.col_as_slice_mut(j).chunks_exact_mut(3).zip(&lines) {
-                to.copy_from_slice(line[j].as_slice());
-            }
-        }
-        (jacobian, errors, shares)
-    }
-}
-
 /// Errors of the rows `part` under a fit to the others.
 fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usize], part: &[usize]) -> Vec<f64> {
     let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
@@ -234,7 +128,7 @@ fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usi
     part.iter().map(|row| row_error(&other, data, *row, &mut scratch).length).collect()
 }
 
-fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {
+pub(crate) fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {
     let mut all = vec![f64::NAN; data.rows()];
     for (row, error) in parts.iter().flatten().zip(errors.iter().flatten()) {
         all[*row] = *error;

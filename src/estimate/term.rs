@@ -36,14 +36,19 @@ impl ObservationTerm {
 
     /// Root of Huber's weight: the share by which errors and derivatives count.
     pub fn share(&self) -> f64 {
-        let (error, bound) = (self.error.norm(), bound(self.axes));
-        if error > bound { (bound / error).sqrt() } else { 1.0 }
+        share(self.error.norm(), self.axes)
     }
 
     /// Derivatives of what was predicted, in standard deviations per unit of the parameter.
     pub fn derivatives(&self, placed: &mut PlacedRow, emit: impl FnMut(usize, Vector3<f64>)) {
         self.sensitivity.derivatives(placed, emit);
     }
+}
+
+/// Root of Huber's weight of an error of so many axes, in standard deviations.
+pub(crate) fn share(error: f64, axes: usize) -> f64 {
+    let bound = bound(axes);
+    if error > bound { (bound / error).sqrt() } else { 1.0 }
 }
 
 /// Where Huber's loss turns linear for a term of so many axes.

@@ -1,7 +1,7 @@
 //! What models with other causes are compared by.
 
 use crate::diagnose::pool::CachedHypotheses;
-use crate::diagnose::round::{FitState, Fitter};
+use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
 use crate::effect::Survey;
 
 /// The pool in which causes are, and the fitter that tries them.
@@ -14,7 +14,12 @@ pub(crate) struct ModelComparison<'a, 'b> {
 impl ModelComparison<'_, '_> {
     /// The fit without some of the causes, by their positions.
     pub(super) fn without(&self, now: &FitState, members: &[usize]) -> FitState {
-        let all = now.causes.iter().enumerate();
-        self.fitter.fit(&now.model, all.filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone()).collect())
+        self.fitter.fit(&now.model, others(now, members))
     }
+}
+
+/// The causes without some, by their positions.
+pub(super) fn others(now: &FitState, members: &[usize]) -> Vec<EstimatedCause> {
+    let all = now.causes.iter().enumerate();
+    all.filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone()).collect()
 }

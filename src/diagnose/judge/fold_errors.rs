@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
-use crate::estimate::{FoldKind, Session, autocorrelation_time, folds_of};
+use crate::estimate::{FoldKind, Session, autocorrelation_time, dealt, gather};
 use std::collections::BTreeMap;
 
 /// Parts of the rows that were fitted, the same for every model that is compared.
@@ -14,6 +14,14 @@ pub(crate) struct FoldGain {
     pub effect: &'static str,
     pub place: Place,
     pub gain: f64,
+}
+
+/// Rows of the folds that judge a state; the same for every model that is compared. `None` where the poses are too few.
+pub(super) fn folds(now: &FitState, fitter: &Fitter) -> Option<Vec<Vec<usize>>> {
+    // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
+    let random = FoldKind::Random(fitter.question.seed);
+    let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
+    dealt(kind, &now.session(fitter), FOLDS)
 }
 
 /// A model that is worse by this share, and by so many standard errors, is worse.
@@ -31,13 +39,16 @@ pub(super) struct FoldErrors {
 impl FoldErrors {
     /// `None` where the poses are too few for folds.
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
-        let (data, rows) = (&fitter.data, &now.screening.kept);
-        // Where noise is correlated, a row is known by its neighbours in time: whole stretches are left out.
-        let random = FoldKind::Random(fitter.question.seed);
-        let kind = if fitter.correlated.is_some() { FoldKind::Blocks } else { random };
-        let errors = folds_of(kind, &Session { data, rows, model: &now.model, fitted: &now.fitted }, FOLDS)?;
-        let squares = rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
-        Some(Self { squares, moving: data.in_motion(rows) })
+        let session = now.session(fitter);
+        let folds = folds(now, fitter)?;
+        Some(Self::gathered(&session, &folds, &session.without_each(&folds)))
+    }
+
+    /// From the errors of each fold's rows.
+    pub fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
+        let errors = gather(session.data, session.rows, folds, errors);
+        let squares = session.rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
+        Self { squares, moving: session.data.in_motion(session.rows) }
     }
 
     pub fn rms(&self) -> f64 {

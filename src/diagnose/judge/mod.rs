@@ -1,6 +1,7 @@
 //! Folds of the rows to fit, and the fit of the whole model, judge what a search found: it saw a linear picture of these rows. Rows
 //! that are held out for validation take no part.
 
+mod alternatives;
 mod comparison;
 mod exchange;
 mod fold_errors;

@@ -1,6 +1,7 @@
 //! Findings that the last fit leaves without size, or that gain nothing in folds, are taken back, and the model is fitted
 //! without them: the search judges a linear picture of each, the fit the whole model.
 
+use super::alternatives::Alternatives;
 use super::comparison::ModelComparison;
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::round::FitState;
@@ -40,9 +41,14 @@ fn useless(now: &FitState, comparison: &ModelComparison) -> Option<FitState> {
         return None;
     }
     let all: Vec<usize> = (0..now.causes.len()).collect();
+    let seen = FoldErrors::of(now, comparison.fitter)?;
+    let near = Alternatives::of(now, comparison.fitter, &[])?;
+    let bare = near.judge().and_then(|judge| judge(&all, None));
+    if bare.is_some_and(|bare| seen.gain_over(&bare) > 0.0) {
+        return None;
+    }
     let base = comparison.without(now, &all);
-    let gain = FoldErrors::of(now, comparison.fitter)?.gain_over(&FoldErrors::of(&base, comparison.fitter)?);
-    (gain <= 0.0).then_some(base)
+    (seen.gain_over(&FoldErrors::of(&base, comparison.fitter)?) <= 0.0).then_some(base)
 }
 
 /// The finding that was not estimated, else the weakest of those that are smaller than their own uncertainty.
@@ -76,7 +82,10 @@ fn harmful(
     gains: &mut Vec<FoldGain>,
     comparison: &ModelComparison,
 ) -> Option<(Vec<usize>, String, FitState)> {
-    let seen = FoldErrors::of(now, comparison.fitter)?;
+    let fitter = comparison.fitter;
+    let seen = FoldErrors::of(now, fitter)?;
+    let near = Alternatives::of(now, fitter, &[])?;
+    let nearby = near.judge();
     let mut worst: Option<(f64, Vec<usize>, String, FitState)> = None;
     let groups: FindingGroups = groups(now, set, comparison.pool, comparison.survey);
     for ((effect, place), members) in groups {
@@ -86,14 +95,22 @@ fn harmful(
         if known.as_ref().is_some_and(|known| known.gain > 0.0) {
             continue;
         }
-        let state = comparison.without(now, &members);
-        let gain = seen.gain_over(&FoldErrors::of(&state, comparison.fitter)?);
+        let bare = nearby.as_ref().and_then(|judge| judge(&members, None));
+        let mut gain = bare.map(|bare| seen.gain_over(&bare));
+        let mut state = None;
+        // What is to go is fitted before it goes.
+        if gain.is_none_or(|gain| gain <= 0.0) {
+            let without = comparison.without(now, &members);
+            gain = Some(seen.gain_over(&FoldErrors::of(&without, fitter)?));
+            state = Some(without);
+        }
+        let gain = gain?;
         match known {
             Some(known) => known.gain = gain,
             None if same => gains.push(FoldGain { effect: names[0], place, gain }),
             None => (),
         }
-        if gain <= 0.0 && worst.as_ref().is_none_or(|(least, ..)| gain < *least) {
+        if let Some(state) = state.filter(|_| gain <= 0.0 && worst.as_ref().is_none_or(|(least, ..)| gain < *least)) {
             let sentence =
                 format!("{effect} at {place}: poses that a fit has not seen are predicted as well or better without it");
             worst = Some((gain, members, sentence, state));

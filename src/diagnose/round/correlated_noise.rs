@@ -88,7 +88,7 @@ impl<'a> Regression<'a> {
         AutocorrelatedNoise::without_gross(&mut left);
         points.iter_mut().zip(gross.iter().zip(&left)).for_each(|(value, (gross, left))| *value += left - gross);
         let mut own = Self { rows: &problem.rows, columns, count, points, white: 0.0 };
-        own.white = pivots(&matrix(&own.columns, rows));
+        own.white = logarithms(&pivots(&matrix(&own.columns, rows)));
         own
     }
 
@@ -100,12 +100,14 @@ impl<'a> Regression<'a> {
         let (mut columns, mut left) = (self.columns.clone(), self.points.clone());
         columns.chunks_mut(rows).for_each(|column| innovations.apply(column));
         innovations.apply(&mut left);
-        let design = matrix(&columns, rows);
-        project(orthonormal(&design).as_ref(), &mut left);
+        columns.extend(left);
+        // The last pivot is the length of what the design leaves of the points.
+        let pivots = pivots(&matrix(&columns, rows));
         let freedom = (rows.saturating_sub(self.count)).max(1) as f64;
-        let square: f64 = left.iter().map(|value| value * value).sum();
+        let square = pivots[self.count].powi(2);
         let shapes = if noise.is_some() { 2.0 * freedom.ln() } else { 0.0 };
-        freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * (pivots(&design) - self.white) + shapes
+        let design = logarithms(&pivots[..self.count]) - self.white;
+        freedom * (square / freedom).ln() + innovations.determinant() + 2.0 * design + shapes
     }
 
     /// The least cost, and of the autocorrelations that are as good the longest.
@@ -123,9 +125,13 @@ fn matrix(columns: &[f64], rows: usize) -> Mat<f64> {
     Mat::from_fn(rows, columns.len() / rows, |i, j| columns[j * rows + i])
 }
 
-/// Sum of the logarithms of the pivots of a design's QR decomposition.
-fn pivots(design: &Mat<f64>) -> f64 {
+/// Sizes of the pivots of a design's QR decomposition.
+fn pivots(design: &Mat<f64>) -> Vec<f64> {
     let factor = design.qr();
     let triangle = factor.thin_R();
-    (0..triangle.ncols()).map(|k| triangle[(k, k)].abs().max(f64::MIN_POSITIVE).ln()).sum()
+    (0..triangle.ncols()).map(|k| triangle[(k, k)].abs().max(f64::MIN_POSITIVE)).collect()
+}
+
+fn logarithms(values: &[f64]) -> f64 {
+    values.iter().map(|value| value.ln()).sum()
 }

@@ -5,7 +5,7 @@ use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
-use crate::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, Screening, fit_screened};
+use crate::estimate::{FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
 use std::ops::Range;
@@ -18,6 +18,13 @@ pub(crate) struct FitState {
     pub causes: Vec<EstimatedCause>,
     /// Where in the model's parameters those of each cause are.
     pub ranges: Vec<Range<usize>>,
+}
+
+impl FitState {
+    /// The rows with the model fitted to them.
+    pub fn session<'a>(&'a self, fitter: &'a Fitter) -> Session<'a> {
+        Session { data: &fitter.data, rows: &self.screening.kept, model: &self.model, fitted: &self.fitted }
+    }
 }
 
 /// A cause with its coefficients, and what is known of them beforehand.
@@ -107,8 +114,7 @@ impl<'a> Fitter<'a> {
         };
         let base = base_model(question.robot, &fitter.data, question.fit);
         let mut now = fitter.fit(&base, Vec::new());
-        let statuses = &now.fitted.statuses;
-        fitter.free = Some((0..statuses.len()).filter(|k| matches!(statuses[*k], ParameterStatus::Free(_))).collect());
+        fitter.free = Some(now.fitted.free());
         fitter.spread = spreads(&now.model, &fitter.data);
         let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
         fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
@@ -177,7 +183,7 @@ impl<'a> Fitter<'a> {
 }
 
 /// The effects of the whole arm in `from` as they stand, then causes at their coefficients, and where the parameters of these are.
-fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Vec<Range<usize>>) {
+pub(crate) fn with_causes(from: &Model, causes: &[EstimatedCause]) -> (Model, Vec<Range<usize>>) {
     // The base starts where it was found, so that its correction is too small to matter to what else moves it.
     let setting = EffectContext { base: from.base(), load: Load::GravityTorque };
     let base = || from.stack.effects().filter(|(effect, _)| effect.form().is_none());

@@ -13,7 +13,7 @@ use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::diagnose::verdict_statement::statement;
 use crate::effect::Unknown;
-use crate::estimate::{Session, cross_validate};
+use crate::estimate::cross_validate;
 use crate::robot::NoiseBasis;
 use nalgebra::Vector3;
 
@@ -43,11 +43,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
     let state = last.judged.state;
-    let folds = cross_validate(
-        &Session { data, rows: &state.screening.kept, model: &state.model, fitted: &state.fitted },
-        FOLDS,
-        fitter.question.seed,
-    );
+    let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
     let basis = basis(fitter);
     let ground = misfit.ground(data, basis, fitter.repeatability.repeats);
     Diagnosis {

@@ -6,8 +6,8 @@
 use crate::estimate::model::Model;
 use crate::estimate::problem::Problem;
 use crate::estimate::term::{HUBER, ObservationTerm};
-use crate::estimate::triangle::Triangle;
 use crate::observation::{KINDS, MeasurementKind, noise};
+use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -40,52 +40,49 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
     for row in problem.rows {
         fitted[*row] = true;
     }
-    let p = free.len();
+    let inverse = inverse.map(|inverse| Mat::from_fn(free.len(), free.len(), |i, j| inverse.at(i, j)));
     let screened: Vec<&dyn MeasurementKind> = KINDS.iter().copied().filter(|kind| kind.about().is_screened).collect();
-    (0..data.rows())
-        .into_par_iter()
-        .with_min_len(CHUNK)
-        .map_init(
-            || (model.stack.scratch(&model.robot), vec![Vector3::zeros(); p]),
-            |(scratch, jacobian), row| {
-                let mut placed = model.place(data, row, scratch);
-                let predicted = placed.point;
-                let away = |kind: &&'static dyn MeasurementKind| {
-                    let (term, _) = ObservationTerm::of(*kind, data, row, &placed, problem.excess)?;
-                    jacobian.fill(Vector3::zeros());
-                    term.derivatives(&mut placed, |parameter, derivative| {
-                        if let Some(entry) = jacobian.get_mut(column[parameter]) {
-                            *entry += derivative;
-                        }
-                    });
-                    let weight = match term.error.norm() {
-                        _ if !fitted[row] => 0.0,
-                        length if length > HUBER => HUBER / length,
-                        _ => 1.0,
-                    };
-                    let leverage = inverse.as_ref().map_or_else(Matrix3::zeros, |inverse| leverage(jacobian, inverse));
-                    Some(distance(&term.error, leverage, weight))
-                };
-                let distance = screened.iter().filter_map(away).fold(0.0, f64::max);
-                LeaveOneOut {
-                    predicted,
-                    residual: data.residual(row, &predicted),
-                    sigma: noise(data, row).hypot(3f64.sqrt() * problem.excess.length) / 3f64.sqrt(),
-                    distance,
-                }
-            },
-        )
-        .collect()
-}
-
-/// H = G G', G = J R^-1 of the whitened derivatives, R^-1 upper triangular.
-fn leverage(jacobian: &[Vector3<f64>], inverse: &Triangle) -> Matrix3<f64> {
-    let mut leverage = Matrix3::zeros();
-    for column in 0..jacobian.len() {
-        let g: Vector3<f64> = jacobian.iter().zip(inverse.column(column)).map(|(derivative, share)| derivative * *share).sum();
-        leverage += g * g.transpose();
-    }
-    leverage
+    let chunk = |chunk: usize| {
+        let rows = chunk * CHUNK..((chunk + 1) * CHUNK).min(data.rows());
+        let mut scratch = model.stack.scratch(&model.robot);
+        let mut lines: Mat<f64> = Mat::zeros(3 * screened.len() * rows.len(), free.len());
+        let (mut terms, mut standings) = (Vec::new(), Vec::with_capacity(rows.len()));
+        for (i, row) in rows.enumerate() {
+            let mut placed = model.place(data, row, &mut scratch);
+            let predicted = placed.point;
+            for kind in &screened {
+                let Some((term, _)) = ObservationTerm::of(*kind, data, row, &placed, problem.excess) else { continue };
+                let first = 3 * terms.len();
+                term.derivatives(&mut placed, |parameter, derivative| {
+                    if column[parameter] < free.len() {
+                        let line = &mut lines.col_as_slice_mut(column[parameter])[first..first + 3];
+                        line.iter_mut().zip(derivative.iter()).for_each(|(value, d)| *value += d);
+                    }
+                });
+                terms.push((i, fitted[row], term.error));
+            }
+            standings.push(LeaveOneOut {
+                predicted,
+                residual: data.residual(row, &predicted),
+                sigma: noise(data, row).hypot(3f64.sqrt() * problem.excess.length) / 3f64.sqrt(),
+                distance: 0.0,
+            });
+        }
+        // H = G G', G = J R^-1 of the whitened derivatives.
+        let seen = inverse.as_ref().map_or_else(|| Mat::zeros(lines.nrows(), 1), |inverse| &lines * inverse);
+        for (k, (i, fitted, error)) in terms.into_iter().enumerate() {
+            let leverage = Matrix3::from_fn(|a, b| (0..seen.ncols()).map(|j| seen[(3 * k + a, j)] * seen[(3 * k + b, j)]).sum());
+            let weight = match error.norm() {
+                _ if !fitted => 0.0,
+                length if length > HUBER => HUBER / length,
+                _ => 1.0,
+            };
+            let standing = &mut standings[i];
+            standing.distance = standing.distance.max(distance(&error, leverage, weight));
+        }
+        standings
+    };
+    (0..data.rows().div_ceil(CHUNK)).into_par_iter().flat_map_iter(chunk).collect()
 }
 
 fn distance(whitened: &Vector3<f64>, leverage: Matrix3<f64>, weight: f64) -> f64 {

@@ -10,7 +10,7 @@ mod tail;
 
 pub use kind::SuspectKind;
 
-use super::fit::{FitOptions, Fitted, ParameterStatus, fit};
+use super::fit::{FitOptions, Fitted, fit};
 use super::model::Model;
 use super::problem::Problem;
 use crate::robot::Measurements;
@@ -142,10 +142,8 @@ fn screen(
     held: &BTreeSet<usize>,
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
-    let free: Vec<usize> =
-        (0..fitted.statuses.len()).filter(|k| matches!(fitted.statuses[*k], ParameterStatus::Free(_))).collect();
     let problem = Problem { data, rows: kept, excess: fitted.excess() };
-    let mut standings = leave_one_out(&problem, model, &free);
+    let mut standings = leave_one_out(&problem, model, &fitted.free());
     measure_by_set(&mut standings, set);
     let limit = limit(&standings);
     let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();

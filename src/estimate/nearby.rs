@@ -1,0 +1,129 @@
+//! Fits next to a fit, one Gauss-Newton step away: without some rows, and with parameters put to other values or left out.
+//!
+//! Without the rows of a part it is, of G = J R^-1 of these rows (R'R = J'J of all) and their errors e, the step R^-1 (1 - G'G)^-1
+//! (Q'r - G'e). Of a part only its own triangular factor is kept, which has the same G'G and G'e.
+
+use super::factor::TriangularFactor;
+use super::model::Model;
+use super::problem::Problem;
+use super::row_error::row_error;
+use super::session::Session;
+use super::term::{ObservationTerm, share};
+use crate::observation::{ExcessSigma, KINDS};
+use crate::robot::Measurements;
+use faer::Mat;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Least share of what is known in any direction that must be left without a part: with less, other parameters may be seen.
+const LEFT: f64 = 0.02;
+/// Departure from a straight line (of the part's errors) up to which a step is small.
+const STRAIGHT: f64 = 0.01;
+
+/// A model around which others are fitted, and its rows in parts that are left out in turn.
+pub(crate) struct NearbyFits<'a> {
+    data: &'a Measurements,
+    model: &'a Model,
+    excess: ExcessSigma,
+    /// Parameters that are estimated or moved.
+    columns: Vec<usize>,
+    /// Of all parts and the priors.
+    whole: TriangularFactor,
+    parts: Vec<Part<'a>>,
+}
+
+struct Part<'a> {
+    rows: &'a [usize],
+    factor: TriangularFactor,
+    /// Root of the Huber weight of each term.
+    shares: Vec<f64>,
+}
+
+impl<'a> NearbyFits<'a> {
+    /// Around the model of a session. `None` where bounds are in the way.
+    pub fn of(session: &Session<'a>, parts: &'a [Vec<usize>], columns: &[usize]) -> Option<Self> {
+        let Session { data, model, fitted, .. } = *session;
+        if model.known.values().any(|known| known.bounds.is_some()) {
+            return None;
+        }
+        let excess = fitted.excess();
+        let part = |rows: &'a Vec<usize>| {
+            let problem = Problem { data, rows, excess };
+            let seen = problem.observe(model, columns);
+            let shares = problem.errors(&seen.residuals).into_iter().map(|(error, axes)| share(error, axes)).collect();
+            Part { rows, factor: seen.factor, shares }
+        };
+        let parts: Vec<Part> = parts.par_iter().map(part).collect();
+        let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
+        let (whole, _) = model.with_priors(columns, all);
+        Some(Self { data, model, excess, columns: columns.to_vec(), whole, parts })
+    }
+
+    /// Errors (m) of the rows of each part under a fit to the others; none where that is farther than a small step.
+    pub fn alone(&self) -> Option<Vec<Option<Vec<f64>>>> {
+        self.with(&vec![None; self.columns.len()])
+    }
+
+    /// The same with the columns that have a step moved by it and kept. `None` where the others are not separable.
+    pub fn with(&self, steps: &[Option<f64>]) -> Option<Vec<Option<Vec<f64>>>> {
+        let whole = self.whole.given(steps);
+        let inverse = whole.inverse()?;
+        let p = whole.parameters();
+        let inverse = Mat::from_fn(p, p, |i, j| inverse.at(i, j));
+        let mut model = self.model.clone();
+        for (parameter, step) in self.columns.iter().zip(steps) {
+            model.x[*parameter] += step.unwrap_or_default();
+        }
+        let open: Vec<usize> =
+            self.columns.iter().zip(steps).filter(|(_, step)| step.is_none()).map(|(parameter, _)| *parameter).collect();
+        let beside = Beside { whole, inverse, model, open };
+        Some(self.parts.par_iter().map(|part| self.without(part, &beside, &part.factor.given(steps))).collect())
+    }
+
+    fn without(&self, part: &Part, beside: &Beside, factor: &TriangularFactor) -> Option<Vec<f64>> {
+        let Beside { whole, inverse, model, open } = beside;
+        let p = open.len();
+        let seen = Mat::from_fn(p, p, |i, j| factor.entry(i, j)) * inverse;
+        let taken = seen.transpose() * &seen;
+        let left = DMatrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)) - taken[(i, j)]).cholesky()?;
+        if left.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < LEFT) {
+            return None;
+        }
+        let errors: Vec<f64> = (0..=p).map(|i| factor.entry(i, p)).collect();
+        let gradient = |j: usize| errors.iter().zip(seen.col_as_slice(j)).map(|(error, seen)| error * seen).sum::<f64>();
+        let along = left.solve(&DVector::from_fn(p, |j, _| whole.entry(j, p) - gradient(j)));
+        let mut other = model.clone();
+        for (i, parameter) in open.iter().enumerate() {
+            other.x[*parameter] += (i..p).map(|j| inverse[(i, j)] * along[j]).sum::<f64>();
+        }
+        let ahead = (0..p).map(|i| errors[i] - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>());
+        let straight = (ahead.map(|error| error * error).sum::<f64>() + errors[p] * errors[p]).sqrt();
+        let (lengths, arrived) = self.arrive(part, &other);
+        ((arrived - straight).abs() <= STRAIGHT * straight).then_some(lengths)
+    }
+
+    /// Errors (m) of a part's rows under a model, and the root of their whitened square.
+    fn arrive(&self, part: &Part, model: &Model) -> (Vec<f64>, f64) {
+        let mut scratch = model.stack.scratch(&model.robot);
+        let (mut lengths, mut square) = (Vec::with_capacity(part.rows.len()), 0.0);
+        let mut shares = part.shares.iter();
+        for row in part.rows {
+            let placed = model.place(self.data, *row, &mut scratch);
+            let terms = KINDS.iter().filter_map(|kind| ObservationTerm::of(*kind, self.data, *row, &placed, self.excess));
+            for ((term, _), share) in terms.zip(&mut shares) {
+                square += (term.error * *share).norm_squared();
+            }
+            lengths.push(row_error(model, self.data, *row, &mut scratch).length);
+        }
+        (lengths, square.sqrt())
+    }
+}
+
+/// A fit to all parts.
+struct Beside {
+    whole: TriangularFactor,
+    inverse: Mat<f64>,
+    model: Model,
+    /// Parameters that are estimated.
+    open: Vec<usize>,
+}
