@@ -15,6 +15,8 @@ pub struct Question<'a> {
     pub validate: &'a [usize],
     /// The number of the set that each row belongs to.
     pub set: &'a [usize],
+    /// By what the penalties of rare causes (-2 ln of their odds) are multiplied: 1 as the library believes.
+    pub prior_weight: f64,
     pub seed: u64,
 }
 

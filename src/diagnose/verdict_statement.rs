@@ -62,10 +62,10 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
         VerdictKind::Explained if inferred => format!("what was found explains the error but for noise; {}", ground.of_noise()),
         VerdictKind::Explained => format!("what was found explains the error; what is left is {}", ground.of_noise()),
         VerdictKind::Unexplained if inferred => {
-            format!("{} um are left that the findings do not explain; {}", um(ground.left), ground.of_noise())
+            format!("the findings do not explain all: {} um are left; {}", um(ground.left), ground.of_noise())
         }
         VerdictKind::Unexplained => {
-            format!("{} um are left that the findings do not explain, beside {}", um(ground.left), ground.of_noise())
+            format!("the findings do not explain all: {} um are left, against {}", um(ground.left), ground.of_noise())
         }
         VerdictKind::NotAsked => "too few rows were fitted to ask what the simulation lacks".into(),
     }
@@ -130,17 +130,17 @@ mod tests {
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Repeats,
-                "32 um are left that the findings do not explain, beside the noise that 24 repeats show, 31 um",
+                "the findings do not explain all: 32 um are left, against the noise that 24 repeats show, 31 um",
             ),
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Instrument,
-                "32 um are left that the findings do not explain, beside the noise that the instrument states, 31 um",
+                "the findings do not explain all: 32 um are left, against the noise that the instrument states, 31 um",
             ),
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Inferred,
-                "32 um are left that the findings do not explain; 31 um scatter at random, of which the instrument explains 8.2: \
+                "the findings do not explain all: 32 um are left; 31 um scatter at random, of which the instrument explains 8.2: \
                  measure ten poses twice",
             ),
         ] {

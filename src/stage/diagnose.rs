@@ -20,11 +20,21 @@ pub struct Diagnose {
     /// Sets of the split to fit; all others are predicted in the end and choose nothing.
     #[serde(default = "fit_set")]
     pub on: Vec<String>,
+    /// By what the penalties of rare causes are multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
+    #[serde(default = "as_believed")]
+    pub prior_weight: f64,
+}
+
+fn as_believed() -> f64 {
+    1.0
 }
 
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
+
+/// No prior is worth more times its own weight.
+const HEAVIEST: f64 = 10.0;
 
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
@@ -66,6 +76,9 @@ impl Stage for Diagnose {
         if self.on.is_empty() {
             faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
         }
+        if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
+            faults.push(Fault::new("prior_weight", format!("expected a number from 0 to {HEAVIEST}")));
+        }
         faults
     }
 
@@ -91,7 +104,15 @@ impl Stage for Diagnose {
         let (robot, _) = gauge(RobotModel::new(reads.robot.to_description()?), &data, &fit, &BTreeMap::new())
             .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
-        let question = Question { robot: &robot, data: &data, fit: &fit, validate: &validate, set: &set, seed: context.seed };
+        let question = Question {
+            robot: &robot,
+            data: &data,
+            fit: &fit,
+            validate: &validate,
+            set: &set,
+            prior_weight: self.prior_weight,
+            seed: context.seed,
+        };
         let diagnosis = diagnose(&question, |line| context.services.note(line));
         if diagnosis.verdict == Said::NotAsked {
             context.services.warn(diagnosis.not_observable.join("; "));

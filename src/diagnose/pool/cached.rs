@@ -67,7 +67,7 @@ impl CachedHypotheses<'_> {
 
     /// Estimates a set of hypotheses together, beside the base model.
     pub fn solve(&self, set: &[usize]) -> Solution {
-        solve(&self.pool, set, &self.factor(set))
+        solve(&self.pool, set, self.factor(set))
     }
 
     /// Coefficients of every member of a set.

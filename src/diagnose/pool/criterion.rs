@@ -33,9 +33,11 @@ impl HypothesisSet<'_> {
     /// Penalty for every coefficient that has the wrong sign or is too large, by more than two standard errors.
     fn sign_penalty(&self, set: &[usize], solution: &Solution) -> f64 {
         let columns = set.iter().flat_map(|k| (self.first[*k]..self.first[*k + 1]).map(move |_| *k));
-        let wrong = columns.zip(solution.coefficients.iter().zip(&solution.errors)).filter(|(k, (value, error))| {
-            let Hypothesis { positive, largest, .. } = &self.hypotheses[*k];
-            (*positive && **value < -2.0 * **error) || value.abs() - 2.0 * **error > *largest
+        let wrong = columns.zip(&solution.coefficients).enumerate().filter(|(column, (k, value))| {
+            let Hypothesis { positive, largest, .. } = self.hypotheses[*k];
+            let suspicious = positive && **value < 0.0 || value.abs() > largest;
+            let error = if suspicious { solution.error(*column) } else { 0.0 };
+            (positive && **value < -2.0 * error) || value.abs() - 2.0 * error > largest
         });
         IMPLAUSIBLE * wrong.count() as f64
     }

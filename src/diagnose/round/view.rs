@@ -48,7 +48,9 @@ impl<'a> RoundView<'a> {
                 residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses(survey)).into()
+        let mut hypotheses = hypotheses(survey);
+        hypotheses.iter_mut().for_each(|hypothesis| hypothesis.prior_penalty *= fitter.question.prior_weight);
+        HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses).into()
     }
 }
 

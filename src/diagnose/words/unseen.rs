@@ -27,7 +27,7 @@ pub(super) fn by_speed(last: &LastRound) -> Vec<String> {
         set.sort_unstable();
         let before: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
         // What cannot be seen at all has no standard error.
-        let error = pool.solve(&set).errors.get(before).copied().filter(|error| *error > 0.0);
+        let error = Some(pool.solve(&set).error(before)).filter(|error| *error > 0.0);
         let limit = error.map_or(f64::INFINITY, |error| FOUND * error);
         if clocks && limit > CLOCKS {
             out.push(format!("{}: clocks may be apart {}; {ADVICE}", form.name(), size(limit, Unit::Millisecond)));
