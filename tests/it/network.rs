@@ -231,6 +231,38 @@ fn joint_curves_find_waves_that_no_other_rival_can_see() {
     assert!((15e-6..35e-6).contains(&spread), "{spread}");
 }
 
+/// 40 deg of joint 1 that no row visited: what was learnt there is as small as beside it, and known to be in doubt.
+#[test]
+fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
+    let tool = sr210d();
+    let in_gap = |q: &[f64]| q[0].abs() < 0.35;
+    let (all, unseen) = (waves(900, &tool, 20e-6, 3), waves(600, &tool, 20e-6, 4));
+    let visited: Vec<usize> = (0..all.rows()).filter(|row| !in_gap(&all.sources[*row])).collect();
+    let training = all.pick(&visited);
+    let contest = contest(Some(&tool), &[Rival::Curves], &recipe(6), 4);
+    let comparison = compare(&training, &contest, |_, _| {});
+    let (correction, _) = learn(&training, &contest, &comparison.judged[comparison.chosen], |_| {}).unwrap();
+    let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let (mut largest, mut spread, mut covered, mut rows) = ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+    for (q, residual) in unseen.sources.iter().zip(&unseen.residual) {
+        let (applied, at) = (correction.at(q), usize::from(in_gap(q)));
+        let Some(doubt) = applied.spread else { continue };
+        let left = std::array::from_fn(|k| residual[k] - applied.delta[k]);
+        largest[at] = largest[at].max(length(applied.delta));
+        spread[at] += doubt;
+        // Three axes of one sigma: 2.8 of them hold 95 %.
+        covered[at] += f64::from(u8::from(length(left) < 2.8 * doubt));
+        rows[at] += 1.0;
+    }
+    let mean = |sums: [f64; 2]| [sums[0] / rows[0], sums[1] / rows[1]];
+    let (spread, covered) = (mean(spread), mean(covered));
+    println!("beside and in the gap: largest {largest:.2e} m, spread {spread:.2e} m, within 95 % {covered:.3?} of {rows:?} rows");
+    assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
+    assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
+    assert!(spread[1] > 1.3 * spread[0], "{spread:?}");
+    assert!(covered[0] > 0.9 && covered[1] > 0.85, "{covered:?}");
+}
+
 /// The paper's Fig. 2: errors that are made in the joints are learnt from fewer numbers where the Jacobian is known.
 #[test]
 fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacements() {

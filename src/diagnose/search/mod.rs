@@ -26,7 +26,7 @@ pub(crate) struct SearchOptions {
 
 impl Default for SearchOptions {
     fn default() -> Self {
-        Self { most: 24, beam: 3, draws: 299, seed: 1 }
+        Self { most: 12, beam: 3, draws: 299, seed: 1 }
     }
 }
 
