@@ -5,7 +5,7 @@ use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
 use super::known::PriorCheck;
-use super::levenberg::{Iteration, Stop, minimise};
+use super::levenberg::{Effort, Iteration, ROUGH_TOLERANCE, STEP_TOLERANCE, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{Evaluation, Problem};
@@ -81,10 +81,12 @@ impl Fitted {
     }
 }
 
-/// Limit of accepted steps; calibration problems need four to ten.
-const ITERATIONS: usize = 60;
-/// Steps of the first round, which only finds out how large the residual is and what it lets one see.
-const FIRST_ITERATIONS: usize = 4;
+/// To the minimum; calibration problems need four to ten steps.
+const FINE: Effort = Effort { limit: 60, tolerance: STEP_TOLERANCE };
+/// Of rounds whose weights are not settled.
+const ROUGH: Effort = Effort { tolerance: ROUGH_TOLERANCE, ..FINE };
+/// Of the first round, which only finds out how large the residual is and what it lets one see.
+const FIRST: Effort = Effort { limit: 4, ..ROUGH };
 /// A parameter that the nominal robot hid is taken up where the data know it this many times better than its prior sigma ...
 const CLEARLY: f64 = 10.0;
 /// ... and where they lower the cost by this and so much for each further one: chi-square as rare as five sigmas, so that
@@ -206,7 +208,7 @@ impl Minimisation {
         let free: Vec<usize> = candidates.iter().copied().filter(|k| self.free.contains(k) || new.contains(k)).collect();
         let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
         let cost = start.cost;
-        let (_, stop, end) = minimise(problem, model, &free, start, ITERATIONS);
+        let (_, stop, end) = minimise(problem, model, &free, start, FINE);
         if stop != Stop::Converged || cost - end.cost < WORTH[0] + WORTH[1] * (new.len() - 1) as f64 {
             model.x = before;
             return false;
@@ -239,15 +241,25 @@ impl Minimisation {
             }
             let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
             let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
-            let limit = if first && round == 0 { FIRST_ITERATIONS } else { ITERATIONS };
-            let (steps, stop, end) = minimise(problem, model, &free, start, limit);
+            let effort = match () {
+                () if first && round == 0 => FIRST,
+                () if round + 1 < ROUNDS => ROUGH,
+                () => FINE,
+            };
+            let (steps, mut stop, mut end) = minimise(problem, model, &free, start, effort);
             self.course.extend(steps);
-            self.stop = stop;
-            let next = excess_sigma(problem, &end, free.len());
+            let mut next = excess_sigma(problem, &end, free.len());
             let same = |one: f64, other: f64| (one - other).abs() <= 0.02 * one.max(other);
             let settled = same(next.length, problem.excess.length)
                 && same(next.angle, problem.excess.angle)
                 && free.len() == candidates.len();
+            if settled && effort.tolerance > FINE.tolerance {
+                let steps;
+                (steps, stop, end) = minimise(problem, model, &free, end, FINE);
+                self.course.extend(steps.into_iter().skip(1));
+                next = excess_sigma(problem, &end, free.len());
+            }
+            self.stop = stop;
             problem.excess = next;
             self.free.clone_from(&free);
             candidates = free;

@@ -45,11 +45,21 @@ pub struct Iteration {
 
 /// A relative fall of the cost below this is rounding.
 const COST_TOLERANCE: f64 = 1e-10;
-/// A step that moves all whitened predictions together by less than this (sigmas) changes nothing that data could show.
-const STEP_TOLERANCE: f64 = 1e-3;
+/// A step that moves all whitened predictions together by less than this (sigmas) changes nothing that data could show ...
+pub(crate) const STEP_TOLERANCE: f64 = 1e-3;
+/// ... and by less than this nothing that the weights of the next round would be learnt from.
+pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
 
-/// Minimises the problem in the `free` parameters, from and into `model.x`, in at most `limit` accepted steps; `now` is the problem
-/// there.
+/// How long an iteration goes on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    /// Most accepted steps.
+    pub limit: usize,
+    /// Steps that move the whitened predictions by less than this end it, sigmas.
+    pub tolerance: f64,
+}
+
+/// Minimises the problem in the `free` parameters, from and into `model.x`; `now` is the problem there.
 ///
 /// Returns the course, why it stopped, and the problem at the end.
 pub(crate) fn minimise(
@@ -57,14 +67,14 @@ pub(crate) fn minimise(
     model: &mut Model,
     free: &[usize],
     mut now: Evaluation,
-    limit: usize,
+    effort: Effort,
 ) -> (Vec<Iteration>, Stop, Evaluation) {
     let mut course = vec![iteration(model, free, &now, 0.0, 0.0)];
     if free.is_empty() {
         return (course, Stop::NothingFree, now);
     }
     let mut damping = 0.0;
-    for _ in 0..limit {
+    for _ in 0..effort.limit {
         let mut tries = 0;
         let (step, next) = loop {
             tries += 1;
@@ -76,7 +86,7 @@ pub(crate) fn minimise(
                 continue;
             };
             // What is left is below the noise, and the next step would be smaller by orders of magnitude.
-            if damping == 0.0 && negligible(&now, &step) {
+            if damping == 0.0 && negligible(&now, &step, effort.tolerance) {
                 return (course, Stop::Converged, now);
             }
             let before = model.x.clone();
@@ -89,7 +99,7 @@ pub(crate) fn minimise(
                 break (step, next);
             }
             model.x = before;
-            if negligible(&now, &step) {
+            if negligible(&now, &step, effort.tolerance) {
                 return (course, Stop::Converged, now);
             }
             damping = raise(damping);
@@ -98,7 +108,7 @@ pub(crate) fn minimise(
         let fall = now.cost - next.cost;
         now = next;
         course.push(iteration(model, free, &now, step_norm, damping));
-        if step_norm < STEP_TOLERANCE || fall <= COST_TOLERANCE * now.cost {
+        if step_norm < effort.tolerance || fall <= COST_TOLERANCE * now.cost {
             return (course, Stop::Converged, now);
         }
         damping = if damping < 1e-9 { 0.0 } else { damping / 10.0 };
@@ -112,9 +122,9 @@ fn iteration(model: &Model, free: &[usize], state: &Evaluation, step_norm: f64, 
 }
 
 /// Whether the step moves no prediction visibly, or promises to lower the cost by no more than rounding.
-fn negligible(state: &Evaluation, step: &[f64]) -> bool {
+fn negligible(state: &Evaluation, step: &[f64], tolerance: f64) -> bool {
     let norm = step_norm(&state.factor, step);
-    norm < STEP_TOLERANCE || 0.5 * norm * norm < COST_TOLERANCE * state.cost
+    norm < tolerance || 0.5 * norm * norm < COST_TOLERANCE * state.cost
 }
 
 fn raise(damping: f64) -> f64 {

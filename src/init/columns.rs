@@ -5,6 +5,7 @@ use super::points::{PointColumns, points};
 use super::sheet::Sheet;
 use super::words;
 use crate::error::Result;
+use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
 use std::path::Path;
 
@@ -279,11 +280,21 @@ impl ExaminedFile {
         let columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let running: Vec<usize> =
             columns.iter().copied().filter(|column| unit(*column).is_some() && self.runs(*column)).collect();
-        for column in columns.iter().filter(|column| !running.contains(column)) {
+        let is_clock = |column: &usize| {
+            let mut texts = self.sheet.texts(*column).filter(|text| !text.is_empty()).peekable();
+            texts.peek().is_some() && texts.all(is_clock_time)
+        };
+        let clocks: Vec<usize> = columns.iter().copied().filter(is_clock).collect();
+        for column in columns.iter().filter(|column| !running.contains(column) && !clocks.contains(column)) {
             let name = quoted(&self.sheet.names[*column]);
-            self.remarks.push(format!("{name} is no time that can be read: s or ms as numbers that do not fall"));
+            self.remarks.push(format!(
+                "{name} is no time that can be read: s or ms as numbers that do not fall, 08:15:03, or 2026-11-22T08:15:03"
+            ));
         }
-        let Some((unit, said)) = running.first().and_then(|column| unit(*column)) else { return };
+        let Some((unit, said)) = running.first().and_then(|column| unit(*column)) else {
+            self.map("time", &clocks, Some("clock"), None);
+            return;
+        };
         self.second = if unit == "ms" { 1e-3 } else { 1.0 };
         self.map("time", &running, Some(unit), (!said).then(|| "the unit".to_string()));
     }

@@ -6,6 +6,7 @@
 mod arm;
 mod bind;
 mod check;
+mod clock;
 mod columns;
 pub mod encoding;
 mod layout;
@@ -23,6 +24,7 @@ mod slots;
 mod verdict;
 mod write;
 
+pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
 pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};

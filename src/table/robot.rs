@@ -229,5 +229,5 @@ fn need(value: Option<f64>, row: &RobotRow, what: &str) -> Result<f64> {
 }
 
 fn fault(row: &RobotRow, message: &str) -> Error {
-    Error::data(format!("table robot, body {}", row.body), message)
+    Error::data(format!("table robot, body {} (`{}`)", row.body, row.name), message)
 }

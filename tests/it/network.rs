@@ -256,7 +256,7 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     }
     let mean = |sums: [f64; 2]| [sums[0] / rows[0], sums[1] / rows[1]];
     let (spread, covered) = (mean(spread), mean(covered));
-    println!("beside and in the gap: largest {largest:.2e} m, spread {spread:.2e} m, within 95 % {covered:.3?} of {rows:?} rows");
+    println!("beside and in the gap: largest {largest:?} m, spread {spread:?} m, within 95 % {covered:.3?} of {rows:?} rows");
     assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
     assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
     assert!(spread[1] > 1.3 * spread[0], "{spread:?}");

@@ -1,6 +1,7 @@
 //! From the columns that the settings name to the columns that a file has.
 
 use super::arm::RobotJoints;
+use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
@@ -54,6 +55,8 @@ pub(super) struct NumberBinding {
     pub name: String,
     /// What is added to it.
     pub difference: Option<Difference>,
+    /// Whether it holds clock times as text.
+    pub is_clock: bool,
 }
 
 /// A column whose numbers are added to those of another, times the sign.
@@ -116,7 +119,8 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         binder.binding.sequence = binder.column(&sequence.column, "sequence", false);
     }
     for (declared, scalar) in columns.numbers() {
-        let unit = unit(scalar.unit.as_deref())?;
+        let is_clock = scalar.unit.as_deref() == Some(CLOCK);
+        let unit = if is_clock { Unit::Second } else { unit(scalar.unit.as_deref())? };
         let index = arm.slots.of(declared.setting).start;
         if let Some(value) = scalar.value {
             binder.binding.constants.push((index, unit.to_si(value)));
@@ -125,7 +129,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         {
             let difference = binder.difference(scalar, declared.setting)?;
             let cell = binder.cell(declared, false, index, column, unit);
-            binder.binding.cells.push(NumberBinding { optional: scalar.optional, difference, ..cell });
+            binder.binding.cells.push(NumberBinding { optional: scalar.optional, difference, is_clock, ..cell });
         }
     }
     binder.uncertainties(columns, arm)?;
@@ -255,7 +259,18 @@ impl Binder<'_> {
     fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
         let (quantity, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
-        NumberBinding { index, column, unit, range, is_direction, optional: false, divisor: 1.0, name, difference: None }
+        NumberBinding {
+            index,
+            column,
+            unit,
+            range,
+            is_direction,
+            optional: false,
+            divisor: 1.0,
+            name,
+            difference: None,
+            is_clock: false,
+        }
     }
     fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &RobotJoints) -> Result<()> {
         let name = declared.setting;

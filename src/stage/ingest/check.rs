@@ -1,6 +1,7 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
 use super::Ingest;
+use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
@@ -158,7 +159,10 @@ fn convention_faults(
 fn scalar_faults(scalar: &ScalarColumn, quantity: Quantity, file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     one_of(scalar.column.is_some(), scalar.value.is_some(), "`column` or `value`", place, faults);
     column(scalar.column.as_ref(), file, place, faults);
-    unit(scalar.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
+    let is_clock = quantity == Quantity::Time && scalar.column.is_some() && scalar.unit.as_deref() == Some(CLOCK);
+    if !is_clock {
+        unit(scalar.unit.as_deref(), quantity, &format!("{place}.unit"), faults);
+    }
     if scalar.value.is_some_and(|value| !value.is_finite()) {
         faults.push(Fault::new(format!("{place}.value"), "not a finite number"));
     }
@@ -255,7 +259,8 @@ fn column(column: Option<&ColumnRef>, file: &FileLayout, place: &str, faults: &m
 
 fn unit(symbol: Option<&str>, quantity: Quantity, place: &str, faults: &mut Vec<Fault>) {
     let allowed = Unit::symbols(quantity);
-    let list = allowed.join(", ");
+    let clock = if quantity == Quantity::Time { ", or clock for times such as 08:15:03 and 2026-11-22T08:15:03" } else { "" };
+    let list = allowed.join(", ") + clock;
     match symbol {
         None => faults.push(Fault::new(place, format!("no unit; allowed: {list}"))),
         Some(symbol) => match Unit::parse(symbol) {

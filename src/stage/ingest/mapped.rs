@@ -93,7 +93,7 @@ pub struct ScalarColumn {
     /// The number of every row, instead of a column.
     #[serde(default)]
     pub value: Option<f64>,
-    /// Unit of the file's numbers, e.g. `mm`.
+    /// Unit of the file's numbers, e.g. `mm`; `clock` where a time is a time of day (08:15:03) or a date with a time (ISO 8601).
     #[serde(default)]
     pub unit: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.

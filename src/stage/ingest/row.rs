@@ -1,7 +1,8 @@
 //! One row read as quantities, or the reason why not.
 
 use super::arm::RobotJoints;
-use super::bind::{Binding, TextBinding};
+use super::bind::{Binding, NumberBinding, TextBinding};
+use super::clock::{ALLOWED, CLOCK, Clock, Moment};
 use super::encoding;
 use super::layout::{Decimal, LimitPolicy};
 use super::lines::RecordFields;
@@ -91,6 +92,7 @@ pub(super) struct RowReader<'a> {
     pub arm: &'a RobotJoints,
     /// Of the last usable row.
     pub last_sequence: Option<i64>,
+    pub clock: Clock,
 }
 
 impl RowReader<'_> {
@@ -135,9 +137,13 @@ impl RowReader<'_> {
         Ok(())
     }
 
-    fn numbers(&self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+    fn numbers(&mut self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
         for cell in &self.binding.cells {
-            let Some(own) = self.number(record, cell.column, &cell.name, cell.optional)? else { continue };
+            let own = match cell.is_clock {
+                true => Self::moment(&mut self.clock, record, cell)?,
+                false => self.number(record, cell.column, &cell.name, cell.optional)?,
+            };
+            let Some(own) = own else { continue };
             let mut value = cell.unit.to_si(own);
             if let Some(other) = &cell.difference {
                 let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
@@ -175,6 +181,20 @@ impl RowReader<'_> {
         Ok(())
     }
 
+    /// The clock time in a cell, s; nothing where it may be blank and is.
+    fn moment(clock: &mut Clock, record: &RecordFields, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
+        let field = record.field(cell.column).unwrap_or_default();
+        match clock.read(field) {
+            Some(seconds) => Ok(Some(seconds)),
+            None if field.is_empty() && cell.optional => Ok(None),
+            None if field.is_empty() => refuse(Reason::Blank, format!("{} is blank", cell.name)),
+            None => {
+                let found = shown(record, cell.column);
+                refuse(Reason::NotANumber, format!("{}: `{found}` is no clock time; allowed: {ALLOWED}", cell.name))
+            }
+        }
+    }
+
     /// The number in a column, in the file's unit; nothing where it may be blank and is.
     fn number(&self, record: &RecordFields, column: usize, name: &str, optional: bool) -> Result<Option<f64>, RowRefusal> {
         let shown = || shown(record, column);
@@ -182,6 +202,9 @@ impl RowReader<'_> {
             Ok(value) => return Ok(Some(value)),
             Err(NumberFault::Blank) if optional => return Ok(None),
             Err(NumberFault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
+            Err(NumberFault::Text) if Moment::parse(record.field(column).unwrap_or_default()).is_some() => {
+                format!("{name}: `{}` is a clock time, not a number; `unit: {CLOCK}` reads such times", shown())
+            }
             Err(NumberFault::Text) => format!("{name}: `{}` is not a number", shown()),
             Err(NumberFault::Comma) => {
                 format!("{name}: `{}` has a decimal comma; allowed: `decimal: comma` in the settings", shown())

@@ -165,6 +165,16 @@ fn two_time_columns_are_joined_by_time() {
 }
 
 #[test]
+fn clock_times_are_times() {
+    let head = "Timestamp,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm";
+    for date in ["", "2026-11-22T", "2026-11-22 "] {
+        let time = |k: usize| format!("{date}08:{:02}:{:02}.5", 15 + k / 5, 12 * (k % 5));
+        let made = one(table(head, |k| format!("{},{},{}", time(k), joints(k, ","), point(k, ","))));
+        made.has(&["time: {column: Timestamp, unit: clock}"]).runs(30);
+    }
+}
+
+#[test]
 fn a_fast_log_beside_few_points_runs() {
     let controller = {
         let mut text = "time_s,A1,A2,A3,A4,A5,A6\n".to_string();
