@@ -43,6 +43,8 @@ pub struct Case {
     pub seed: u64,
     pub kind: Kind,
     pub robot: RobotDescription,
+    /// Whether the robot file gives the masses of the links.
+    pub masses: bool,
     pub truth: TrueRobot,
     pub tracker: Tracker,
     /// Joint repeatability, rad.
@@ -134,6 +136,7 @@ impl Case {
             accepted: drafts.iter().flat_map(|draft| draft.accepted.clone()).collect(),
             geometry_rank: shadow.rank(),
             robot,
+            masses: design.masses,
             truth,
             tracker,
             play_rad,
