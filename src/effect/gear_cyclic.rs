@@ -4,8 +4,8 @@ use super::joint_table::{JointTable, strongest_orders};
 use super::summary::amplitude;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
-    Basis, Cause, CauseDescription, figure, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
+    Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;

@@ -162,9 +162,15 @@ impl<'a> ArmState<'a> {
         self.data.direction(self.row, joint)
     }
 
-    /// What a joint moved from the row before, rad or m.
+    /// What a joint moved from the stop before, rad or m.
     pub fn last_move(&self, joint: usize) -> f64 {
         self.data.last_move(self.row, joint)
+    }
+
+    /// The largest of the moves of all joints that turn from the stop before, rad.
+    pub fn largest_turn(&self, robot: &RobotModel) -> f64 {
+        let turns = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
+        turns.map(|joint| self.last_move(joint).abs()).fold(0.0, f64::max)
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.

@@ -5,7 +5,9 @@
 
 use super::form::parameters;
 use super::skeleton::moments;
-use super::{ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure};
+use super::{
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
+};
 use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -76,7 +78,8 @@ impl UnweighedWindup {
         let own_angle = (0..joint).all(|before| is_plumb(robot, before));
         let outwards = |bodies: &[usize]| -> Vec<Moment> { bodies.iter().map(|body| Moment::outwards(*body, lines)).collect() };
         let both = |bodies: &[usize]| -> Vec<Moment> {
-            let pair = |body: &usize| if heavy.contains(body) { Moment::both(*body, robot, lines) } else { Moment::any(*body, robot) };
+            let pair =
+                |body: &usize| if heavy.contains(body) { Moment::both(*body, robot, lines) } else { Moment::any(*body, robot) };
             bodies.iter().flat_map(pair).collect()
         };
         let first = |count: usize| &heavy[..count.min(heavy.len())];
@@ -120,7 +123,8 @@ impl UnweighedWindup {
     pub fn largest(&self, summary: &Summary) -> f64 {
         let number = summary.forms.iter().position(|form| form.as_a::<Self>() == Some(self));
         let own = summary.parameters.iter().filter(|estimate| Some(estimate.form) == number);
-        let sizes: Vec<(usize, f64)> = self.shape.moments.iter().map(|moment| moment.body).zip(own.map(|own| own.value)).collect();
+        let sizes: Vec<(usize, f64)> =
+            self.shape.moments.iter().map(|moment| moment.body).zip(own.map(|own| own.value)).collect();
         let squares = sizes.chunk_by(|a, b| a.0 == b.0).map(|body| body.iter().map(|(_, size)| size * size).sum::<f64>());
         squares.map(f64::sqrt).sum()
     }

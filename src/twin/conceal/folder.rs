@@ -27,7 +27,7 @@ impl Case {
     /// The robot as its file states it.
     fn stated(&self) -> RobotDescription {
         let mut stated = self.robot.clone();
-        if !self.masses {
+        if self.bare {
             stated.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
         }
         stated
