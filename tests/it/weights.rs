@@ -2,6 +2,7 @@
 
 use crate::fixture;
 use calib::effect::{Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, hypotheses, whole};
+use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -48,21 +49,28 @@ fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
     out
 }
 
-fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
+/// A survey of all rows is handed to `tell`.
+fn surveyed<T>(robot: &RobotModel, data: &Measurements, tell: impl FnOnce(&Survey) -> T) -> T {
     let (rows, torque, compliance) = ((0..ROWS).collect::<Vec<_>>(), torques(robot, data), vec![0.0; robot.joints()]);
-    let survey = Survey::new(robot, data, &rows, &torque, &compliance);
-    let all = hypotheses(&survey).into_iter().map(|hypothesis| hypothesis.form);
+    tell(&Survey::new(robot, data, &rows, &torque, &compliance))
+}
+
+fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
+    let all = surveyed(robot, data, hypotheses).into_iter().map(|hypothesis| hypothesis.form);
     all.filter(|form| form.name() == "joint_compliance").collect()
+}
+
+fn bare(mut description: RobotDescription) -> RobotModel {
+    description.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+    RobotModel::new(description)
 }
 
 #[test]
 fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards() {
     let mut compared = 0;
     for description in fixture::all() {
-        let weighed = RobotModel::new(description.clone());
-        let mut bare = description;
-        bare.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
-        let (bare, data) = (RobotModel::new(bare), data(&weighed));
+        let (weighed, bare) = (RobotModel::new(description.clone()), bare(description));
+        let data = data(&weighed);
         let (torque, forms) = (torques(&weighed, &data), windups(&bare, &data));
         let most = torque.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
         for joint in 0..weighed.joints() {
@@ -82,4 +90,38 @@ fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards(
         assert!(windups(&weighed, &data).iter().all(|form| form.parameters(&weighed).len() == 1), "masses are known");
     }
     assert!(compared > 12, "{compared}");
+}
+
+/// About the first level axis a weight does what an eccentric wheel does: with the phase of a weight it is called one, and both are named.
+#[test]
+fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
+    let robot = bare(fixture::spherical());
+    let data = data(&robot);
+    let forms = windups(&robot, &data);
+    let names = |form: &Form| form.parameters(&robot).into_iter().map(|spec| spec.name).collect::<Vec<_>>();
+    let mut kinds = [0; 3];
+    for form in forms.iter().filter(|form| form.place() == Place::Joint(1)) {
+        let (names, identities) = (names(form), form.cause().identities(form, "joint_compliance"));
+        let alone = names.iter().all(|name| name.starts_with("joint_compliance.j2.gravity.link2"));
+        let same: &[(&str, Place)] =
+            if alone { &[("gear_cyclic", Place::Joint(1)), ("counterbalance", Place::Joint(1))] } else { &[] };
+        assert_eq!(identities, same, "{names:?}");
+        let called = |p: &[f64]| surveyed(&robot, &data, |survey| form.called(p, survey));
+        match (alone, names.len()) {
+            (true, 1) => {
+                assert_eq!([called(&[1e-4]), called(&[-1e-4])], ["joint_compliance", "cable_drag"]);
+                kinds[0] += 1;
+            }
+            (true, _) => {
+                let said = [[1e-4, 2e-5], [1e-5, 1e-4], [-1e-4, 1e-5]].map(|p| called(&p));
+                assert_eq!(said, ["joint_compliance", "gear_cyclic", "gear_cyclic"]);
+                kinds[1] += 1;
+            }
+            _ => {
+                assert_eq!(called(&vec![1e-4; names.len()]), "joint_compliance", "{names:?}");
+                kinds[2] += 1;
+            }
+        }
+    }
+    assert!(kinds[0] == 1 && kinds[1] == 1 && kinds[2] > 1, "{kinds:?}");
 }
