@@ -2,9 +2,10 @@
 
 use super::joint_table::{JointTable, strongest_orders};
 use super::summary::amplitude;
+use super::unweighed_windup::UnweighedWindup;
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable,
+    Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -69,6 +70,8 @@ impl Cause for GearCyclic {
 
     fn sentence(&self, summary: &Summary) -> String {
         let mut orders: Vec<String> = summary.estimates(Self::NAME).map(|(term, numbers)| order(term, &numbers)).collect();
+        let weight = summary.form::<UnweighedWindup>().map(|windup| figure(windup.largest(summary), 0));
+        orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
     }

@@ -1,7 +1,9 @@
 //! `joint_compliance`: a joint winds up in proportion to its load (Eqs. 25-30); one parameter a revolute joint.
 //!
-//! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`].
+//! The load is the gravity torque from the robot's masses (rad/Nm) or the motor current (rad/A), see [`Load`]; where nobody knows the
+//! masses, gravity's torque per first moment, see [`UnweighedWindup`].
 
+use super::unweighed_windup::UnweighedWindup;
 use super::{
     ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, Form, Hypothesis, Load, ParameterSpec, Place, Placed,
     Summary, Survey, Variable,
@@ -22,8 +24,8 @@ impl Cause for JointCompliance {
             place: "joint",
             formula: "d = c t",
             size: "0.1 to 10 urad/Nm",
-            confounded: "joint_hardening, reduction_ratio, link_compliance",
-            needs: "link masses, or motor currents",
+            confounded: "joint_hardening, reduction_ratio, link_compliance; without masses gear_cyclic of order 1",
+            needs: "link masses, motor currents, or many postures",
         }
     }
 
@@ -31,7 +33,7 @@ impl Cause for JointCompliance {
         Some(Box::new(Windup::new(setting.load)))
     }
 
-    /// Every joint that gravity loads; by motor currents where the robot file has no masses to make a torque from.
+    /// Every joint that gravity loads; where the robot file has no masses to make a torque from, by motor currents and by gravity alone.
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let by_gravity = survey.revolute().filter(|joint| survey.is_loaded(*joint));
         let by_gravity = by_gravity.map(|joint| Hypothesis::new(Windup::of(joint, Load::GravityTorque), 1).positive());
@@ -39,11 +41,12 @@ impl Cause for JointCompliance {
         // The sign of a current is the controller's.
         let currents = survey.revolute().filter(|_| by_current);
         let currents = currents.map(|joint| Hypothesis::new(Windup::of(joint, Load::MotorCurrent), 2));
-        by_gravity.chain(currents).collect()
+        by_gravity.chain(currents).chain(UnweighedWindup::propose(&Self, survey)).collect()
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        format!("{} winds up under its load by {}", summary.place, summary.value())
+        UnweighedWindup::sentence(summary)
+            .unwrap_or_else(|| format!("{} winds up under its load by {}", summary.place, summary.value()))
     }
 
     fn finer(&self) -> &'static [&'static str] {
@@ -51,7 +54,11 @@ impl Cause for JointCompliance {
     }
 
     fn read(&self, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
-        Some(Windup::deserialize(body).map(Form::from))
+        UnweighedWindup::read(&Self, body).or_else(|| Some(Windup::deserialize(body).map(Form::from)))
+    }
+
+    fn identities(&self, form: &Form, _called: &str) -> Vec<(&'static str, Place)> {
+        UnweighedWindup::identities(form)
     }
 
     fn yields_to_torque(&self) -> bool {

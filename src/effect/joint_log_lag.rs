@@ -1,5 +1,5 @@
 //! `joint_log_lag`: joints and points are not of one moment. Of standing points a share of the last move was still to come when the
-//! joints were logged; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
+//! joints were logged, or, where a controller ends the moves of all joints together, a turn shared out as these moves are; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::form::parameters;
 use super::{
@@ -23,6 +23,8 @@ enum Behind {
     /// The last move of each joint.
     #[default]
     Move,
+    /// The last move of each joint as a share of the largest move of any: all joints of a synchronous motion settle alike.
+    Synchronous,
     /// The velocity of each joint.
     Clock,
 }
@@ -55,7 +57,8 @@ impl Cause for JointLogLag {
             // What a joint moves from one row to the next is its velocity: a share of it is a time, too.
             return vec![Hypothesis::new(Lag { each: false, by: Behind::Clock }, 1).within(LARGEST)];
         }
-        [false, true].map(|each| Hypothesis::new(Lag { each, by: Behind::Move }, 2)).to_vec()
+        let laws = [(false, Behind::Move), (true, Behind::Move), (false, Behind::Synchronous)];
+        laws.map(|(each, by)| Hypothesis::new(Lag { each, by }, laws.len())).to_vec()
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -69,6 +72,11 @@ impl Cause for JointLogLag {
                      beside them"
                 )
             }
+            Some(n) if summary.form::<Lag>().is_some_and(|lag| lag.by == Behind::Synchronous) => format!(
+                "joints were logged before the arm had settled: the joint that moved most had {} arcsec still to come, the others their \
+                 shares of it",
+                figure(n.value, 0)
+            ),
             Some(n) if summary.parameters.len() == 1 => format!(
                 "joints were logged before the arm had settled: {} % of the last move was still to come",
                 figure(n.value * 100.0, 2)
@@ -108,14 +116,18 @@ impl Effect for Lag {
         let names: Vec<String> = (1..=robot.joints()).map(|joint| format!("share_j{joint}")).collect();
         match (self.by, self.each) {
             (Behind::Clock, _) => parameters(self, [("time", Unit::Second, 0.01)]),
+            (Behind::Synchronous, _) => parameters(self, [("rest", Unit::Radian, 0.01)]),
             (Behind::Move, true) => parameters(self, names.iter().map(|name| (name.as_str(), Unit::One, 0.1))),
             (Behind::Move, false) => parameters(self, [("share", Unit::One, 0.1)]),
         }
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let largest = if self.by == Behind::Synchronous { state.largest_turn(robot) } else { 0.0 };
         for joint in 0..robot.joints() {
             match self.by {
+                Behind::Synchronous if largest == 0.0 => out.turn(0, p, joint, 0.0),
+                Behind::Synchronous => out.turn(0, p, joint, state.last_move(joint) / largest),
                 Behind::Clock => out.turn(0, p, joint, state.velocity(joint)),
                 Behind::Move => out.turn(if self.each { joint } else { 0 }, p, joint, state.last_move(joint)),
             }

@@ -34,6 +34,7 @@ mod payload_error;
 mod place;
 mod placed_row;
 mod reduction_ratio;
+mod skeleton;
 mod spring;
 mod stack;
 mod summary;
@@ -45,6 +46,7 @@ mod tool_shift;
 mod tracker_drift;
 mod tracker_scale;
 mod unknown;
+mod unweighed_windup;
 mod variable;
 mod viscous_windup;
 mod warmth;
@@ -160,9 +162,15 @@ impl<'a> ArmState<'a> {
         self.data.direction(self.row, joint)
     }
 
-    /// What a joint moved from the row before, rad or m.
+    /// What a joint moved from the stop before, rad or m.
     pub fn last_move(&self, joint: usize) -> f64 {
         self.data.last_move(self.row, joint)
+    }
+
+    /// The largest of the moves of all joints that turn from the stop before, rad.
+    pub fn largest_turn(&self, robot: &RobotModel) -> f64 {
+        let turns = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint));
+        turns.map(|joint| self.last_move(joint).abs()).fold(0.0, f64::max)
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.

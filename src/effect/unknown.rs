@@ -2,6 +2,7 @@
 
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
+use super::unweighed_windup::is_unweighed;
 use super::{
     Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term,
     Variable, warmth,
@@ -29,6 +30,9 @@ const PERIODS: [f64; 2] = [0.05, 1.0];
 const ORDERS: u32 = 3;
 /// What depends on another joint's angle is nearly always the wobble of that joint's axis: -2 ln of the odds that it is not.
 const WOBBLE: f64 = 12.0;
+/// Of an arm of unknown masses a joint that follows its own angle and its neighbour's is nearly always one that its links weigh upon: -2 ln
+/// of the odds that a hose pulls.
+const WEIGHT: f64 = 12.0;
 /// -2 ln of the odds of things outside the library.
 const OPEN: f64 = 8.0;
 /// One sigma of what is known of a coefficient before any measurement, SI.
@@ -39,9 +43,11 @@ impl Unknown {
 
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {
         let mut out = Vec::new();
+        let unweighed = is_unweighed(survey.robot);
         let mut add = |law: Law, tried: usize, penalty: f64| {
             let term = Term::new(&Self, Motion::Joint { joint }, law);
-            out.push(Hypothesis::new(term, tried).penalised(OPEN + penalty));
+            let weight = if unweighed && is_hose(&term) { WEIGHT } else { 0.0 };
+            out.push(Hypothesis::new(term, tried).penalised(OPEN + weight + penalty));
         };
         let own = |basis| Law::new(Variable::Angle { joint }, basis);
         let [low, high] = survey.range[joint];

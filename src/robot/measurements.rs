@@ -3,6 +3,7 @@
 use crate::robot::instrument::NoiseBasis;
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::robot::readings::{Named, Reading, Readings};
+use crate::robot::sequence::Sequence;
 use nalgebra::{Matrix3, Vector3};
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
@@ -35,6 +36,8 @@ pub struct Measurements {
     pub target: Option<Named>,
     /// What was measured beside points; one entry a kind.
     pub readings: Vec<Readings>,
+    /// The order in which the rows were measured, where it is another one than theirs.
+    pub sequence: Option<Sequence>,
 }
 
 impl Measurements {
@@ -77,32 +80,53 @@ impl Measurements {
         nearest(self.temperature.as_ref()?, row)
     }
 
+    /// The row that was measured at a place, from 0, of the order of measurement.
+    pub fn at_place(&self, place: usize) -> usize {
+        self.sequence.as_ref().map_or(place, |sequence| sequence.row(place))
+    }
+
+    /// The place of a row in the order of measurement, from 0.
+    pub fn place(&self, row: usize) -> usize {
+        self.sequence.as_ref().map_or(row, |sequence| sequence.place(row))
+    }
+
     /// The first row of the stop at which a row was measured: several targets in a row, one after the other in one pose.
     pub fn stop(&self, row: usize) -> usize {
         let Some(target) = &self.target else { return row };
-        let mut first = (0..row).rev().take_while(|other| self.near_pose(*other, row)).last().unwrap_or(row);
-        for other in first + 1..=row {
+        let (here, name) = (self.place(row), |place: usize| target.name(self.at_place(place)));
+        let mut first = (0..here).rev().take_while(|other| self.near_pose(self.at_place(*other), row)).last().unwrap_or(here);
+        for other in first + 1..=here {
             // The same target again: the arm came back to the pose.
-            if (first..other).any(|k| target.name(k) == target.name(other)) {
+            if (first..other).any(|k| name(k) == name(other)) {
                 first = other;
             }
         }
-        first
+        self.at_place(first)
+    }
+
+    /// Whether a row was measured at the recording's first stop, to which nobody knows the way.
+    pub fn at_first_stop(&self, row: usize) -> bool {
+        self.place(self.stop(row)) == 0
+    }
+
+    /// The last row of the stop before that of a row, and the first row of its own; none at the first stop.
+    pub fn way(&self, row: usize) -> Option<[usize; 2]> {
+        let first = self.stop(row);
+        Some([self.at_place(self.place(first).checked_sub(1)?), first])
     }
 
     /// What joint `joint` moved (rad or m) from the stop before to that of this row; 0 at the first.
     pub fn last_move(&self, row: usize, joint: usize) -> f64 {
-        let first = self.stop(row);
-        if first == 0 { 0.0 } else { self.q(first)[joint] - self.q(first - 1)[joint] }
+        self.way(row).map_or(0.0, |[from, to]| self.q(to)[joint] - self.q(from)[joint])
     }
 
-    /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of the rows; 0 if it never moved.
+    /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of measurement; 0 if it never moved.
     pub fn direction(&self, row: usize, joint: usize) -> f64 {
         let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
         if let Some(direction) = recorded.filter(|value| value.is_finite() && *value != 0.0) {
             return direction.signum();
         }
-        let moves = (0..=row).rev().map(|k| self.last_move(k, joint));
+        let moves = (0..=self.place(row)).rev().map(|place| self.last_move(self.at_place(place), joint));
         moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
     }
 

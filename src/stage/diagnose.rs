@@ -94,6 +94,11 @@ impl Stage for Diagnose {
             context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
             context.services.warn("parameters correct that simulation: they are not the robot file's".into());
         }
+        if data.sequence.is_some() {
+            let message =
+                "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
+            context.services.warn(message.into());
+        }
         // Causes are separated by whole points; other measurements take no part.
         let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
         if fit.len() < FEWEST {

@@ -6,7 +6,7 @@ pub use columns::columns;
 
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{Measurements, Named, NoiseBasis, START, SigmaSource};
+use crate::robot::{Measurements, Named, NoiseBasis, START, Sequence, SigmaSource};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
@@ -88,7 +88,7 @@ impl Recording {
             Some(all) => all.iter().map(measured).collect(),
             None => vec![0.0; self.rows()],
         };
-        Measurements {
+        let mut data = Measurements {
             joints: self.joints,
             q: self.q.clone(),
             position,
@@ -109,7 +109,10 @@ impl Recording {
                     kind.readings(|setting| self.readings.get(setting).map(Vec::as_slice), names)
                 })
                 .collect(),
-        }
+            sequence: None,
+        };
+        data.sequence = data.time.as_ref().and_then(|time| Sequence::by_time(time, |a, b| data.near_pose(a, b)));
+        data
     }
 
     /// Whether all three axes of a row's point were measured.

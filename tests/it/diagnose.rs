@@ -3,6 +3,7 @@
 mod flanks;
 mod said;
 mod scrambled;
+mod weight;
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};

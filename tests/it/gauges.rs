@@ -1,5 +1,7 @@
 //! What may be measured beside a single point: several targets, poses, some axes, distances. Rank, truth and uncertainty of each.
 
+mod holder;
+mod lag;
 mod laws;
 mod level;
 mod stops;

@@ -68,3 +68,4 @@ mod trail;
 mod transfer;
 mod twin;
 mod vouched;
+mod weights;

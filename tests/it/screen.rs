@@ -342,3 +342,33 @@ fn a_joint_log_that_slipped_throughout_is_told_by_how_many_rows() {
         assert_eq!(trial.screen().1.apart, Some(7), "arm {seed}");
     }
 }
+
+/// A grid of two joints whose lines are straight for the first of them: a step along a line is a turn about its axis, which a base of one's
+/// own follows as if two logs had slipped by a row, where a row with wrong joints falls out at the end of a stretch.
+#[test]
+fn rows_beside_a_wrong_one_in_a_dense_grid_are_not_apart() {
+    for (seed, description) in [fixture::spherical(), fixture::offset_wrist()].into_iter().enumerate() {
+        let mut trial = Trial::new(description, 600, 80 + seed as u64, normal);
+        let joints = trial.data.joints;
+        // All other joints follow the line: each line is one stiff arm that turns about its foot.
+        let wrist: Vec<f64> = trial.data.q.clone();
+        for row in 0..trial.rows() {
+            let (line, along) = (row / 30, row % 30);
+            for joint in 1..joints {
+                trial.data.q[row * joints + joint] = wrist[line * joints + joint];
+            }
+            trial.data.q[row * joints] = 0.026 * along as f64 - 0.4;
+        }
+        trial.data.position = trial.truth.predict(&trial.data);
+        for point in &mut trial.data.position {
+            *point += Vector3::from_fn(|_, _| SIGMA * normal(&mut trial.dice));
+        }
+        let wrong = [67, 215, 341, 460];
+        for row in wrong {
+            trial.data.q[row * joints + 1] += 0.1;
+        }
+        let screening = trial.screen().1;
+        let aside: Vec<usize> = screening.suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
+        assert_eq!(aside, wrong, "arm {seed}: {:?}", screening.suspects);
+    }
+}

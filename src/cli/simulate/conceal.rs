@@ -64,6 +64,9 @@ pub(super) struct ConcealArguments {
     /// [default: gaussian, of nulls also student and uneven]
     #[arg(long, value_name = "FORM")]
     scatter: Option<String>,
+    /// As most cells have it: robot files without masses, nothing on the tool, no motor currents
+    #[arg(long)]
+    bare: bool,
     /// Rounds the logged joints to steps of so many degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     log_step: f64,
@@ -155,6 +158,7 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         natural: arguments.natural,
         faulty: arguments.faulty,
         scatter,
+        bare: arguments.bare,
         log_step_deg: arguments.log_step,
     })
 }

@@ -45,7 +45,11 @@ impl RepeatPairs {
         }
         let poses = Poses::of(data, rows);
         let pairs = poses.repeated().flat_map(|rows| rows.windows(2).map(|pair| [pair[0], pair[1]]));
-        let at_once = |[a, b]: &[usize; 2]| (a + 1..*b).all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a));
+        let at_once = |[a, b]: &[usize; 2]| {
+            let [from, to] = [data.place(*a), data.place(*b)];
+            let mut between = (from.min(to) + 1..from.max(to)).map(|place| data.at_place(place));
+            between.all(|k| data.near_pose(*a, k) && data.target(k) != data.target(*a))
+        };
         let (mut pairs, mut returns): (Vec<[usize; 2]>, Vec<[usize; 2]>) = pairs.partition(at_once);
         if pairs.len() >= REPEATS || returns.is_empty() {
             pairs.sort_unstable_by_key(|pair| pair[1]);

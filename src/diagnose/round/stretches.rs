@@ -13,9 +13,9 @@ const STRETCHES: usize = 40;
 /// Rows that the search looks at: all but those of the recording's first stop, to which nobody knows the way, or [`SEARCHED`] of them by a sequence
 /// that keeps no step with any design of the recording; the model is fitted to all.
 pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
-    let rows = &rows[rows.partition_point(|row| data.stop(*row) == 0)..];
+    let rows: Vec<usize> = rows.iter().copied().filter(|row| !data.at_first_stop(*row)).collect();
     if rows.len() <= SEARCHED {
-        return rows.to_vec();
+        return rows;
     }
     // Multiples of the golden ratio fill the unit interval evenly (Kuipers and Niederreiter, 1974).
     let share = SEARCHED as f64 / rows.len() as f64;
@@ -36,13 +36,13 @@ pub(super) fn poses(data: &Measurements, rows: &[usize], autocorrelation_time: f
         let stretch = ((2.0 * autocorrelation_time).ceil() as usize).min(rows.len() / STRETCHES).max(1);
         return (0..rows.len()).map(|i| i / stretch).collect();
     }
-    let mut out = Vec::with_capacity(rows.len());
-    let mut number = 0;
-    for (i, row) in rows.iter().enumerate() {
-        if i > 0 && !data.same_pose(rows[i - 1], *row) && data.stop(*row) > rows[i - 1] {
-            number += 1;
-        }
-        out.push(number);
+    let mut measured: Vec<usize> = (0..rows.len()).collect();
+    measured.sort_by_key(|i| data.place(rows[*i]));
+    let mut out = vec![0; rows.len()];
+    for pair in measured.windows(2) {
+        let (before, row) = (rows[pair[0]], rows[pair[1]]);
+        let new = !data.same_pose(before, row) && data.place(data.stop(row)) > data.place(before);
+        out[pair[1]] = out[pair[0]] + usize::from(new);
     }
     out
 }

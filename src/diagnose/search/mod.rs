@@ -87,8 +87,9 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
     /// The wind-up of every joint where it is seen.
     fn all_windups(&self) -> Vec<usize> {
         let given = self.pool.given(&[]);
-        let seen = given.falls.iter().map(|(_, h)| *h);
-        let mut set: Vec<usize> = seen.filter(|h| self.pool.hypotheses[*h].form.is(&JointCompliance)).collect();
+        let mut keys = BTreeSet::new();
+        let seen = given.falls.iter().map(|(_, h)| *h).filter(|h| self.pool.hypotheses[*h].form.is(&JointCompliance));
+        let mut set: Vec<usize> = seen.filter(|h| keys.insert(&self.pool.keys[*h])).collect();
         set.sort_unstable();
         set
     }

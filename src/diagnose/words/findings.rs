@@ -2,6 +2,7 @@
 
 use super::faults::{faults, reversals, rows_apart};
 use super::groups::{FindingKey, groups};
+use super::holder::HolderTurn;
 use super::last_round::LastRound;
 use super::rivals::{exact, rivals};
 use super::statement::{not_so, sentence};
@@ -56,6 +57,9 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
     let mut rivals = rivals(pool, &rest, &own, whole.bic, (effect, place));
     exact(effect, &forms, &mut rivals);
+    let turn = HolderTurn::of(state, last.survey.data, &forms);
+    let other = turn.as_ref().map(|turn| turn.rival(effect));
+    rivals.extend(other.filter(|other| !rivals.iter().any(|rival| (rival.effect, rival.place) == (other.effect, other.place))));
     rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
     let effect_rms = size(pool, members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
     let without = pool.solve(&rest);
@@ -75,9 +79,10 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let parameters = parameters(state, effect, members);
     let clock = Clock::of(last.survey.data);
     let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
-    let (effect, statement) = match impossible(last, members) {
-        Some(why) => (Unknown::NAME, not_so(effect, &summary, why, effect_rms)),
-        None => (effect, sentence(effect, &summary, effect_rms)),
+    let (effect, statement) = match (impossible(last, members), turn) {
+        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, why, effect_rms)),
+        (None, Some(turn)) => (effect, turn.sentence(clock, effect_rms)),
+        (None, None) => (effect, sentence(effect, &summary, effect_rms)),
     };
     let valid = valid(&forms, last);
     Finding {

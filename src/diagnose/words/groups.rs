@@ -1,5 +1,6 @@
 //! Which causes make up one finding: what one part of the arm does by one law, with the rest that its true shape leaves.
 
+use super::holder::stepped;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::FitState;
 use crate::effect::{
@@ -24,6 +25,7 @@ pub(crate) fn groups(last: &FitState, set: &[usize], pool: &CachedHypotheses, su
     refine(pool, &mut groups, set);
     both_angles(pool, &mut groups, set);
     wobbles(pool, &mut groups, set);
+    holders(pool, &mut groups, set, survey);
     // One wind-up a joint: a compliance beside a hardening of the same joint is part of it.
     let hard: Vec<Place> = groups.keys().filter(|key| key.0 == JointHardening::NAME).map(|key| key.1).collect();
     for place in hard {
@@ -107,6 +109,22 @@ fn wobbles(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
             let members = groups.remove(&key).unwrap_or_default();
             groups.entry(wobble).or_default().extend(members);
         }
+    }
+}
+
+/// One target on the last body that turns about its axis is one step, though the last joint's zero takes a part of it.
+fn holders(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize], survey: &Survey) {
+    let at = |key: &FindingKey| {
+        let members = groups.get(key)?;
+        members.iter().map(|i| stepped(&pool.hypotheses[set[*i]].form, survey.joints())).collect::<Option<Vec<f64>>>()
+    };
+    let [tool, zero] = [("tool_shift", Place::Tool), ("zero_shift", Place::Joint(survey.joints() - 1))];
+    let (Some(moved), Some(stepped)) = (at(&tool), at(&zero)) else { return };
+    let alone = survey.rows.iter().all(|row| survey.data.target(*row) == survey.data.target(survey.rows[0]));
+    let at_once = |time: &f64| moved.iter().any(|other| survey.changes_near(*time).contains(other));
+    if alone && stepped.iter().all(at_once) {
+        let members = groups.remove(&zero).unwrap_or_default();
+        groups.entry(tool).or_default().extend(members);
     }
 }
 

@@ -4,6 +4,7 @@ mod conclude;
 mod faults;
 mod findings;
 mod groups;
+mod holder;
 mod last_round;
 mod probability;
 mod rivals;

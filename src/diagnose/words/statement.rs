@@ -56,7 +56,9 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
     }
     if survey.data.direction.is_none() {
-        out.push("direction of approach: taken from the order of the rows".into());
+        let order =
+            if survey.data.sequence.is_some() { "times, since the rows stand in another order" } else { "order of the rows" };
+        out.push(format!("direction of approach: taken from the {order}"));
     }
     out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
     out
@@ -78,7 +80,9 @@ fn masses(survey: &Survey) -> Option<String> {
     let bare: Vec<String> = bare.map(|(number, _): (usize, _)| number.to_string()).collect();
     match bare.len() {
         0 => None,
-        none if none == all.len() => Some("gravity effects: the robot file gives no link masses".into()),
+        none if none == all.len() => {
+            Some("gravity effects: the robot file gives no link masses; wind-up shows as an angle, no stiffness".into())
+        }
         some => {
             let (own, all) = (all.len() - some, all.len());
             let bare = bare.join(", ");

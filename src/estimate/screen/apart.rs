@@ -1,11 +1,12 @@
 //! Stretches of a recording whose joints and points are rows apart: plain to see before anything is fitted, and fatal to a fit.
 //!
 //! A rigid motion brings the nominal robot's points of a stretch onto the measured ones, but for the errors of a nominal robot;
-//! where it does so only with the joints of rows further on, the two logs have slipped.
+//! where it does so only with the joints of rows further on, and all stretches so paired stand under one base, the two logs have slipped.
 
-use crate::estimate::align::kabsch;
+use crate::estimate::align::{align_points, kabsch};
 use crate::robot::Measurements;
 use crate::spatial::Pose;
+use crate::statistics::nearest;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -20,6 +21,9 @@ const MOST: i64 = 64;
 const NOMINAL: f64 = 0.03;
 /// With the right joints so many times less is left.
 const BETTER: f64 = 5.0;
+/// Under the base of the whole recording, where a nominal robot leaves more, so many times less is left of such rows. A base of their own
+/// takes up a step of the pitch of a grid.
+const TOGETHER: f64 = 2.0;
 
 /// For every row how many rows further on its joints are, where that is plain; zero elsewhere.
 pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64> {
@@ -39,8 +43,37 @@ pub(super) fn apart(data: &Measurements, predicted: &[Vector3<f64>]) -> Vec<i64>
             rows.filter(nearer).for_each(|row| out[row] = offset);
         }
     }
+    under_one_base(data, predicted, &mut out);
     beyond_the_log(&mut out);
     out
+}
+
+/// Takes back what a stretch's own base alone made of it: runs of rows whose points the base of all rows, as they are paired now, puts no
+/// nearer with the other joints than with their own.
+fn under_one_base(data: &Measurements, predicted: &[Vector3<f64>], apart: &mut [i64]) {
+    if apart.iter().all(|offset| *offset == 0) {
+        return;
+    }
+    let whole = (0..apart.len()).filter(|row| data.whole(*row));
+    let paired = whole.filter_map(|row| Some((*other(predicted, row, apart[row])?, data.position[row])));
+    let (from, to): (Vec<_>, Vec<_>) = paired.unzip();
+    if from.len() < STRETCH {
+        return;
+    }
+    let base = align_points(&from, &to);
+    let off = |row: usize, offset: i64| Some((base.point(other(predicted, row, offset)?) - data.position[row]).norm());
+    let rows: Vec<usize> = (0..apart.len()).collect();
+    let claimed: Vec<i64> = apart.to_vec();
+    for run in rows.chunk_by(|a, b| claimed[*a] == claimed[*b]).filter(|run| claimed[run[0]] != 0) {
+        let middle = |offset: i64| {
+            let mut all: Vec<f64> = run.iter().filter(|row| data.whole(**row)).filter_map(|row| off(*row, offset)).collect();
+            nearest(&mut all, 0.5)
+        };
+        let better = middle(claimed[run[0]]).zip(middle(0)).is_some_and(|(there, own)| TOGETHER * there < own);
+        if !better {
+            run.iter().for_each(|row| apart[*row] = 0);
+        }
+    }
 }
 
 /// Where a slip reaches an end of the log, the joints of the rows past it were never logged.

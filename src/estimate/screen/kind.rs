@@ -68,11 +68,14 @@ pub(super) fn name(
             kinds.insert(*row, (SuspectKind::Mislabelled, Some(*partner)));
         }
     }
-    let unexplained: Vec<usize> = flagged.iter().copied().filter(|row| !kinds.contains_key(row)).collect();
-    for run in runs(&unexplained) {
-        let kind = match beyond_the_log(run, &kinds, standings.len()) {
+    let unexplained = flagged.iter().filter(|row| !kinds.contains_key(row));
+    let mut measured: Vec<usize> = unexplained.map(|row| data.place(*row)).collect();
+    measured.sort_unstable();
+    for run in runs(&measured) {
+        let run: Vec<usize> = run.iter().map(|place| data.at_place(*place)).collect();
+        let kind = match beyond_the_log(&run, &kinds, standings.len()) {
             Some(offset) => SuspectKind::ShiftedBlock(offset),
-            None if is_event(data, run, standings) => SuspectKind::Event,
+            None if is_event(data, &run, standings) => SuspectKind::Event,
             None => SuspectKind::Outlier,
         };
         kinds.extend(run.iter().map(|row| (*row, (kind, None))));

@@ -96,7 +96,9 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
     let mut aside = BTreeSet::new();
     for round in 0.. {
         let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
-        let Screened { suspects, crowd, reach } = screen(&model, data, &kept, &fitted, set, &held, &slipped);
+        let Screened { suspects, crowd, reach, followed } = screen(&model, data, &kept, &fitted, set, &held, &slipped);
+        // What the fitted model follows never slipped.
+        slipped.retain(|row, _| !followed.contains(row));
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
         let next: Vec<usize> = options.rows.iter().copied().filter(|row| !aside.contains(row)).collect();
         if next == kept {
@@ -130,6 +132,8 @@ struct Screened {
     suspects: Vec<Suspect>,
     crowd: usize,
     reach: f64,
+    /// Slipped rows that stand where the model predicts them by their own joints.
+    followed: BTreeSet<usize>,
 }
 
 /// Suspects of a model that was fitted to the rows `kept`, and how many rows make up a crowd. Rows in `held` stay suspects.
@@ -162,8 +166,9 @@ fn screen(
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });
         }
     }
-    // Plain from the nominal robot, whatever the model makes of them.
-    suspects.extend(slipped.iter().map(|(row, offset)| Suspect {
+    let followed: BTreeSet<usize> = slipped.keys().copied().filter(|row| standings[*row].distance <= limit).collect();
+    // Plain from the nominal robot, but where the fitted model follows them.
+    suspects.extend(slipped.iter().filter(|(row, _)| !followed.contains(row)).map(|(row, offset)| Suspect {
         row: *row,
         kind: SuspectKind::ShiftedBlock(*offset),
         partner: row.checked_add_signed(*offset as isize).filter(|row| *row < data.rows()),
@@ -171,7 +176,7 @@ fn screen(
         statistic: standings[*row].distance,
     }));
     suspects.sort_by_key(|suspect| suspect.row);
-    Screened { suspects, crowd, reach: tail::reach(&bulk(&standings), standings.len()) }
+    Screened { suspects, crowd, reach: tail::reach(&bulk(&standings), standings.len()), followed }
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
@@ -203,9 +208,12 @@ fn beside(data: &Measurements, named: &[ClassedRow]) -> Vec<ClassedRow> {
     let off: Vec<usize> = named.iter().filter(|(_, kind, _)| *kind == SuspectKind::Outlier).map(|(row, ..)| *row).collect();
     let listed = |row: &usize| named.iter().any(|(other, ..)| other == row);
     let mut found = Vec::new();
-    for stop in off.chunk_by(|a, b| data.stop(*a) == data.stop(*b)).filter(|stop| stop.len() > 1) {
-        let first = data.stop(stop[0]);
-        let rows: Vec<usize> = (first..data.rows()).take_while(|row| data.stop(*row) == first).collect();
+    let mut stops: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    off.into_iter().for_each(|row| stops.entry(data.stop(row)).or_default().push(row));
+    for (first, stop) in stops.into_iter().filter(|(_, stop)| stop.len() > 1) {
+        let from = data.place(first);
+        let rows: Vec<usize> =
+            (from..data.rows()).map(|place| data.at_place(place)).take_while(|row| data.stop(*row) == first).collect();
         if 2 * stop.len() > rows.len() {
             found.extend(rows.into_iter().filter(|row| !listed(row)).map(|row| (row, SuspectKind::Outlier, None)));
         }

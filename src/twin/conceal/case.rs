@@ -43,6 +43,8 @@ pub struct Case {
     pub seed: u64,
     pub kind: Kind,
     pub robot: RobotDescription,
+    /// Whether the robot file keeps the masses of the links to itself.
+    pub bare: bool,
     pub truth: TrueRobot,
     pub tracker: Tracker,
     /// Joint repeatability, rad.
@@ -91,7 +93,7 @@ impl Case {
         };
         let ranges: Vec<[f64; 2]> =
             robot.joints.iter().map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw)).collect();
-        let points = points::plan(kind, &ranges, Amount { fit, validate, repeated }, &climate, seed)?;
+        let points = points::plan(kind, &ranges, Amount { fit, validate, repeated, loaded: !design.bare }, &climate, seed)?;
         let to_fit = &points[..fit.min(points.len())];
         let site = Site { robot: &robot, truth: &truth, tracker: &tracker, points: to_fit };
         let held_out = Site { points: &points[fit.min(points.len())..], ..site };
@@ -100,7 +102,8 @@ impl Case {
         let bench = Bench::new(&robot, &ranges, to_fit);
         let drafts = drafts(design, content, &bench, &mut draw);
         let concealed = size(design, &drafts, &site, &shadow, 1e-3 * noise_mm[0], &mut draw);
-        let hidden = hidden(&drafts, &mut draw);
+        let mut hidden = hidden(&drafts, &mut draw);
+        hidden.extend(design.bare.then_some(Column::Current));
 
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
@@ -134,6 +137,7 @@ impl Case {
             accepted: drafts.iter().flat_map(|draft| draft.accepted.clone()).collect(),
             geometry_rank: shadow.rank(),
             robot,
+            bare: design.bare,
             truth,
             tracker,
             play_rad,

@@ -28,6 +28,8 @@ pub struct Design {
     pub faulty: f64,
     /// How every tracker scatters; none: Gaussian, of recordings without an effect also heavy-tailed and uneven.
     pub scatter: Option<Scatter>,
+    /// As most cells have it: the robot file gives no masses, nothing hangs on the tool, no motor currents are recorded.
+    pub bare: bool,
     /// Step (deg) to which joints are rounded in the log; 0: none.
     pub log_step_deg: f64,
 }
@@ -47,6 +49,7 @@ impl Default for Design {
             natural: 0.2,
             faulty: 0.08,
             scatter: None,
+            bare: false,
             log_step_deg: 0.0,
         }
     }

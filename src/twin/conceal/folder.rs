@@ -4,6 +4,7 @@ use super::case::{Case, Concealed};
 use super::design::Content;
 use super::family::{Column, FAMILIES};
 use super::points::FIT;
+use crate::robot::description::RobotDescription;
 use crate::twin::effect::Physical;
 use crate::twin::folder::{Decimals, Log, robot};
 use crate::twin::recorder::Shot;
@@ -20,7 +21,16 @@ impl Case {
     pub fn recording(&self) -> Result<[File; 3], String> {
         let log = self.log();
         let (controller, tracker) = (log.controller(DECIMALS), log.tracker(DECIMALS));
-        Ok([("robot.json", robot(&self.robot)?), ("controller.csv", controller), ("tracker.csv", tracker)])
+        Ok([("robot.json", robot(&self.stated())?), ("controller.csv", controller), ("tracker.csv", tracker)])
+    }
+
+    /// The robot as its file states it.
+    fn stated(&self) -> RobotDescription {
+        let mut stated = self.robot.clone();
+        if self.bare {
+            stated.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+        }
+        stated
     }
 
     /// The truth.

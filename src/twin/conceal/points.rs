@@ -17,6 +17,8 @@ pub struct Amount {
     pub validate: usize,
     /// Share of points that repeat the one before.
     pub repeated: f64,
+    /// Whether half of the points carry the full payload.
+    pub loaded: bool,
 }
 
 /// A step of the controller's display, deg; recorded joints are multiples of it, so that writing them loses nothing.
@@ -38,7 +40,7 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
             FIT => 2 * number >= amount.fit,
             _ => draw.chance(0.5),
         };
-        let payload_kg = if loaded { robot.payload_mass } else { 0.0 };
+        let payload_kg = if loaded && amount.loaded { robot.payload_mass } else { 0.0 };
         time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
         // A repeat: the arm goes away and comes back as it came before, with the same load.
         let again =

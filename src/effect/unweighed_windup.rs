@@ -1,0 +1,253 @@
+//! Wind-up under gravity of an arm whose masses nobody knows: d = sum_k c_k g . (axis x R_b e_k), with c_k = compliance times a first moment of
+//! body b along e_k times g (rad). Stiffness and masses are one product.
+//!
+//! Bodies are those from the joint outwards, their moments base parameters: two a joint that turns. Bodies that slide are left out.
+
+use super::form::parameters;
+use super::skeleton::moments;
+use super::{
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
+};
+use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
+use crate::units::Unit;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Under the name of a cause.
+#[derive(Clone)]
+pub(super) struct UnweighedWindup {
+    cause: &'static dyn Cause,
+    shape: WindupShape,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct WindupShape {
+    /// From 0.
+    joint: usize,
+    moments: Vec<Moment>,
+    /// Whether gravity's torque is a function of the joint's own angle alone.
+    #[serde(default)]
+    own_angle: bool,
+}
+
+/// A direction in which a body has a first moment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Moment {
+    /// From 0.
+    body: usize,
+    /// Unit vector, zero-pose base axes.
+    direction: [f64; 3],
+    /// Whether it points to where the weight of such an arm hangs.
+    #[serde(default)]
+    outwards: bool,
+}
+
+/// Gravity loads a joint if it has so much of the lever that it has about a level axis.
+const LEVER: f64 = 0.05;
+/// Bodies with a smaller share of the largest moment, as the arm's lines have it, may hang anywhere.
+const SLIGHT: f64 = 0.1;
+/// The forms of one joint: bodies with and without moments across their lines.
+const FORMS: usize = 3;
+/// A wheel off its centre errs with any phase; within this tangent of the phase of a weight it is a weight.
+const PHASE: f64 = 1.5;
+/// rad; one sigma of what is known.
+const WIDE: f64 = 0.01;
+
+impl PartialEq for UnweighedWindup {
+    fn eq(&self, other: &Self) -> bool {
+        self.cause.name() == other.cause.name() && self.shape == other.shape
+    }
+}
+
+impl UnweighedWindup {
+    /// Of every joint that gravity loads, from the weight of the next links alone to that of all; only where the robot file gives no mass.
+    pub fn propose(cause: &'static dyn Cause, survey: &Survey) -> Vec<Hypothesis> {
+        if !is_unweighed(survey.robot) {
+            return Vec::new();
+        }
+        let lines = moments(survey.robot);
+        let postures: Vec<Posture> = survey.rows.iter().map(|row| hanging(survey.robot, survey.data.q(*row))).collect();
+        let loaded = survey.revolute().filter(|joint| lever(survey.robot, *joint, &postures) > LEVER);
+        loaded.flat_map(|joint| Self::at(cause, survey.robot, joint, &lines)).collect()
+    }
+
+    fn at(cause: &'static dyn Cause, robot: &RobotModel, joint: usize, lines: &[Vector3<f64>]) -> Vec<Hypothesis> {
+        let most = lines[joint..].iter().map(|line| line.norm()).fold(0.0, f64::max);
+        let bodies: Vec<usize> = (joint..robot.joints()).filter(|body| robot.is_revolute(*body)).collect();
+        let heavy: Vec<usize> = bodies.iter().copied().filter(|body| lines[*body].norm() > SLIGHT * most).collect();
+        let own_angle = (0..joint).all(|before| is_plumb(robot, before));
+        let outwards = |bodies: &[usize]| -> Vec<Moment> { bodies.iter().map(|body| Moment::outwards(*body, lines)).collect() };
+        let both = |bodies: &[usize]| -> Vec<Moment> {
+            let pair =
+                |body: &usize| if heavy.contains(body) { Moment::both(*body, robot, lines) } else { Moment::any(*body, robot) };
+            bodies.iter().flat_map(pair).collect()
+        };
+        let first = |count: usize| &heavy[..count.min(heavy.len())];
+        let mut all: Vec<(Vec<Moment>, bool)> = Vec::new();
+        for count in 1..=heavy.len() {
+            all.push((outwards(first(count)), true));
+            all.push((both(first(count)), false));
+        }
+        all.push((both(&bodies), false));
+        let mut out: Vec<Hypothesis> = Vec::new();
+        for (moments, positive) in all.into_iter().filter(|(moments, _)| !moments.is_empty()) {
+            let own_angle = own_angle && moments.iter().all(|moment| moment.body == joint);
+            let form = Form::from(Self { cause, shape: WindupShape { joint, moments, own_angle } });
+            if out.iter().any(|other| other.form == form) {
+                continue;
+            }
+            let hypothesis = Hypothesis::new(form, FORMS);
+            out.push(if positive { hypothesis.positive() } else { hypothesis });
+        }
+        out
+    }
+
+    /// Reads the body of a form, where it is one of these.
+    pub fn read(cause: &'static dyn Cause, body: &serde_json::Value) -> Option<serde_json::Result<Form>> {
+        body.get("moments")?;
+        Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
+    }
+
+    /// The sentence of a finding that has such a form.
+    pub fn sentence(summary: &Summary) -> Option<String> {
+        let windup: &Self = summary.form()?;
+        let size = figure(windup.largest(summary), 0);
+        Some(format!(
+            "{} winds up under gravity, by up to {size} arcsec where its links stretch out level; how stiff it is cannot be separated from \
+             their weight, which the robot file does not give",
+            summary.place
+        ))
+    }
+
+    /// The deflection (arcsec) of a finding's form with all its bodies level.
+    pub fn largest(&self, summary: &Summary) -> f64 {
+        let number = summary.forms.iter().position(|form| form.as_a::<Self>() == Some(self));
+        let own = summary.parameters.iter().filter(|estimate| Some(estimate.form) == number);
+        let sizes: Vec<(usize, f64)> =
+            self.shape.moments.iter().map(|moment| moment.body).zip(own.map(|own| own.value)).collect();
+        let squares = sizes.chunk_by(|a, b| a.0 == b.0).map(|body| body.iter().map(|(_, size)| size * size).sum::<f64>());
+        squares.map(f64::sqrt).sum()
+    }
+
+    /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
+    pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
+        let alone = form.as_a::<Self>().is_some_and(|windup| windup.shape.own_angle);
+        if alone { vec![("gear_cyclic", form.place()), ("counterbalance", form.place())] } else { Vec::new() }
+    }
+}
+
+/// Whether a robot file gives no mass at all.
+pub(super) fn is_unweighed(robot: &RobotModel) -> bool {
+    robot.description().joints.iter().all(|joint| joint.mass.is_none() || joint.centre.is_none())
+}
+
+/// Whether a joint turns about gravity's own direction, wherever the joints before it stand.
+fn is_plumb(robot: &RobotModel, joint: usize) -> bool {
+    let down = Vector3::from(robot.description().gravity);
+    !robot.is_revolute(joint) || robot.axis(joint).cross(&down).norm() < 1e-6 * down.norm()
+}
+
+/// The arm of the robot file at joint positions `q`.
+fn hanging(robot: &RobotModel, q: &[f64]) -> Posture {
+    let mut posture = Posture::new(robot.joints());
+    for (joint, travel) in q.iter().enumerate() {
+        let behind = posture.behind[joint] * robot.motion(joint, &Travel::new(*travel));
+        (posture.body[joint], posture.behind[joint + 1]) = (behind, behind);
+    }
+    posture.gravity_torques(robot, 0.0, &LoadCorrection::new(robot.joints()));
+    posture
+}
+
+/// The largest lever of a joint for gravity: 1 about a level axis.
+fn lever(robot: &RobotModel, joint: usize, postures: &[Posture]) -> f64 {
+    let of = |posture: &Posture| posture.torque_of_moment(robot, joint, joint).norm() / posture.gravity.norm();
+    postures.iter().map(of).filter(|lever| lever.is_finite()).fold(0.0, f64::max)
+}
+
+impl Moment {
+    fn outwards(body: usize, lines: &[Vector3<f64>]) -> Self {
+        Self { body, direction: lines[body].normalize().into(), outwards: true }
+    }
+
+    /// Outwards, and across that and the axis.
+    fn both(body: usize, robot: &RobotModel, lines: &[Vector3<f64>]) -> Vec<Self> {
+        let across = robot.axis(body).cross(&lines[body]).normalize();
+        vec![Self::outwards(body, lines), Self { body, direction: across.into(), outwards: false }]
+    }
+
+    fn any(body: usize, robot: &RobotModel) -> Vec<Self> {
+        robot.normals(body).iter().map(|(_, normal)| Self { body, direction: (*normal).into(), outwards: false }).collect()
+    }
+}
+
+impl Effect for UnweighedWindup {
+    fn name(&self) -> &'static str {
+        self.cause.name()
+    }
+
+    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+        let mut names: Vec<String> = Vec::new();
+        for Moment { body, outwards, .. } in &self.shape.moments {
+            let first = format!("link{}", body + 1);
+            let name = if *outwards || !names.contains(&first) { first } else { format!("{first}_across") };
+            names.push(name);
+        }
+        parameters(self, names.iter().map(|name| (name.as_str(), Unit::Radian, WIDE)))
+    }
+
+    fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
+        let (joint, gravity) = (self.shape.joint, state.posture.gravity.norm());
+        if gravity == 0.0 {
+            return;
+        }
+        for (k, Moment { body, direction, .. }) in self.shape.moments.iter().enumerate() {
+            let torque = state.posture.torque_of_moment(robot, joint, *body).dot(&Vector3::from(*direction));
+            out.turn(k, p, joint, torque / gravity);
+        }
+    }
+
+    fn needs_torque(&self) -> bool {
+        true
+    }
+
+    fn missing(&self, robot: &RobotModel, _data: &Measurements) -> Option<String> {
+        (Vector3::from(robot.description().gravity) == Vector3::zeros()).then(|| "the robot file gives no gravity".into())
+    }
+}
+
+impl Placed for UnweighedWindup {
+    fn place(&self) -> Place {
+        Place::Joint(self.shape.joint)
+    }
+
+    fn cause(&self) -> &'static dyn Cause {
+        self.cause
+    }
+
+    fn variables(&self) -> Vec<Variable> {
+        vec![Variable::Load { joint: self.shape.joint }]
+    }
+
+    fn variant(&self) -> String {
+        "gravity".into()
+    }
+
+    /// Weights hang outwards: what acts the other way is something else by the same angles.
+    fn called(&self, p: &[f64], _survey: &Survey) -> &'static str {
+        let sum = |outwards: bool| {
+            let own = self.shape.moments.iter().zip(p).filter(|(moment, _)| moment.outwards == outwards);
+            own.map(|(_, value)| if outwards { *value } else { value.abs() }).sum::<f64>()
+        };
+        let (outwards, across) = (sum(true), sum(false));
+        let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
+        match self.shape.own_angle {
+            true if has(false) && across > PHASE * outwards => "gear_cyclic",
+            _ if has(true) && outwards < 0.0 => "cable_drag",
+            _ => self.name(),
+        }
+    }
+
+    fn body(&self) -> serde_json::Value {
+        serde_json::json!(self.shape)
+    }
+}

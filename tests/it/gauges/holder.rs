@@ -1,0 +1,61 @@
+//! A target that steps on the tool: about the last axis it is a holder that has turned, or that joint's zero; elsewhere it has moved.
+
+use super::Cell;
+use crate::fixture;
+use calib::diagnose::{Diagnosis, Question, diagnose};
+use calib::effect::Place;
+use calib::estimate::gauge;
+use calib::robot::{Measurements, RobotModel};
+use std::collections::BTreeMap;
+
+const ROWS: usize = 120;
+const STEP: usize = 70;
+
+fn cell(seed: usize) -> (Cell, Measurements) {
+    let cell = Cell::new(fixture::offset_wrist(), &[("A", [60.0, 40.0, 20.0])], seed);
+    let data = cell.rows(ROWS, 0);
+    (cell, data)
+}
+
+fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
+    cell.disturb(&mut data);
+    let all: Vec<usize> = (0..ROWS).collect();
+    let (robot, _) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
+    let question = Question { robot: &robot, data: &data, fit: &all, validate: &[], set: &[0; ROWS], seed: 1 };
+    diagnose(&question, |_| ())
+}
+
+#[test]
+fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
+    for (seed, degrees) in [(21, 3.3), (22, -0.4)] {
+        let (cell, mut data) = cell(seed);
+        let (logged, joints) = (data.q.clone(), data.joints);
+        (STEP..ROWS).for_each(|row| data.q[row * joints + joints - 1] += f64::to_radians(degrees));
+        data.position = cell.truth.predict(&data);
+        data.q = logged;
+        let said = said(&cell, data);
+        let statements: Vec<&str> = said.findings.iter().map(|finding| finding.statement.as_str()).collect();
+        assert_eq!(statements.len(), 1, "{statements:?}");
+        let size = format!("the holder has turned by {:.2} deg about the flange", degrees.abs());
+        assert!(statements[0].starts_with(&size) && statements[0].contains("from row 71"), "{}", statements[0]);
+        let found = &said.findings[0];
+        let mut names: Vec<(&str, Place)> = found.rivals.iter().map(|rival| (rival.effect, rival.place)).collect();
+        names.push((found.effect, found.place));
+        for name in [("zero_shift", Place::Joint(joints - 1)), ("tool_shift", Place::Tool)] {
+            assert_eq!(names.iter().filter(|other| **other == name).count(), 1, "{names:?}");
+        }
+    }
+}
+
+#[test]
+fn a_target_that_moves_along_the_last_axis_has_not_turned() {
+    let (cell, mut data) = cell(23);
+    let robot = RobotModel::new(cell.description.clone());
+    for row in STEP..ROWS {
+        let turn = cell.truth.stack.base().rotation * robot.last_body(data.q(row)).rotation;
+        data.position[row] += turn * robot.axis(data.joints - 1) * 3e-4;
+    }
+    let said = said(&cell, data);
+    assert_eq!(said.findings.len(), 1, "{}", said.statement);
+    assert!(said.findings[0].statement.starts_with("the target on the tool has moved"), "{}", said.findings[0].statement);
+}

@@ -1,0 +1,127 @@
+//! Wind-up of arms whose masses nobody knows: gravity's torque of whatever masses is made of the moments that the form has.
+
+use crate::fixture;
+use calib::effect::{Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, hypotheses, whole};
+use calib::robot::description::RobotDescription;
+use calib::robot::{Measurements, RobotModel};
+use calib::spatial::Pose;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+const ROWS: usize = 80;
+
+fn data(robot: &RobotModel) -> Measurements {
+    Measurements {
+        joints: robot.joints(),
+        q: fixture::poses(robot.description(), ROWS),
+        position: vec![Vector3::zeros(); ROWS],
+        sigma: vec![Vector3::repeat(1e-5); ROWS],
+        payload: vec![0.0; ROWS],
+        ..Measurements::default()
+    }
+}
+
+fn stack(robot: &RobotModel) -> EffectStack {
+    let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
+    EffectStack::new(robot, setting.base, vec![whole("joint_compliance", &setting).expect("a cause")])
+}
+
+/// Load torques of every row (Nm), row-major, and what each number of a form turns its joint by.
+fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
+    let stack = stack(robot);
+    let (mut scratch, none) = (stack.scratch(robot), vec![0.0; stack.specs().len()]);
+    (0..ROWS).flat_map(|row| stack.point_motion(robot, data, row, &none, &mut scratch).posture.torque.clone()).collect()
+}
+
+fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
+    let stack = stack(robot);
+    let (mut scratch, none) = (stack.scratch(robot), vec![0.0; stack.specs().len()]);
+    let zeros = vec![0.0; form.parameters(robot).len()];
+    let mut out = DMatrix::zeros(ROWS, zeros.len());
+    let mut buffer = Deflection::new(robot.joints());
+    for row in 0..ROWS {
+        let motion = stack.point_motion(robot, data, row, &none, &mut scratch);
+        motion.derivatives(robot, data, form, &zeros, &mut buffer, |_, _| ());
+        for (k, direction) in &buffer.partials {
+            let Direction::Joint(_, rate) = direction else { panic!("{direction:?}") };
+            out[(row, *k)] += rate;
+        }
+    }
+    out
+}
+
+/// A survey of all rows is handed to `tell`.
+fn surveyed<T>(robot: &RobotModel, data: &Measurements, tell: impl FnOnce(&Survey) -> T) -> T {
+    let (rows, torque, compliance) = ((0..ROWS).collect::<Vec<_>>(), torques(robot, data), vec![0.0; robot.joints()]);
+    tell(&Survey::new(robot, data, &rows, &torque, &compliance))
+}
+
+fn windups(robot: &RobotModel, data: &Measurements) -> Vec<Form> {
+    let all = surveyed(robot, data, hypotheses).into_iter().map(|hypothesis| hypothesis.form);
+    all.filter(|form| form.name() == "joint_compliance").collect()
+}
+
+fn bare(mut description: RobotDescription) -> RobotModel {
+    description.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+    RobotModel::new(description)
+}
+
+#[test]
+fn gravity_torques_of_any_masses_are_made_of_the_moments_of_the_bodies_outwards() {
+    let mut compared = 0;
+    for description in fixture::all() {
+        let (weighed, bare) = (RobotModel::new(description.clone()), bare(description));
+        let data = data(&weighed);
+        let (torque, forms) = (torques(&weighed, &data), windups(&bare, &data));
+        let most = torque.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
+        for joint in 0..weighed.joints() {
+            let own = DVector::from_iterator(ROWS, torque.iter().skip(joint).step_by(weighed.joints()).copied());
+            let size = own.amax();
+            let here = forms.iter().filter(|form| form.place() == Place::Joint(joint));
+            let Some(widest) = here.max_by_key(|form| form.parameters(&bare).len()) else {
+                assert!(!weighed.is_revolute(joint) || size < 0.05 * most, "nothing for joint {} of {size} Nm", joint + 1);
+                continue;
+            };
+            let turns = turns(&bare, &data, widest);
+            let solved = turns.clone().svd(true, true).solve(&own, 1e-10).expect("a solution");
+            let left = (turns * solved - &own).amax();
+            assert!(left < 1e-9 * most, "joint {}: {left} of {size} Nm", joint + 1);
+            compared += 1;
+        }
+        assert!(windups(&weighed, &data).iter().all(|form| form.parameters(&weighed).len() == 1), "masses are known");
+    }
+    assert!(compared > 12, "{compared}");
+}
+
+/// About the first level axis a weight does what an eccentric wheel does: with the phase of a weight it is called one, and both are named.
+#[test]
+fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
+    let robot = bare(fixture::spherical());
+    let data = data(&robot);
+    let forms = windups(&robot, &data);
+    let names = |form: &Form| form.parameters(&robot).into_iter().map(|spec| spec.name).collect::<Vec<_>>();
+    let mut kinds = [0; 3];
+    for form in forms.iter().filter(|form| form.place() == Place::Joint(1)) {
+        let (names, identities) = (names(form), form.cause().identities(form, "joint_compliance"));
+        let alone = names.iter().all(|name| name.starts_with("joint_compliance.j2.gravity.link2"));
+        let same: &[(&str, Place)] =
+            if alone { &[("gear_cyclic", Place::Joint(1)), ("counterbalance", Place::Joint(1))] } else { &[] };
+        assert_eq!(identities, same, "{names:?}");
+        let called = |p: &[f64]| surveyed(&robot, &data, |survey| form.called(p, survey));
+        match (alone, names.len()) {
+            (true, 1) => {
+                assert_eq!([called(&[1e-4]), called(&[-1e-4])], ["joint_compliance", "cable_drag"]);
+                kinds[0] += 1;
+            }
+            (true, _) => {
+                let said = [[1e-4, 2e-5], [1e-5, 1e-4], [-1e-4, 1e-5]].map(|p| called(&p));
+                assert_eq!(said, ["joint_compliance", "gear_cyclic", "gear_cyclic"]);
+                kinds[1] += 1;
+            }
+            _ => {
+                assert_eq!(called(&vec![1e-4; names.len()]), "joint_compliance", "{names:?}");
+                kinds[2] += 1;
+            }
+        }
+    }
+    assert!(kinds[0] == 1 && kinds[1] == 1 && kinds[2] > 1, "{kinds:?}");
+}
