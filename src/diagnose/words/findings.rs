@@ -1,6 +1,6 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
-use super::faults::{faults, reversals, rows_apart};
+use super::faults::{faults, rows_apart};
 use super::groups::{FindingKey, groups};
 use super::last_round::LastRound;
 use super::rivals::{exact, rivals};
@@ -31,7 +31,6 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
     out.extend(faults(&state.screening, unknown));
-    out.extend(reversals(state));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
