@@ -3,7 +3,7 @@
 use super::pipeline_arguments::PipelineArguments;
 use super::{emit, emit_json};
 use crate::error::{Result, counted};
-use crate::identified::standing_of;
+use crate::identified::{standing_of, wrong_setup_of};
 use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
 use crate::summary;
@@ -77,6 +77,9 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     text.push_str(&summary::searches(&outcome, &store)?);
     text.push_str(&summary::rejected(&outcome));
     text.push_str(&summary::headline(&outcome, standing.as_ref(), &store)?);
+    text.push_str(
+        &wrong_setup_of(&outcome.manifest, &store)?.map_or_else(String::new, |wrong| format!("not accepted: {wrong}\n")),
+    );
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }
@@ -149,6 +152,7 @@ fn document(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> 
         "seed": manifest.seed,
         "stages": stages,
         "standing": standing,
+        "wrong_setup": wrong_setup_of(manifest, store)?,
         "statistics": summary::statistics_json(outcome, store)?,
         "corrections": summary::corrections_json(outcome, store)?,
         "searches": summary::searches_json(outcome, store)?,

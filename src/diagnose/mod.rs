@@ -15,6 +15,7 @@ mod pool;
 mod round;
 mod search;
 mod separate;
+mod setup;
 mod too_few;
 mod types;
 mod verdict_statement;
@@ -26,7 +27,7 @@ pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
 pub use types::{
     Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question, RivalCause,
-    SpectrumLine, VerdictKind,
+    SETUP, SpectrumLine, VerdictKind,
 };
 pub use words::other_means;
 
@@ -36,12 +37,19 @@ use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, corre
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
-/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them, of a wrong set-up what is wrong. `tell` receives
+/// the progress, a line each.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
+    if let Some(wrong) = setup::wrong_from_the_start(question) {
+        return wrong;
+    }
     if question.fit.len() < too_few::FEWEST {
         return too_few::not_asked(question);
     }
     let (mut fitter, mut now) = Fitter::start(question);
+    if let Some(wrong) = setup::wrong_when_identified(question, &now) {
+        return wrong;
+    }
     let before = now.model.predict(&fitter.data);
     tell(words::of_the_base(&now, &fitter));
     let (mut history, mut located, mut first) = (RoundHistory::default(), None, None);

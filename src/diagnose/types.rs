@@ -81,8 +81,10 @@ pub struct Finding {
     pub forms: Vec<Form>,
 }
 
+/// What a wrong set-up is called.
+pub const SETUP: &str = "setup";
 /// Effects that are faults of the recording, not of the robot.
-const FAULTS: [&str; 3] = ["outlier", "mislabelled_point", "joint_log_lag"];
+const FAULTS: [&str; 4] = ["outlier", "mislabelled_point", "joint_log_lag", SETUP];
 
 impl Finding {
     pub fn is_physics(&self) -> bool {
@@ -140,6 +142,8 @@ pub enum VerdictKind {
     Unexplained,
     /// Too few rows were fitted.
     NotAsked,
+    /// Units, signs, orders, frames or the robot file are wrong: no physics was asked.
+    WrongSetup,
 }
 
 impl VerdictKind {
@@ -149,6 +153,7 @@ impl VerdictKind {
             Self::NothingMissing => "nothing_missing",
             Self::Unexplained => "unexplained",
             Self::NotAsked => "not_asked",
+            Self::WrongSetup => "wrong_setup",
         }
     }
 }
@@ -164,7 +169,11 @@ pub struct ErrorLengths {
 impl ErrorLengths {
     /// Of some rows; `None` of no rows.
     pub(crate) fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
-        let lengths: Vec<f64> = rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect();
+        Self::of_lengths(&rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect::<Vec<_>>())
+    }
+
+    /// Of lengths, m; `None` of none.
+    pub(crate) fn of_lengths(lengths: &[f64]) -> Option<Self> {
         let count = lengths.len() as f64;
         (count > 0.0).then(|| Self {
             mean: lengths.iter().sum::<f64>() / count,

@@ -5,7 +5,7 @@ mod scatter;
 mod standing;
 
 pub use robot_file::robot_file;
-pub use standing::standing_of;
+pub use standing::{standing_of, wrong_setup_of};
 
 use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
 use crate::effect::Load;
@@ -67,6 +67,13 @@ impl IdentifiedModel {
             let status = if manifest.status == RunStatus::Failed { "failed" } else { "running or was killed" };
             return Err(Error::spec(run, format!("the run {status}, it is not done")));
         }
+        let wrong = wrong_setup_of(manifest, store)?;
+        if let (None, Some(wrong)) = (step, &wrong) {
+            let message = format!(
+                "no model of it is good for anything: {wrong}. Mend it and run again, or take a step on purpose with --step"
+            );
+            return Err(Error::data(run, message));
+        }
         let stands = if step.is_none() { standing_of(manifest, store)? } else { None };
         let (stage, table) = chosen(manifest, step, stands.as_ref())?;
         let load = |table: &TableRef| load(store, table, manifest);
@@ -90,7 +97,7 @@ impl IdentifiedModel {
         };
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
-        let warnings = stands.iter().flat_map(Standing::warnings).collect();
+        let warnings = stands.iter().flat_map(Standing::warnings).chain(wrong).collect();
         let covariance = stage.outputs.iter().find(|output| output.kind == CovarianceTable::KIND);
         let covariance = covariance.map(|output| CovarianceTable::from_frame(&load(&output.table)?)).transpose()?;
         let own = Self::of(robot, parameters, origin)?;

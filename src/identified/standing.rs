@@ -4,10 +4,20 @@ use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{Diagnose, Stage};
 use crate::store::{Store, TableRef};
-use crate::table::{Corrected, Parameters, Prediction, Standing, Step, Table, Unseen, standing};
+use crate::table::{Corrected, Findings, Parameters, Prediction, Standing, Step, Table, Unseen, Verdict, standing};
 
-/// The step that stands for a run; none where nothing predicts, or the last diagnosis speaks of an outside simulation. Fails where a
-/// table has left the store.
+/// What the last diagnosis of a run says of a wrong set-up; none where it is right. Fails where a table has left the store.
+pub fn wrong_setup_of(manifest: &Manifest, store: &Store) -> Result<Option<String>> {
+    let diagnosed = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
+    let Some(stage) = diagnosed.last() else { return Ok(None) };
+    let of = |kind: &str| stage.outputs.iter().find(|output| output.kind == kind).map(|output| output.table.clone());
+    let (Some(verdict), Some(findings)) = (of(Verdict::KIND), of(Findings::KIND)) else { return Ok(None) };
+    let (verdict, findings) = (store.load(&verdict)?, store.load(&findings)?);
+    Ok(Verdict::from_frame(&verdict)?.wrong_setup(&Findings::from_frame(&findings)?))
+}
+
+/// The step that stands for a run; none where nothing predicts, the last diagnosis speaks of an outside simulation, or the set-up is
+/// wrong. Fails where a table has left the store.
 pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing>> {
     let of = |stage: &StageReport, kind: &str| -> Option<TableRef> {
         stage.outputs.iter().find(|output| output.kind == kind).map(|output| output.table.clone())
@@ -17,6 +27,9 @@ pub fn standing_of(manifest: &Manifest, store: &Store) -> Result<Option<Standing
     if let Some(table) = diagnosed.as_ref().and_then(|(stage, _)| of(stage, Parameters::KIND))
         && Parameters::from_frame(&store.load(&table)?)?.corrected() == Corrected::OutsideSimulation
     {
+        return Ok(None);
+    }
+    if wrong_setup_of(manifest, store)?.is_some() {
         return Ok(None);
     }
     let step = |(stage, prediction): (&StageReport, TableRef)| -> Result<Step> {

@@ -52,14 +52,14 @@ impl RobotFileKind {
         for joint in 1..=self.joints() {
             out.push_str(&format!("  - {{name: A{joint}, limits: [-170, 170]}}\n"));
         }
-        out + TAIL
+        out + LINKS + PAYLOAD
     }
 }
 
 /// The robot file beside a URDF.
 pub(super) fn of_urdf(tip: &str) -> String {
     format!(
-        "{HEAD}  urdf: {{base: base_link, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{TAIL}",
+        "{HEAD}  urdf: {{base: base_link, tip: {}}}     # CHECK: first and last link of the chain\ntool: {{point: [0, 0, 0]}}           # REPLACE: the measured point in the tip link's frame\n{URDF_LINKS}{PAYLOAD}",
         quoted(tip)
     )
 }
@@ -107,7 +107,11 @@ const DH6: &str = "  dh:                             # REPLACE: Rz(theta) Tz(d) 
     - {theta: 0, d: 260, a: 0, alpha: 0}
 ";
 
-const TAIL: &str = "# links:                          # masses of the bodies that the joints move, for compliance under gravity; null where not known
-#   - {mass: 340, centre: [150, 0, -120]}
-# payload: {mass: 210, offset: [140, -30, 10]}     # rated, kg; from the tool point to its centre
+const URDF_LINKS: &str = "links:                            # CHECK: masses and centres are those of the URDF's <inertial>; where it has none, a line for each joint
+#   - {mass: 340, centre: [150, 0, -120]}   # without them what weight does (wind-up, bending) is not in the model
+";
+const LINKS: &str = "links:                            # REPLACE: a line for each joint, kg and centre of the body that it moves, as below; null where not known
+#   - {mass: 340, centre: [150, 0, -120]}   # without them what weight does (wind-up, bending) is not in the model
+";
+const PAYLOAD: &str = "# payload: {mass: 210, offset: [140, -30, 10]}     # rated, kg; from the tool point to its centre
 ";

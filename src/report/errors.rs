@@ -2,6 +2,7 @@
 
 use super::Tables;
 use super::distribution::{self, cumulative, histogram};
+use super::findings::wrong_setup;
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
@@ -143,7 +144,10 @@ impl ErrorsSection {
         let held_out = kept.iter().map(|set| block(set, true, None));
         let used = later.map(|set| block(set, true, Some("held out until a later step was fitted to it")));
         Ok(Self {
-            verdict: verdict(rows, &last, &tables.withdrawn),
+            verdict: match wrong_setup(tables) {
+                Some(wrong) => nothing_known(format!("Nothing is calibrated: {wrong}.")),
+                None => verdict(rows, &last, &tables.withdrawn),
+            },
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
@@ -230,18 +234,16 @@ fn points(number: i64) -> String {
     if number == 1 { "one point".into() } else { format!("{} points", count(number)) }
 }
 
+/// A sentence without figures.
+fn nothing_known(sentence: String) -> VerdictView {
+    VerdictView { kind: "unknown", sentence, before: None, after: None, facts: Vec::new(), others: Vec::new() }
+}
+
 fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> VerdictView {
     let Some(after) = last.first() else {
-        return VerdictView {
-            kind: "unknown",
-            sentence: "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
-                       the model was fitted to, and flatter it."
-                .into(),
-            before: None,
-            after: None,
-            facts: Vec::new(),
-            others: Vec::new(),
-        };
+        let sentence = "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
+                        the model was fitted to, and flatter it.";
+        return nothing_known(sentence.into());
     };
     let before_row = before(rows, after);
     let sample = format!("{} of the set \u{201c}{}\u{201d}, to which nothing was fitted", points(after.points), after.set);

@@ -15,6 +15,9 @@ const DRAWN: usize = 700;
 pub(super) struct FindingsSection {
     kind: &'static str,
     sentence: String,
+    heading: &'static str,
+    /// What the errors are of.
+    caption: &'static str,
     /// Name, mean, rms, max.
     errors: Vec<[String; 4]>,
     facts: Vec<(&'static str, String)>,
@@ -50,20 +53,22 @@ impl FindingsSection {
         let figure = |value: Option<f64>| value.map_or_else(|| "\u{2013}".into(), mm);
         let errors = |name: &str, mean, rms, max| [name.to_string(), figure(mean), figure(rms), figure(max)];
         let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
+        let wrong = wrong_setup(tables).is_some();
+        let (before, after) = match wrong {
+            true => ("as it is set up", "without what is wrong"),
+            false => ("before: geometry, zeros and ratios identified", "after: with the findings"),
+        };
         Some(Self {
             kind: match verdict.verdict.as_str() {
                 "explained" | "nothing_missing" => "better",
                 _ => "unknown",
             },
             sentence: sentence(verdict, tables),
+            heading: if wrong { "The set-up is wrong" } else { "What the simulation lacked" },
+            caption: if wrong { "Error of the nominal robot, base and tool fitted, mm" } else { "Error of held-out points, mm" },
             errors: vec![
-                errors(
-                    "before: geometry, zeros and ratios identified",
-                    verdict.before_mean_mm,
-                    verdict.before_rms_mm,
-                    verdict.before_max_mm,
-                ),
-                errors("after: with the findings", verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
+                errors(before, verdict.before_mean_mm, verdict.before_rms_mm, verdict.before_max_mm),
+                errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
             ],
             facts: facts(verdict),
             findings: tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect(),
@@ -76,6 +81,12 @@ impl FindingsSection {
                 .collect(),
         })
     }
+}
+
+/// What is wrong with the set-up; none where it is right.
+pub(super) fn wrong_setup(tables: &Tables) -> Option<String> {
+    let findings = tables.findings.last()?;
+    tables.verdict.last()?.wrong_setup(findings)
 }
 
 fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
@@ -104,6 +115,13 @@ fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
     let said = match &verdict.statement {
         Some(statement) => sentence_case(statement),
         None => said.into(),
+    };
+    let said = match wrong_setup(tables) {
+        Some(_) => said,
+        None => format!(
+            "{said} The simulation is the nominal robot with geometry, zeros, ratios and declared couplings identified; everything else \
+             is a finding."
+        ),
     };
     match tables.withdrawn.iter().find(|gone| gone.step == verdict.step) {
         Some(gone) => format!("This model does not stand for the run: {gone}. {said}"),

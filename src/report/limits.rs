@@ -2,6 +2,7 @@
 
 use super::Tables;
 use super::errors::Steps;
+use super::findings::wrong_setup;
 use crate::table::StatisticsRow;
 use serde::Serialize;
 
@@ -32,9 +33,13 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 }
 
 impl Judgement {
-    /// None where there are no limits.
+    /// None where there are no limits and the set-up is right.
     pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let asked = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
+        if let Some(wrong) = wrong_setup(tables) {
+            let sentence = format!("Not accepted: {wrong}.");
+            return Some(Self { kind: "worse", sentence, lines: Vec::new(), kept: false });
+        }
         if asked.iter().all(|(_, limit)| limit.is_none()) {
             return None;
         }

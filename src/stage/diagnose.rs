@@ -4,7 +4,7 @@ use crate::diagnose::{Question, VerdictKind as Said, against_simulation, diagnos
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
-use crate::stage::{Context, Stage, screened};
+use crate::stage::{Context, Stage, screened, weightless};
 use crate::table::{
     Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
     Split, Suspects, Verdict,
@@ -67,7 +67,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 10;
+    const IMPLEMENTATION: u32 = 11;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -118,9 +118,20 @@ impl Stage for Diagnose {
             prior_weight: self.prior_weight,
             seed: context.seed,
         };
-        let diagnosis = diagnose(&question, |line| context.services.note(line));
+        let mut diagnosis = diagnose(&question, |line| context.services.note(line));
         if diagnosis.verdict == Said::NotAsked {
             context.services.warn(diagnosis.not_observable.join("; "));
+        }
+        if diagnosis.verdict == Said::WrongSetup {
+            match diagnosis.findings.first() {
+                Some(finding) => context.services.warn(format!("the set-up is wrong: {}", finding.statement)),
+                None => return Err(Error::data("table recording", diagnosis.statement)),
+            }
+        }
+        let asked_for_physics = !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked);
+        if let Some(warning) = weightless::warning(&robot, &data, &fit).filter(|_| asked_for_physics) {
+            diagnosis.statement.push_str(&format!("; {warning}"));
+            context.services.warn(warning);
         }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];

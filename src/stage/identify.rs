@@ -8,9 +8,9 @@ use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
-use crate::stage::identified::{Fitting, Identified};
+use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::screened::fit_rows;
-use crate::stage::{Context, Stage};
+use crate::stage::{Context, Stage, weightless};
 use crate::table::{Recording, Robot, Split};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -91,7 +91,13 @@ impl Stage for Identify {
             }
             match effect.missing(&robot, &data) {
                 Some(reason) => context.services.note(format!("{} is left out: {reason}", effect.name())),
-                None => effects.push(effect),
+                None => {
+                    let by_weight = effect.name() == JointCompliance::NAME && matches!(self.load, LoadSetting::Gravity);
+                    if let Some(warning) = weightless::warning(&robot, &data, &rows).filter(|_| by_weight) {
+                        context.services.warn(warning);
+                    }
+                    effects.push(effect);
+                }
             }
         }
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));

@@ -27,7 +27,9 @@ mod write;
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
-pub use mapped::{ColumnRef, ConventionColumns, CountColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
+pub use mapped::{
+    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn,
+};
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 

@@ -21,6 +21,7 @@ pub mod split;
 mod stiffness;
 mod transfer;
 mod validate;
+mod weightless;
 
 pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};

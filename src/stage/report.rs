@@ -70,7 +70,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 8;
+    const IMPLEMENTATION: u32 = 9;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -86,7 +86,10 @@ impl Stage for Report {
             unseen: Unseen::of(&step.table),
         };
         let steps: Vec<Step> = reads.prediction.iter().map(step).collect();
-        let stands = standing(&steps, diagnosed.map(String::as_str)).filter(|_| reads.recording.simulated.is_none());
+        let wrong = reads.verdict.last().zip(reads.findings.last());
+        let wrong = wrong.and_then(|(verdict, findings)| verdict.table.wrong_setup(&findings.table));
+        let stands = standing(&steps, diagnosed.map(String::as_str));
+        let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
         let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
         stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
         let tables = Tables {

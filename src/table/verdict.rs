@@ -4,7 +4,7 @@ crate::table::rows! { "verdict",
     /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects apart.
     pub struct Verdict of VerdictRow {
         step: String,
-        /// `explained`, `nothing_missing`, `unexplained`, or `not_asked` of too few rows.
+        /// `explained`, `nothing_missing`, `unexplained`, `not_asked` of too few rows, or `wrong_setup`.
         verdict: String,
         /// The same in a sentence, with what its noise rests on.
         statement: Option<String>,
@@ -46,9 +46,17 @@ crate::table::rows! { "verdict",
     }
 }
 
-use crate::diagnose::{Diagnosis, ErrorLengths};
+use super::Findings;
+use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};
 
 impl Verdict {
+    /// What is wrong with the set-up, where a diagnosis says so: `findings` are its own.
+    pub fn wrong_setup(&self, findings: &Findings) -> Option<String> {
+        let wrong = self.0.iter().any(|row| row.verdict == VerdictKind::WrongSetup.name());
+        let first = findings.0.first().map(|finding| finding.statement.as_str()).unwrap_or_default();
+        wrong.then(|| format!("the set-up is wrong: {first}").trim_end_matches('.').to_string())
+    }
+
     /// The verdict of the stage `step`.
     pub fn of(step: &str, diagnosis: &Diagnosis) -> Self {
         let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| errors.map(|errors| of(errors) * 1e3);

@@ -3,6 +3,7 @@
 mod flanks;
 mod said;
 mod scrambled;
+mod setup;
 mod weight;
 
 use crate::desk::{Desk, shared, table};
@@ -152,7 +153,7 @@ fn lost_motion_that_heavy_loads_decide_is_one_cause_with_its_gap_and_its_torque(
 }
 
 #[test]
-fn a_joint_of_the_wrong_sign_is_named_and_the_rest_is_fitted_all_the_same() {
+fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let arguments =
         ["simulate", "conceal", "--out", "sealed", "--cases", "1", "--seed", "901", "--points", "120", "--nulls", "1"];
@@ -174,9 +175,15 @@ fn a_joint_of_the_wrong_sign_is_named_and_the_rest_is_fitted_all_the_same() {
     let said: Value = serde_json::from_str(&said).expect("JSON");
     let findings = said["findings"].as_array().expect("a list");
     assert_eq!(findings.len(), 1, "{said:#}");
-    assert_eq!((&findings[0]["effect"], &findings[0]["where"]), (&"reduction_ratio".into(), &"joint 4".into()));
-    let after = said["after"]["validate_rms_mm"].as_f64().expect("held-out rows");
-    assert!(after < 1.3 * said["noise_floor_mm"].as_f64().expect("a number"), "{after}");
+    assert_eq!((&said["verdict"], &findings[0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
+    let sign = "sign: [1, 1, 1, -1, 1, 1]";
+    assert!(findings[0]["statement"].as_str().expect("a sentence").contains(sign), "{said:#}");
+    // The line of YAML mends it, and physics is asked.
+    let here = folder.path();
+    case_with(here, &[("unit: deg, linear_unit: mm}", &format!("unit: deg, linear_unit: mm, {sign}}}"))]);
+    let mended = calib(&[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    assert_eq!((&mended["verdict"], &mended["findings"]), (&"nothing_missing".into(), &serde_json::json!([])), "{mended:#}");
 }
 
 #[test]

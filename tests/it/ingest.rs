@@ -1,6 +1,7 @@
 //! Raw files become a recording; what does not is named with file, line and reason.
 
 mod clocks;
+mod counting;
 mod foreign;
 mod kinds;
 mod moving;

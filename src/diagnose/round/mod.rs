@@ -5,7 +5,6 @@ mod correlated_noise;
 mod fit_state;
 mod history;
 mod noise;
-mod reversed_joints;
 mod stretches;
 mod view;
 
@@ -14,5 +13,4 @@ pub(crate) use correlated_noise::correlation_left_by;
 pub(crate) use fit_state::{EstimatedCause, FitState, Fitter, with_causes};
 pub(crate) use history::{RoundHistory, RoundOutcome};
 pub(crate) use noise::REPEATS;
-pub(crate) use reversed_joints::REVERSED;
 pub(crate) use view::{RoundView, compliance};

@@ -1,10 +1,9 @@
-//! Findings that are no physics of the arm: rows that no model can follow, logs that are apart, joints that count the other way.
+//! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
-use crate::diagnose::round::{FitState, REVERSED};
 use crate::diagnose::types::{Finding, Probabilities};
-use crate::effect::{JointLogLag, ParameterEstimate, Place, ReductionRatio};
+use crate::effect::{JointLogLag, Place};
 use crate::error::counted;
-use crate::estimate::{ParameterStatus, Screening, Suspect, SuspectKind};
+use crate::estimate::{Screening, Suspect, SuspectKind};
 
 /// Joints and points of all rows that are so many rows apart.
 pub(super) fn rows_apart(offset: i64) -> Finding {
@@ -14,25 +13,6 @@ pub(super) fn rows_apart(offset: i64) -> Finding {
         format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
     of_the_recording(JointLogLag::NAME, text)
 }
-
-/// Joints that turn the other way than the robot file says.
-pub(super) fn reversals(last: &FitState) -> Vec<Finding> {
-    let FitState { model, fitted, .. } = last;
-    let ratios = model.stack.parameters_of(ReductionRatio::NAME);
-    let reversed = ratios.filter(|k| (model.x[*k] - REVERSED).abs() < REVERSED_WITHIN);
-    let one = |k: usize| {
-        let sigma = if let ParameterStatus::Free(sigma) = fitted.statuses[k] { Some(sigma) } else { None };
-        let place = model.stack.specs()[k].place;
-        let statement =
-            format!("{place} turns the other way than the robot file says: turn its axis there, or the sign of its column");
-        let parameters = vec![ParameterEstimate { name: "k".into(), form: 0, value: 1.0 + model.x[k], unit: "1", sigma }];
-        Finding { place, parameters, ..of_the_recording(ReductionRatio::NAME, statement) }
-    };
-    reversed.map(one).collect()
-}
-
-/// A reversed joint's ratio is -1 to this.
-const REVERSED_WITHIN: f64 = 0.1;
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
 pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {

@@ -1,6 +1,6 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
-use super::faults::{faults, reversals, rows_apart};
+use super::faults::{faults, rows_apart};
 use super::groups::{FindingKey, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
@@ -32,7 +32,6 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
     out.extend(faults(&state.screening, unknown));
-    out.extend(reversals(state));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out

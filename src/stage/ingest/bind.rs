@@ -28,6 +28,8 @@ pub(super) struct Binding {
     pub cells: Vec<NumberBinding>,
     /// Numbers that are the same in every row, SI.
     pub constants: Vec<(usize, f64)>,
+    /// Joints (from 0) from which so many times another one is taken off.
+    pub coupled: Vec<(usize, usize, f64)>,
     /// Optional columns that the file does not have, for a note.
     pub missing: Vec<String>,
 }
@@ -51,6 +53,9 @@ pub(super) struct NumberBinding {
     pub optional: bool,
     /// What the file's number is divided by: how many standard deviations an uncertainty is.
     pub divisor: f64,
+    /// What is taken off, SI, and the sign of what remains.
+    pub zero: f64,
+    pub sign: f64,
     /// The column, as people call it: `x_mm`, or `column 4`.
     pub name: String,
     /// What is added to it.
@@ -100,6 +105,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         sequence: None,
         cells: Vec::new(),
         constants: Vec::new(),
+        coupled: Vec::new(),
         missing: Vec::new(),
     };
     let mut binder = Binder { head, binding, faults: Vec::new() };
@@ -259,18 +265,8 @@ impl Binder<'_> {
     fn cell(&self, declared: &DeclaredColumn, is_prismatic: bool, index: usize, column: usize, unit: Unit) -> NumberBinding {
         let (quantity, range) = declared.of_joint(is_prismatic);
         let (is_direction, name) = (quantity == Quantity::Number, self.name(column));
-        NumberBinding {
-            index,
-            column,
-            unit,
-            range,
-            is_direction,
-            optional: false,
-            divisor: 1.0,
-            name,
-            difference: None,
-            is_clock: false,
-        }
+        let (optional, divisor, zero, sign, difference, is_clock) = (false, 1.0, 0.0, 1.0, None, false);
+        NumberBinding { index, column, unit, range, is_direction, optional, divisor, zero, sign, name, difference, is_clock }
     }
     fn joints(&mut self, declared: &DeclaredColumn, joints: &JointColumns, arm: &RobotJoints) -> Result<()> {
         let name = declared.setting;
@@ -288,6 +284,9 @@ impl Binder<'_> {
                 counted(references.len(), "column"),
                 counted(count, "joint")
             ));
+            return Ok(());
+        }
+        if !self.are_of_the_robot(joints, name, count) {
             return Ok(());
         }
         if let Some(pattern) = &joints.column {
@@ -319,9 +318,26 @@ impl Binder<'_> {
             if let Some(column) = self.column(reference, name, false) {
                 let index = arm.slots.of(name).start + joint;
                 let cell = self.cell(declared, is_prismatic, index, column, unit);
-                self.binding.cells.push(NumberBinding { optional: joints.optional, ..cell });
+                let sign = joints.sign.get(joint).copied().unwrap_or(1.0);
+                let zero = joints.zero.get(joint).map_or(0.0, |zero| unit.to_si(*zero));
+                self.binding.cells.push(NumberBinding { optional: joints.optional, sign, zero, ..cell });
             }
         }
+        self.binding.coupled.extend(joints.coupled.iter().map(|one| (one.joint - 1, one.by - 1, one.ratio)));
         Ok(())
+    }
+    /// Whether signs, zeros and couplings are those of this robot's joints.
+    fn are_of_the_robot(&mut self, joints: &JointColumns, name: &str, count: usize) -> bool {
+        let before = self.faults.len();
+        for (list, given) in [("sign", joints.sign.len()), ("zero", joints.zero.len())] {
+            if given > 0 && given != count {
+                let (given, count) = (counted(given, "number"), counted(count, "joint"));
+                self.fault(format!("`{name}.{list}` lists {given}; the robot has {count}"));
+            }
+        }
+        if joints.coupled.iter().any(|one| one.joint.max(one.by) > count) {
+            self.fault(format!("`{name}.coupled` names a joint beyond the last; the robot has {}", counted(count, "joint")));
+        }
+        self.faults.len() == before
     }
 }

@@ -216,6 +216,7 @@ fn joint_faults(declared: &DeclaredColumn, joints: &JointColumns, file: &FileLay
     for (index, entry) in joints.columns.iter().flatten().enumerate() {
         column(Some(entry), file, &format!("{place}.columns[{index}]"), faults);
     }
+    faults.extend(joints.counting_faults(declared.setting == "q", place));
     if quantity == Quantity::Angle && joints.optional {
         faults.push(Fault::new(format!("{place}.optional"), "no recording without joint positions"));
     }

@@ -1,5 +1,6 @@
 //! Where a quantity stands in a file: a column or several of them, or one value for every row.
 
+use crate::error::Fault;
 use schemars::JsonSchema;
 use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
@@ -138,9 +139,31 @@ pub struct JointColumns {
     /// Unit of the positions or velocities of prismatic joints, e.g. `mm`.
     #[serde(default)]
     pub linear_unit: Option<String>,
+    /// 1 or -1 for each joint: -1 where the file counts the other way than the robot file, e.g. `[1, 1, -1, 1, 1, 1]`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sign: Vec<f64>,
+    /// Of positions: what the file shows where the robot file has its zero, for each joint in the unit of the column, e.g.
+    /// `[0, -90, 0, 0, 0, 0]`. A position is `sign * (file - zero)`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zero: Vec<f64>,
+    /// Of positions: angles that hold a part of another one, as where a controller reports joint 3 against the horizon; taken off.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coupled: Vec<CoupledColumn>,
     /// The columns may be missing from the file, and their cells may be blank.
     #[serde(default)]
     pub optional: bool,
+}
+
+/// The column of joint `joint` holds `ratio` times the position of joint `by` beside its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CoupledColumn {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// Number of the joint whose position is in its column, from 1.
+    pub by: usize,
+    /// How often it is, e.g. 1 or -1.
+    pub ratio: f64,
 }
 
 /// Columns of a quantity of several numbers, by convention.
@@ -153,6 +176,34 @@ pub struct ConventionColumns {
     pub unit: Option<String>,
     /// The cells may be blank: the row has none.
     pub optional: bool,
+}
+
+impl JointColumns {
+    /// Faults of how the file is said to count its joints.
+    pub(super) fn counting_faults(&self, are_positions: bool, place: &str) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (index, _) in self.sign.iter().enumerate().filter(|(_, sign)| sign.abs() != 1.0) {
+            faults.push(Fault::new(format!("{place}.sign[{index}]"), "allowed: 1 and -1"));
+        }
+        for (index, _) in self.zero.iter().enumerate().filter(|(_, zero)| !zero.is_finite()) {
+            faults.push(Fault::new(format!("{place}.zero[{index}]"), "not a finite number"));
+        }
+        for (index, one) in self.coupled.iter().enumerate() {
+            let place = format!("{place}.coupled[{index}]");
+            if one.joint == 0 || one.by == 0 {
+                faults.push(Fault::new(&place, "joints count from 1"));
+            } else if one.joint == one.by {
+                faults.push(Fault::new(&place, "a joint cannot hold itself; expected two different joints"));
+            }
+            if !one.ratio.is_finite() {
+                faults.push(Fault::new(format!("{place}.ratio"), "not a finite number, e.g. 1 or -1"));
+            }
+        }
+        if !are_positions && !(self.zero.is_empty() && self.coupled.is_empty()) {
+            faults.push(Fault::new(place, "`zero` and `coupled` are for positions; say them at `q`"));
+        }
+        faults
+    }
 }
 
 impl ScalarColumn {

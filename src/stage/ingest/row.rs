@@ -149,7 +149,7 @@ impl RowReader<'_> {
                 let Some(added) = self.number(record, other.column, &other.name, cell.optional)? else { continue };
                 value += other.sign * other.unit.to_si(added);
             }
-            value /= cell.divisor;
+            value = cell.sign * (value - cell.zero) / cell.divisor;
             let joint = cell.index.wrapping_sub(self.arm.slots.q.start);
             if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > TURNS {
                 row.turned.get_or_insert((joint, value));
@@ -177,6 +177,10 @@ impl RowReader<'_> {
             if let Some(slot) = row.values.get_mut(cell.index) {
                 *slot = value;
             }
+        }
+        let q = row.values.get_mut(self.arm.slots.q.clone()).unwrap_or_default();
+        for (joint, by, ratio) in &self.binding.coupled {
+            q[*joint] -= ratio * q[*by];
         }
         Ok(())
     }

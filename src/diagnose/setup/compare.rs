@@ -1,0 +1,139 @@
+//! Every set-up error of the list tried: the recording without it, base and tool aligned anew, and what is left compared.
+
+use super::manufacture::{ANGLE, length_error};
+use super::number::FreeNumber;
+use super::order::RowOrder;
+use super::pairs::{Pairs, sampled};
+use super::placement::{Placement, place};
+use super::wrong::WrongSetup;
+use crate::diagnose::types::Question;
+use crate::robot::RobotModel;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// A nominal robot leaves less than this share of its reach, and of the size of the measured cloud.
+const NOMINAL: f64 = 0.02;
+/// A set-up error explains where without it so many times less is left.
+const BETTER: f64 = 3.0;
+/// What has numbers of its own must leave so many times less than what has none.
+const OWN_NUMBERS: f64 = 2.0;
+/// Others that leave no more than so many times as much explain as well.
+const ALIKE: f64 = 1.3;
+/// Set-up errors that are tried together with another where none explains alone.
+const SECOND: usize = 6;
+
+/// The recording as the files say, and how large arm and measured cloud are.
+pub(super) struct AsStated<'a> {
+    question: &'a Question<'a>,
+    /// Whole rows in their order, and the positions among them of those that judge.
+    rows: Vec<usize>,
+    judges: Vec<usize>,
+    pub placed: Placement,
+    /// m.
+    pub reach: f64,
+    cloud: f64,
+}
+
+/// Set-up errors that together explain what the nominal robot leaves, those that explain as well, and what is left without them.
+pub(super) struct Explanation {
+    pub wrong: Vec<WrongSetup>,
+    pub alike: Vec<WrongSetup>,
+    pub placed: Placement,
+}
+
+/// One try: what is left, as a share of the measured cloud's size.
+struct Try {
+    wrong: Vec<WrongSetup>,
+    placed: Placement,
+    share: f64,
+    explains: bool,
+}
+
+impl<'a> AsStated<'a> {
+    pub fn of(question: &'a Question<'a>) -> Self {
+        let data = question.data;
+        let rows: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row)).collect();
+        let sample = sampled(question.fit);
+        let judges = sample.iter().filter_map(|row| rows.binary_search(row).ok()).collect();
+        let pairs = Pairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
+        Self { question, rows, judges, placed: place(&pairs, None), reach: pairs.reach(), cloud: pairs.cloud() }
+    }
+
+    /// What the nominal robot leaves, as a share of its reach.
+    pub fn share_of_reach(&self) -> f64 {
+        self.placed.left / self.reach.max(f64::MIN_POSITIVE)
+    }
+
+    /// Whether no nominal robot leaves so much.
+    pub fn is_no_robot(&self) -> bool {
+        self.share_of_reach() > NOMINAL
+    }
+
+    /// Whether the nominal robot leaves more than most.
+    pub fn is_far_off(&self) -> bool {
+        self.is_no_robot() || self.share() > NOMINAL
+    }
+
+    fn share(&self) -> f64 {
+        self.placed.left / self.cloud.max(f64::MIN_POSITIVE)
+    }
+
+    /// The rows that judge, with set-up errors mended.
+    fn mended(&self, wrong: &[WrongSetup]) -> Pairs<'a> {
+        let (data, rows) = (self.question.data, &self.rows);
+        let order = wrong.iter().find_map(|one| one.order()).unwrap_or(RowOrder::Shifted(0));
+        let partners = order.partners(rows.len());
+        let pairs = Pairs::of(self.question.robot, data, self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])));
+        wrong.iter().fold(pairs, |pairs, one| one.mended(&pairs))
+    }
+
+    fn tried(&self, wrong: Vec<WrongSetup>) -> Try {
+        let pairs = self.mended(&wrong);
+        let number = wrong.iter().find_map(|one| one.number());
+        let placed = place(&pairs, number);
+        let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
+        let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
+        let own = if number.is_some() { OWN_NUMBERS } else { 1.0 };
+        let explains = counts && BETTER * own * share < self.share() && placed.left < NOMINAL * pairs.reach();
+        Try { wrong, placed, share: own * share, explains }
+    }
+
+    /// What explains it: one set-up error, else two.
+    pub fn explained(&self) -> Option<Explanation> {
+        let data = self.question.data;
+        let in_order = Pairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
+        let all = WrongSetup::all(&in_order);
+        let mut one: Vec<Try> = all.par_iter().map(|wrong| self.tried(vec![*wrong])).collect();
+        one.sort_by(|a, b| a.share.total_cmp(&b.share));
+        if let Some(found) = chosen(&one) {
+            return Some(found);
+        }
+        let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(SECOND);
+        let both = |a: WrongSetup| {
+            let others = all.iter().filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
+            others.map(move |b| vec![a, *b])
+        };
+        let pairs: Vec<Vec<WrongSetup>> = first.flat_map(both).collect();
+        let mut two: Vec<Try> = pairs.into_par_iter().map(|wrong| self.tried(wrong)).collect();
+        two.sort_by(|a, b| a.share.total_cmp(&b.share));
+        chosen(&two)
+    }
+}
+
+/// The best of tries in their order, if it explains.
+fn chosen(tries: &[Try]) -> Option<Explanation> {
+    let best = tries.iter().find(|tried| tried.explains)?;
+    let is_rival = |tried: &&Try| tried.explains && tried.wrong != best.wrong && tried.share < ALIKE * best.share;
+    let alike = tries.iter().filter(is_rival).filter(|tried| tried.wrong.len() == 1).map(|tried| tried.wrong[0]).collect();
+    Some(Explanation { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
+}
+
+/// Whether a number of the robot file is off by more than manufacture errs.
+fn beyond_manufacture(number: FreeNumber, values: &[f64], robot: &RobotModel, reach: f64) -> bool {
+    let size = Vector3::from_iterator(values.iter().copied().chain([0.0; 3]).take(3)).norm();
+    match number {
+        FreeNumber::Length(joint) => size > length_error(robot, joint, reach),
+        FreeNumber::Axis(joint) => size > length_error(robot, joint - 1, reach),
+        FreeNumber::Zero(_) => size > ANGLE,
+    }
+}

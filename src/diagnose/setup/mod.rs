@@ -1,0 +1,50 @@
+//! Set-up errors come before physics: what engineers get wrong when they bring a robot file, joints and points together.
+//!
+//! Where the nominal robot is farther off than one that is set up rightly, or the identified one leaves it by more than manufacture
+//! errs, each error of a closed list is taken out of the recording, base and tool are aligned anew, and what is left is compared. The
+//! frames of base and tool are fitted, so that no convention of theirs can be wrong here.
+
+mod compare;
+mod manufacture;
+mod number;
+mod order;
+mod outcome;
+mod pairs;
+mod placement;
+mod words;
+mod wrong;
+
+use super::round::FitState;
+use super::types::{Diagnosis, Question};
+use compare::AsStated;
+
+/// Fewer rows than this do not tell one error from another: base and tool alone take nine numbers.
+const FEWEST: usize = 10;
+
+/// What is wrong with the set-up, if the nominal robot is far off its points; without findings where nothing of the list explains it.
+pub(crate) fn wrong_from_the_start(question: &Question) -> Option<Diagnosis> {
+    if question.fit.len() < FEWEST {
+        return None;
+    }
+    let stated = AsStated::of(question);
+    if !stated.is_far_off() {
+        return None;
+    }
+    match stated.explained() {
+        Some(found) => Some(outcome::explained(question, &stated, &found)),
+        None => stated.is_no_robot().then(|| outcome::unexplained(question, &stated)),
+    }
+}
+
+/// What is wrong with the set-up, if the identified base model leaves the robot file by more than manufacture errs.
+pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Option<Diagnosis> {
+    let stated = AsStated::of(question);
+    let beyond = manufacture::beyond(now, question.robot, stated.reach);
+    if beyond.is_empty() {
+        return None;
+    }
+    Some(match stated.explained() {
+        Some(found) => outcome::explained(question, &stated, &found),
+        None => outcome::implausible(question, &beyond),
+    })
+}

@@ -1,0 +1,129 @@
+//! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
+
+use super::compare::{AsStated, Explanation};
+use super::pairs::median;
+use super::words::{mm, words};
+use crate::diagnose::misfit::Misfit;
+use crate::diagnose::types::{
+    Diagnosis, ErrorLengths, Finding, JointRepeatability, Located, Probabilities, Question, SETUP, VerdictKind,
+};
+use crate::diagnose::verdict_statement::statement;
+use crate::effect::{BasePlacement, Effect, EffectStack, ParameterEstimate, Place};
+use crate::estimate::{FitOptions, Model, Screening, align, fit};
+
+/// That it is what it is called: nothing else of the list explains it, or others share it alike.
+const NAMED: f64 = 0.98;
+/// Points farther off than this many medians are wrong by themselves.
+const FAR: f64 = 4.0;
+
+/// A set-up error that explains what the nominal robot leaves.
+pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explanation) -> Diagnosis {
+    let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
+    let all: Vec<_> = found.wrong.iter().map(|wrong| own(*wrong)).collect();
+    let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
+    let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
+    let (before, after) = (stated.placed.left, found.placed.left);
+    let mut text = format!(
+        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it {}",
+        what.join(", and "),
+        mm(before),
+        mm(after),
+        mend.join("; ")
+    );
+    let alike: Vec<String> = found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
+    if !alike.is_empty() {
+        text.push_str(&format!(". These data are explained as well where {}", alike.join(", or ")));
+    }
+    let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
+    let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();
+    let lengths = |off: &[f64]| {
+        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| *off).collect();
+        ErrorLengths::of_lengths(&kept)
+    };
+    let name = NAMED / (1.0 + found.alike.len() as f64);
+    let finding = Finding {
+        parameters: vec![number("median_before", before * 1e3), number("median_after", after * 1e3)],
+        probabilities: Probabilities { name, place: NAMED, none: 1.0 - NAMED },
+        ..finding(format!("{text}."))
+    };
+    let errors = (lengths(&stated.placed.off), lengths(&found.placed.off));
+    Diagnosis { before: errors.0, after: errors.1, ..wrong(question, vec![finding]) }
+}
+
+/// An identified model that leaves the robot file by more than manufacture allows, and no set-up error of the list that explains it.
+pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis {
+    let text = format!(
+        "the identified robot is another than the robot file's by more than manufacture errs: {}. Look for a typing error there, \
+         for a unit, and for joints whose zero or sign differs",
+        numbers.join(", ")
+    );
+    wrong(question, vec![finding(format!("{text}."))])
+}
+
+/// Nothing of the list explains what the nominal robot leaves.
+pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
+    let statement = format!(
+        "the set-up is wrong: with base and tool fitted the nominal robot is {} off the points (median), {:.1} % of its reach, and \
+         none of the usual errors explains it (units, signs, zeros, exchanged or coupled joints, a mirrored frame, the order of rows, \
+         one length). Look whether the robot file is this arm's (lines marked REPLACE or CHECK, the DH convention), and whether the \
+         joints are those of these points",
+        mm(stated.placed.left),
+        100.0 * stated.share_of_reach()
+    );
+    Diagnosis { statement, ..wrong(question, Vec::new()) }
+}
+
+fn finding(statement: String) -> Finding {
+    Finding {
+        effect: SETUP,
+        place: Place::Recording,
+        statement,
+        parameters: Vec::new(),
+        evidence: None,
+        rivals: Vec::new(),
+        probabilities: Probabilities { name: NAMED, place: NAMED, none: 1.0 - NAMED },
+        valid: None,
+        forms: Vec::new(),
+    }
+}
+
+/// The nominal robot with its base where the rows to fit have it.
+fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
+    let Question { robot, data, fit: rows, .. } = *question;
+    let base = align(robot, data, rows);
+    let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
+    let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
+    let candidates: Vec<usize> = (0..start.x.len()).collect();
+    let (model, fitted) = fit(&start, data, &FitOptions { rows, candidates: &candidates });
+    let screening = Screening { kept: rows.to_vec(), ..Screening::default() };
+    let predicted = model.predict(data);
+    let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
+    let errors = ErrorLengths::of(data, &predicted, rows);
+    Diagnosis {
+        verdict: VerdictKind::WrongSetup,
+        statement: statement(VerdictKind::WrongSetup, &misfit.ground(data, data.noise_basis, 0)),
+        noise_basis: data.noise_basis,
+        noise_floor: misfit.noise_floor,
+        before: errors,
+        after: None,
+        held_out: false,
+        folds: None,
+        findings,
+        withdrawn: Vec::new(),
+        clock: data.has_clock(),
+        not_observable: vec!["what is missing: it is asked when the set-up is right".into()],
+        signature: None,
+        next_measurements: Vec::new(),
+        leftover_rms: misfit.leftover_rms,
+        chi_square: misfit.chi_square,
+        gate_first: None,
+        gate_last: None,
+        repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
+        located_before: Located::default(),
+        located_after: Located::default(),
+        kept: rows.to_vec(),
+        screening,
+        model,
+        fitted,
+    }
+}

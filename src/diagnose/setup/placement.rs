@@ -1,0 +1,122 @@
+//! The nominal robot placed on measured points: its base and where each target sits on the tool, and one number of the robot file where
+//! that is asked. Gauss-Newton from Kabsch's solution, with far points trimmed.
+
+use super::number::{FreeNumber, SeenNumber};
+use super::pairs::{Pairs, bodies, median};
+use crate::estimate::align_points;
+use crate::spatial::{Pose, hat};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
+
+/// Rows farther off than this many medians take no part.
+const TRIM: f64 = 4.0;
+/// Steps: from a tool point that is a third of the arm off it takes seven.
+const STEPS: usize = 20;
+/// A step that brings less than this share ends it.
+const SETTLED: f64 = 1e-4;
+/// Share of a normal equation's diagonal that keeps unseen numbers where they are.
+const RIDGE: f64 = 1e-9;
+
+/// Where robot and targets stand, and what is left.
+#[derive(Clone)]
+pub(super) struct Placement {
+    /// Of the base in the tracker's frame.
+    base: Pose,
+    /// Of the targets at the zero pose, base frame, m.
+    seats: Vec<Vector3<f64>>,
+    /// Of the number that was asked for: m or rad.
+    pub values: Vec<f64>,
+    /// Distance of each point, m.
+    pub off: Vec<f64>,
+    /// Their median.
+    pub left: f64,
+}
+
+/// The best placement.
+pub(super) fn place(pairs: &Pairs, number: Option<FreeNumber>) -> Placement {
+    let robot = pairs.robot;
+    let bodies: Vec<Pose> = (0..pairs.rows()).map(|row| bodies(robot, pairs.q(row))[robot.joints()]).collect();
+    let seats = vec![robot.home().translation; pairs.targets];
+    let model: Vec<Vector3<f64>> = bodies.iter().zip(&pairs.target).map(|(body, target)| body.point(&seats[*target])).collect();
+    let base = align_points(&model, &pairs.points);
+    let values = vec![0.0; number.map_or(0, FreeNumber::width)];
+    let problem = PlacementProblem { pairs, bodies, number };
+    let mut now = problem.judged(Placement { base, seats, values, off: Vec::new(), left: 0.0 });
+    let mut best = now.clone();
+    for _ in 0..STEPS {
+        let Some(next) = problem.step(&now).map(|next| problem.judged(next)) else { break };
+        let settled = (now.left - next.left).abs() <= SETTLED * now.left;
+        now = next;
+        if now.left < best.left {
+            best = now.clone();
+        }
+        if settled {
+            break;
+        }
+    }
+    best
+}
+
+struct PlacementProblem<'a, 'b> {
+    pairs: &'b Pairs<'a>,
+    bodies: Vec<Pose>,
+    number: Option<FreeNumber>,
+}
+
+impl PlacementProblem<'_, '_> {
+    fn seen(&self, now: &Placement, row: usize) -> SeenNumber {
+        match self.number {
+            Some(number) => number.seen(self.pairs.robot, self.pairs.q(row), &now.values, &now.seats[self.pairs.target[row]]),
+            None => SeenNumber { body: self.bodies[row], shift: Vector3::zeros(), columns: Vec::new() },
+        }
+    }
+
+    /// A row's point in the base frame.
+    fn point(&self, now: &Placement, row: usize, seen: &SeenNumber) -> Vector3<f64> {
+        seen.body.point(&now.seats[self.pairs.target[row]]) + seen.shift
+    }
+
+    /// With its distances.
+    fn judged(&self, mut now: Placement) -> Placement {
+        let off = |row: usize| {
+            let seen = self.seen(&now, row);
+            (self.pairs.points[row] - now.base.point(&self.point(&now, row, &seen))).norm()
+        };
+        now.off = (0..self.pairs.rows()).map(off).collect();
+        now.left = median(&now.off);
+        now
+    }
+
+    /// One step of Gauss and Newton over the rows that are not far off.
+    fn step(&self, now: &Placement) -> Option<Placement> {
+        let targets = 3 * now.seats.len();
+        let width = 6 + targets + now.values.len();
+        let mut normal = DMatrix::<f64>::zeros(width, width);
+        let mut right = DVector::<f64>::zeros(width);
+        let kept: Vec<usize> = (0..now.off.len()).filter(|row| now.off[*row] <= TRIM * now.left).collect();
+        let centre = kept.iter().map(|row| self.pairs.points[*row]).sum::<Vector3<f64>>() / kept.len().max(1) as f64;
+        for row in kept {
+            let seen = self.seen(now, row);
+            let at = now.base.point(&self.point(now, row, &seen));
+            let residual = self.pairs.points[row] - at;
+            let turned = now.base.rotation * seen.body.rotation;
+            let block = |first: usize, matrix: Matrix3<f64>| (0..3).map(move |k| (first + k, matrix.column(k).into_owned()));
+            let mut columns: Vec<(usize, Vector3<f64>)> = block(0, -hat(&(at - centre))).collect();
+            columns.extend(block(3, Matrix3::identity()));
+            columns.extend(block(6 + 3 * self.pairs.target[row], turned));
+            columns.extend(seen.columns.iter().enumerate().map(|(k, c)| (6 + targets + k, now.base.rotation * c)));
+            for (i, a) in &columns {
+                right[*i] += a.dot(&residual);
+                columns.iter().for_each(|(j, b)| normal[(*i, *j)] += a.dot(b));
+            }
+        }
+        let ridge = RIDGE * normal.diagonal().max();
+        (0..width).for_each(|k| normal[(k, k)] += ridge);
+        let by = normal.cholesky()?.solve(&right);
+        let three = |first: usize| Vector3::new(by[first], by[first + 1], by[first + 2]);
+        let turn = Rotation3::new(three(0)).into_inner();
+        let base = Pose::new(turn * now.base.rotation, centre + turn * (now.base.translation - centre) + three(3));
+        let seats = now.seats.iter().enumerate().map(|(k, seat)| seat + three(6 + 3 * k)).collect();
+        let values = now.values.iter().enumerate().map(|(k, value)| value + by[6 + targets + k]).collect();
+        Some(Placement { base, seats, values, off: Vec::new(), left: 0.0 })
+    }
+}

@@ -1,0 +1,181 @@
+//! Set-up errors in the words of an engineer, each with what mends it.
+
+use super::number::FreeNumber;
+use super::order::RowOrder;
+use super::wrong::{LENGTHS, WrongSetup};
+use crate::effect::figure;
+use crate::error::counted;
+use crate::robot::RobotModel;
+
+/// What is wrong, and what to change in which file.
+pub(super) struct SetupWords {
+    pub what: String,
+    pub mend: String,
+}
+
+/// An arm that reaches less far, or farther, is not what a robot file in the right unit describes, m.
+const ARMS: [f64; 2] = [0.05, 50.0];
+
+/// Of a set-up error; `values` are those of its own number, `reach` is that of the robot file's arm, m.
+pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach: f64) -> SetupWords {
+    let joints = robot.joints();
+    let list = |of: &dyn Fn(usize) -> String| (0..joints).map(of).collect::<Vec<_>>().join(", ");
+    let (what, mend) = match wrong {
+        WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
+        WrongSetup::InRadians => {
+            ("the joints are in rad and were read in deg".into(), "in `ingest`: `columns: {q: {.., unit: rad}}`".into())
+        }
+        WrongSetup::InDegrees => {
+            ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
+        }
+        WrongSetup::Sign(joint) => {
+            let signs = list(&|k| if k == joint { "-1".into() } else { "1".into() });
+            (
+                format!("joint {} turns the other way than the robot file says", joint + 1),
+                format!("in `ingest`: `columns: {{q: {{.., sign: [{signs}]}}}}`, or turn the axis round in the robot file"),
+            )
+        }
+        WrongSetup::Exchanged(a, b) => {
+            let order = list(&|k| {
+                let from = if k == a {
+                    b
+                } else if k == b {
+                    a
+                } else {
+                    k
+                };
+                format!("<joint {}>", from + 1)
+            });
+            (
+                format!("joints {} and {} are exchanged", a + 1, b + 1),
+                format!("in `ingest`, by the columns that are mapped today: `columns: {{q: {{.., columns: [{order}]}}}}`"),
+            )
+        }
+        WrongSetup::Zero(joint, quarters) => {
+            let degrees = 90 * quarters;
+            let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
+            (
+                format!("the zero of joint {} is {degrees} deg in the recording's numbers", joint + 1),
+                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}` (in the unit of the column)"),
+            )
+        }
+        WrongSetup::Coupled { moved, by, sign } => {
+            let (how, ratio) = if sign < 0.0 { ("less", -1) } else { ("plus", 1) };
+            let (moved, by) = (moved + 1, by + 1);
+            (
+                format!(
+                    "joint {moved} is reported {how} the angle of joint {by}, against the horizon and not against the link before it"
+                ),
+                format!("in `ingest`: `columns: {{q: {{.., coupled: [{{joint: {moved}, by: {by}, ratio: {ratio}}}]}}}}`"),
+            )
+        }
+        WrongSetup::Mirrored => (
+            "the points are a mirror image: an axis of the tracker's frame has the wrong sign, or two are exchanged".into(),
+            "in `ingest`: exchange the columns of `x` and `y`; as the base is fitted, that mends either".into(),
+        ),
+        WrongSetup::Order(order) => return of_order(order),
+        WrongSetup::Number(number) => return of_number(number, values),
+    };
+    SetupWords { what, mend }
+}
+
+fn unit_name(unit: &str) -> &'static str {
+    match unit {
+        "mm" => "millimetres",
+        "um" => "micrometres",
+        "in" => "inches",
+        "cm" => "centimetres",
+        _ => "metres",
+    }
+}
+
+fn of_lengths(unit: usize, reach: f64) -> SetupWords {
+    let (factor, read, is) = LENGTHS[unit];
+    if reach >= ARMS[0] && reach <= ARMS[1] {
+        let what = format!("the points are in {} and were read in {}", unit_name(is), unit_name(read));
+        let mend = if is == "cm" {
+            "export the points in mm; cm cannot be read".into()
+        } else {
+            format!("in `ingest`: `columns: {{x: {{.., unit: {is}}}, y: {{.., unit: {is}}}, z: {{.., unit: {is}}}}}`")
+        };
+        return SetupWords { what, mend };
+    }
+    // As much too small as the points seem too large.
+    let own = LENGTHS.iter().find(|other| (other.0 * factor - 1.0).abs() < 1e-9 && other.2 != "cm");
+    let (read, is) = own.map_or(("mm", "m"), |own| (own.1, own.2));
+    SetupWords {
+        what: format!("the lengths of the robot file are in {} and were read in {}", unit_name(is), unit_name(read)),
+        mend: format!("in the robot file: `units: {{length: {is}, ..}}`"),
+    }
+}
+
+fn of_order(order: RowOrder) -> SetupWords {
+    let (what, mend) = match order {
+        RowOrder::Shifted(by) => {
+            let how = if by < 0 { "before" } else { "behind" };
+            (
+                format!("the points stand {} {how} their joints", counted(by.unsigned_abs(), "row")),
+                "in `ingest`: `join: {by: id}` or `join: {by: time}`, or take off the rows that only one file has",
+            )
+        }
+        RowOrder::Reversed => (
+            "the points stand in the reverse order of their joints".into(),
+            "in `ingest`: `join: {by: id}` or `join: {by: time}`, or sort one of the files the other way",
+        ),
+        RowOrder::PointsByText { .. } => (
+            "the points are sorted by name as text (1, 10, 11, 2), their joints are not".into(),
+            "in `ingest`: `join: {by: id}`, or sort the points as they were measured",
+        ),
+        RowOrder::JointsByText { .. } => (
+            "the joints are sorted by name as text (1, 10, 11, 2), their points are not".into(),
+            "in `ingest`: `join: {by: id}`, or sort the joints as they were moved to",
+        ),
+    };
+    SetupWords { what, mend: mend.into() }
+}
+
+fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
+    match number {
+        FreeNumber::Length(joint) => SetupWords {
+            what: format!(
+                "a length of the robot file from joint {} to joint {} is wrong: what is behind it stands farther by {}",
+                joint + 1,
+                joint + 2,
+                displacement(values)
+            ),
+            mend: format!("in the robot file: look for a typing error between joints {} and {}", joint + 1, joint + 2),
+        },
+        FreeNumber::Axis(joint) => SetupWords {
+            what: format!(
+                "the axis of joint {} alone stands elsewhere than the robot file says: by {}",
+                joint + 1,
+                displacement(values)
+            ),
+            mend: format!("in the robot file: look for a typing error in the point of joint {}'s axis", joint + 1),
+        },
+        FreeNumber::Zero(joint) => {
+            let degrees = values.first().copied().unwrap_or_default().to_degrees();
+            SetupWords {
+                what: format!("the zero of joint {} is off by {} deg, more than manufacture errs", joint + 1, figure(degrees, 2)),
+                mend: format!("master joint {} anew, or put its zero right in the robot file", joint + 1),
+            }
+        }
+    }
+}
+
+/// Base axes that matter, mm.
+fn displacement(values: &[f64]) -> String {
+    let largest = values.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    let axes = values.iter().zip(["x", "y", "z"]).filter(|(value, _)| value.abs() > SMALL * largest);
+    let axes: Vec<String> = axes.map(|(value, axis)| format!("{axis} {:+.1} mm", value * 1e3)).collect();
+    format!("{} (zero pose, base axes)", axes.join(", "))
+}
+
+/// Of the largest part of a displacement, what is not worth a word.
+const SMALL: f64 = 0.05;
+
+/// A length in mm.
+pub(super) fn mm(metres: f64) -> String {
+    let mm = metres * 1e3;
+    if mm < 99.5 { format!("{} mm", figure(mm, 1)) } else { format!("{mm:.0} mm") }
+}

@@ -1,0 +1,37 @@
+//! What a robot file without link masses costs: poses under load that no model can weigh.
+
+use crate::error::counted;
+use crate::robot::{Measurements, RobotModel};
+use nalgebra::Vector3;
+
+/// Cosine from which on gravity does not turn a joint.
+const UPRIGHT: f64 = 0.99;
+
+/// A warning where links without masses are under load in these rows; none where all masses are known, or weight turns no joint.
+pub(super) fn warning(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<String> {
+    let joints = &robot.description().joints;
+    let bare = joints.iter().filter(|joint| joint.mass.is_none() || joint.centre.is_none()).count();
+    let gravity = Vector3::from(robot.description().gravity);
+    let turned = |joint: usize| {
+        let along = gravity.dot(robot.axis(joint)).abs() / gravity.norm().max(f64::MIN_POSITIVE);
+        let mut angles = rows.iter().map(|row| data.q(*row)[joint]);
+        let first = angles.next();
+        robot.is_revolute(joint) && along < UPRIGHT && angles.any(|angle| Some(angle) != first)
+    };
+    if bare == 0 || gravity.norm() == 0.0 || !(0..robot.joints()).any(turned) {
+        return None;
+    }
+    let given = match joints.len() - bare {
+        0 => "no link masses".to_string(),
+        some => format!("mass and centre of {some} of {} links alone", joints.len()),
+    };
+    let loaded = rows.iter().filter(|row| data.payload[**row] > 0.0).count();
+    let load = match loaded {
+        0 => String::new(),
+        _ => format!(" ({} of {} carry a payload)", counted(loaded, "row"), rows.len()),
+    };
+    Some(format!(
+        "the robot file gives {given}, and weight turns joints of these poses{load}: wind-up under the arm's own weight, bending and \
+         counterbalances cannot be computed, and what they do may be called by another name (gear, hose). Fill in `links` of the robot file"
+    ))
+}

@@ -1,0 +1,242 @@
+//! Set-up errors come before physics: fifteen wrong set-ups of three arms, sound recordings, and a robot file of another arm.
+
+use super::{CASE, calib, case_with, concealed, refused};
+use crate::desk::{Desk, table};
+use crate::fixture;
+use calib::error::Error;
+use calib::robot::description::RobotDescription;
+use calib::stage::split::{SplitBy, SplitReads};
+use calib::stage::{Diagnose, DiagnoseReads, Simulate, SimulateReads};
+use calib::table::{FindingRow, Findings, Recording, Robot, Split, Verdict};
+use serde_json::{Value, json};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// A small 6R arm with a lateral shoulder, an elbow beside it and a spherical wrist.
+fn shouldered() -> RobotDescription {
+    let mut out = fixture::spherical();
+    let points = [[0.0; 3], [50.0, 0.0, 0.0], [50.0, 50.0, 425.0], [50.0, 50.0, 425.0], [50.0, 50.0, 850.0], [50.0, 50.0, 850.0]];
+    let axes = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for ((joint, point), axis) in out.joints.iter_mut().zip(points).zip(axes) {
+        (joint.point, joint.axis) = (point.map(|value| value * 1e-3), axis);
+        (joint.mass, joint.centre) = (joint.mass.map(|mass| 0.05 * mass), Some(joint.point));
+    }
+    (out.name, out.couplings) = ("shouldered".into(), Vec::new());
+    (out.tool, out.payload_mass, out.payload_centre) = ([0.11, 0.09, 1.0], 2.0, [0.05, 0.05, 1.0]);
+    out
+}
+
+fn arms() -> [RobotDescription; 3] {
+    [fixture::spherical(), fixture::offset_wrist(), shouldered()]
+}
+
+#[derive(Clone)]
+struct Inputs {
+    robot: RobotDescription,
+    recording: Recording,
+}
+
+/// Seventy-two points of the twin of an arm: zeros, lengths, gears and the tool differ as they do in a real one, and `effects`.
+fn recorded(robot: &RobotDescription, seed: u64, effects: Value) -> Inputs {
+    let range: Vec<[f64; 2]> =
+        vec![[-110.0, 120.0], [-70.0, 65.0], [-60.0, 75.0], [-130.0, 140.0], [-100.0, 95.0], [-150.0, 160.0]];
+    let settings = json!({
+        "truth": {
+            "offset_deg": [0.1, -0.12, 0.2, 0.08, -0.15, 0.3],
+            "links": [
+                {"link": 1, "shift_mm": [0.4, -0.3, 0.2]}, {"link": 2, "shift_mm": [-0.5, 0.3, 0.6], "tilt_arcsec": [60.0, 0.0, -80.0]},
+                {"link": 3, "shift_mm": [0.3, 0.4, -0.2]}, {"link": 6, "shift_mm": [14.0, -9.0, 6.0]},
+            ],
+        },
+        "effects": effects,
+        "poses": {"range_deg": range, "floor_mm": -5000.0, "clearance_mm": 0.0},
+        "blocks": [{"usage": "fit", "points": 48}, {"usage": "validate", "points": 24}],
+        "seed": seed,
+    });
+    let stage: Simulate = serde_json::from_value(settings).expect("settings");
+    let tables = Desk::default().run(&stage, SimulateReads { robot: Robot::from_description(robot) }).expect("a recording");
+    Inputs { robot: robot.clone(), recording: table(&tables).remove(0) }
+}
+
+struct Said {
+    verdict: String,
+    statement: String,
+    findings: Vec<FindingRow>,
+    warnings: Vec<String>,
+}
+
+fn diagnosed(inputs: &Inputs) -> Result<Said, Error> {
+    let desk = Desk::default();
+    let split: SplitBy = serde_json::from_value(json!({"by": "usage", "blank": "fit"})).expect("settings");
+    let split: Split = table(&desk.run(&split, SplitReads { recording: inputs.recording.clone() })?).remove(0);
+    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let robot = Robot::from_description(&inputs.robot);
+    let tables = desk.run(&stage, DiagnoseReads { robot, recording: inputs.recording.clone(), split })?;
+    let verdict: Verdict = table(&tables).remove(0);
+    let findings: Findings = table(&tables).remove(0);
+    let statement = verdict.0[0].statement.clone().unwrap_or_default();
+    let warnings = desk.warnings.lock().expect("warnings").clone();
+    Ok(Said { verdict: verdict.0[0].verdict.clone(), statement, findings: findings.0, warnings })
+}
+
+/// Sets the joints of every row anew.
+fn joints(inputs: &mut Inputs, change: impl Fn(&mut [f64])) {
+    inputs.recording.q.chunks_mut(inputs.robot.joints.len()).for_each(change);
+}
+
+fn points(inputs: &mut Inputs, change: impl Fn([f64; 3]) -> [f64; 3]) {
+    inputs.recording.position.iter_mut().for_each(|point| *point = change(*point));
+}
+
+/// Gives every row the point of another one.
+fn paired(inputs: &mut Inputs, partner: impl Fn(usize) -> usize) {
+    let all = inputs.recording.position.clone();
+    inputs.recording.position.iter_mut().enumerate().for_each(|(row, point)| *point = all[partner(row)]);
+}
+
+/// What is done wrong, what the first finding is to say of it, and how it is done.
+type Wrong = (&'static str, &'static str, fn(&mut Inputs));
+
+/// The frozen cases. Positions are what `mm` and `deg` of the settings make of what stands in the files.
+const WRONG: [Wrong; 15] = [
+    ("points in inches", "unit: in}", |i| points(i, |p| p.map(|x| x / 25.4))),
+    ("points in metres", "unit: m}", |i| points(i, |p| p.map(|x| x / 1000.0))),
+    ("points in micrometres", "unit: um}", |i| points(i, |p| p.map(|x| x * 1000.0))),
+    ("joints in rad", "unit: rad", |i| joints(i, |q| q.iter_mut().for_each(|q| *q *= PI / 180.0))),
+    ("sign of joint 3", "joint 3 turns the other way", |i| joints(i, |q| q[2] = -q[2])),
+    ("sign of joint 5", "joint 5 turns the other way", |i| joints(i, |q| q[4] = -q[4])),
+    ("joints 4 and 5 exchanged", "joints 4 and 5 are exchanged", |i| joints(i, |q| q.swap(3, 4))),
+    ("zero of joint 2 at 90 deg", "the zero of joint 2 is 90 deg", |i| joints(i, |q| q[1] += FRAC_PI_2)),
+    ("zero of joint 4 at 180 deg", "the zero of joint 4 is 180 deg", |i| joints(i, |q| q[3] += PI)),
+    ("joint 3 less joint 2", "joint 3 is reported less the angle of joint 2", |i| joints(i, |q| q[2] -= q[1])),
+    ("joint 3 plus joint 2", "joint 3 is reported plus the angle of joint 2", |i| joints(i, |q| q[2] += q[1])),
+    ("x and y exchanged", "mirror image", |i| points(i, |[x, y, z]| [y, x, z])),
+    ("points two rows late", "2 rows behind", |i| paired(i, |row| (row + 70) % 72)),
+    ("points sorted by name as text", "sorted by name as text", |i| {
+        let mut names: Vec<usize> = (1..=72).collect();
+        names.sort_by_key(usize::to_string);
+        paired(i, move |row| names[row] - 1)
+    }),
+    ("a link 100 mm short", "from joint 2 to joint 3", |i| {
+        // The upper arm: all behind it stands 100 mm too near.
+        let [from, to] = [1, 2].map(|joint| i.robot.joints[joint].point);
+        let along: [f64; 3] = std::array::from_fn(|k| to[k] - from[k]);
+        let axis = (0..3).max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs())).expect("three");
+        let by = 0.1 * along[axis].signum();
+        i.robot.joints[2..].iter_mut().for_each(|joint| joint.point[axis] -= by);
+        i.robot.tool[axis] -= by;
+    }),
+];
+
+#[test]
+fn fifteen_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
+    let (mut right, mut lines) = (0, Vec::new());
+    for (robot, seed) in arms().iter().zip([11, 22, 33]) {
+        let sound = recorded(robot, seed, json!([]));
+        for (name, text, make) in &WRONG {
+            let mut inputs = sound.clone();
+            make(&mut inputs);
+            let said = diagnosed(&inputs);
+            let first = said.as_ref().ok().and_then(|said| said.findings.first()).filter(|first| first.effect == "setup");
+            let forms: Option<Value> = first.map(|first| serde_json::from_str(&first.forms).expect("JSON"));
+            let named = first.is_some_and(|first| first.statement.contains(text));
+            // Whatever is said first: nothing physical has a size, and nothing is explained.
+            if let Ok(said) = &said {
+                assert_eq!(said.verdict, "wrong_setup", "{}: {name}", robot.name);
+                assert!(said.findings.iter().all(|finding| finding.effect == "setup"), "{}: {name}", robot.name);
+                assert!(said.warnings.iter().any(|warning| warning.contains("set-up")), "{:?}", said.warnings);
+                assert!(said.statement.contains("set-up"), "{}", said.statement);
+            }
+            assert_eq!(forms.unwrap_or_else(|| json!([])), json!([]));
+            right += usize::from(named);
+            let heard = match &said {
+                Ok(said) => said.findings.first().map_or("-", |first| &first.statement).to_string(),
+                Err(error) => format!("code {}: {error}", error.exit_code()),
+            };
+            lines.push(format!("{} {:14} {name:30} {heard}", if named { "ok   " } else { "WRONG" }, robot.name));
+        }
+    }
+    println!("{}\n{right} of {}", lines.join("\n"), 3 * WRONG.len());
+    assert!(right >= 42, "{right} of 45\n{}", lines.join("\n"));
+}
+
+#[test]
+fn sound_recordings_say_nothing_of_the_set_up() {
+    let [heavy, cobot, small] = arms();
+    let outliers = |mut inputs: Inputs| {
+        for (row, by) in [(3, 0.4), (17, 0.05), (30, 0.9), (41, 0.012)] {
+            inputs.recording.position[row][row % 3] += by;
+        }
+        inputs
+    };
+    let gear = json!([{"gear_cyclic": {"joint": 2, "order": 3, "amplitude_arcsec": 60, "phase_deg": 30}}]);
+    let wound_up =
+        json!([{"joint_compliance": {"joint": 2, "rad_per_nm": 4e-7}}, {"joint_compliance": {"joint": 3, "rad_per_nm": 8e-7}}]);
+    for (name, inputs) in [
+        ("nothing, spherical wrist", recorded(&heavy, 101, json!([]))),
+        ("nothing, offset wrist", recorded(&cobot, 102, json!([]))),
+        ("a gear", recorded(&cobot, 103, gear)),
+        ("wind-up", recorded(&heavy, 104, wound_up)),
+        ("outliers", outliers(recorded(&small, 105, json!([])))),
+    ] {
+        let said = diagnosed(&inputs).expect(name);
+        assert_ne!(said.verdict, "wrong_setup", "{name}: {}", said.statement);
+        assert!(said.findings.iter().all(|finding| finding.effect != "setup"), "{name}");
+    }
+}
+
+#[test]
+fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
+    let mut inputs = recorded(&fixture::offset_wrist(), 7, json!([]));
+    inputs.robot = fixture::spherical();
+    let error = diagnosed(&inputs).err().expect("no diagnosis");
+    assert_eq!(error.exit_code(), 10, "{error}");
+    let said = error.to_string();
+    assert!(said.contains("% of its reach") && said.contains("REPLACE") && said.contains("robot file"), "{said}");
+}
+
+#[test]
+fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
+    let folder = concealed("zero_shift", "923", "60");
+    let here = folder.path();
+    let file = here.join("sealed/recordings/c0001/tracker.csv");
+    let text = std::fs::read_to_string(&file).expect("the log");
+    let inches = |line: &str| -> String {
+        let cells = line.split(',').map(|cell| cell.parse::<f64>().map_or(cell.into(), |mm| (mm / 25.4).to_string()));
+        cells.collect::<Vec<String>>().join(",")
+    };
+    std::fs::write(&file, text.lines().map(inches).collect::<Vec<_>>().join("\n")).expect("written");
+    case_with(here, &[]);
+    let told = calib(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
+    assert!(told.contains("not accepted: the set-up is wrong: the points are in inches"), "{told}");
+    assert!(!told.contains("the model that stands"), "{told}");
+    let (code, said) = refused(&["compensate", "HEAD", "nothing.csv"], here);
+    assert!(code == Some(10) && said.contains("the set-up is wrong: the points are in inches"), "{code:?} {said}");
+    let said: Value = serde_json::from_str(&calib(&["diagnose", "HEAD", "--json"], here)).expect("JSON");
+    assert_eq!((&said["verdict"], &said["findings"][0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
+    let run: Value =
+        serde_json::from_str(&calib(&[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here)).expect("JSON");
+    let page = std::fs::read_to_string(run["report"].as_str().expect("a report")).expect("the page");
+    assert!(
+        page.contains("Not accepted: the set-up is wrong") && !page.contains("The mean position error fell"),
+        "what is said first"
+    );
+    let axes = ["x", "y", "z"].map(|axis| (format!("column: {axis}_mm, unit: mm"), format!("column: {axis}_mm, unit: in")));
+    let axes: Vec<(&str, &str)> = axes.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect();
+    case_with(here, &axes);
+    let mended = calib(&[&["diagnose", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    let mended: Value = serde_json::from_str(&mended).expect("JSON");
+    assert_eq!(mended["findings"][0]["effect"], "zero_shift", "{mended:#}");
+}
+
+#[test]
+fn without_link_masses_a_loaded_recording_says_what_is_lost() {
+    let mut inputs = recorded(&fixture::spherical(), 5, json!([]));
+    let known = diagnosed(&inputs).expect("a diagnosis");
+    assert!(!known.statement.contains("link masses") && known.warnings.is_empty(), "{:?}", known.warnings);
+    inputs.robot.joints.iter_mut().for_each(|joint| joint.mass = None);
+    inputs.recording.payload = Some((0..72).map(|row| if row % 2 == 0 { 10.0 } else { 0.0 }).collect());
+    let said = diagnosed(&inputs).expect("a diagnosis");
+    let lost = "the robot file gives no link masses, and weight turns joints of these poses (24 rows of 48 carry a payload)";
+    assert!(said.statement.contains(lost), "{}", said.statement);
+    assert!(said.warnings.iter().any(|warning| warning.starts_with(lost)), "{:?}", said.warnings);
+}
