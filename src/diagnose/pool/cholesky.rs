@@ -13,38 +13,28 @@ pub(super) struct PivotedCholesky {
 impl PivotedCholesky {
     /// Of a q x q matrix, row by row; only its lower triangle is read.
     pub fn of(mut gram: Vec<f64>, q: usize) -> Self {
-        let mut order: Vec<usize> = Vec::with_capacity(q);
-        let mut left: Vec<usize> = (0..q).collect();
-        // Column k of the factor is kept in the upper triangle's place: entry (pivot, other).
-        let mut columns: Vec<f64> = Vec::with_capacity(q * q);
-        let at = |i: usize, j: usize| if i >= j { i * q + j } else { j * q + i };
-        while let Some(best) = (0..left.len()).max_by(|a, b| gram[left[*a] * (q + 1)].total_cmp(&gram[left[*b] * (q + 1)])) {
-            let pivot = left[best];
+        let mut order: Vec<usize> = (0..q).collect();
+        let mut column = vec![0.0; q];
+        let mut rank = 0;
+        while let Some(pivot) = (rank..q).max_by(|a, b| gram[a * (q + 1)].total_cmp(&gram[b * (q + 1)])) {
             let size = gram[pivot * (q + 1)];
             if size <= INVISIBLE {
                 break;
             }
-            left.swap_remove(best);
-            let inverse = 1.0 / size.sqrt();
-            let start = columns.len();
-            columns.resize(start + q, 0.0);
-            columns[start + pivot] = size.sqrt();
-            for other in &left {
-                columns[start + other] = gram[at(*other, pivot)] * inverse;
+            exchange(&mut gram, q, rank, pivot);
+            order.swap(rank, pivot);
+            let root = size.sqrt();
+            gram[rank * (q + 1)] = root;
+            for i in rank + 1..q {
+                gram[i * q + rank] /= root;
+                column[i] = gram[i * q + rank];
+                let (own, row) = (column[i], &mut gram[i * q + rank + 1..=i * q + i]);
+                row.iter_mut().zip(&column[rank + 1..=i]).for_each(|(value, other)| *value -= own * other);
             }
-            for (n, i) in left.iter().enumerate() {
-                let own = columns[start + i];
-                for j in &left[..=n] {
-                    gram[at(*i, *j)] -= own * columns[start + j];
-                }
-            }
-            order.push(pivot);
+            rank += 1;
         }
-        let rank = order.len();
-        let mut triangle = Vec::with_capacity(rank * (rank + 1) / 2);
-        for (a, pivot) in order.iter().enumerate() {
-            triangle.extend((0..=a).map(|column| columns[column * q + pivot]));
-        }
+        order.truncate(rank);
+        let triangle = (0..rank).flat_map(|a| gram[a * q..=a * q + a].iter().copied()).collect();
         Self { order, triangle }
     }
 
@@ -78,5 +68,50 @@ impl PivotedCholesky {
             out.iter_mut().zip(&row[..a]).for_each(|(value, entry)| *value -= entry * own);
         }
         out
+    }
+}
+
+/// Exchanges rows and columns `a <= b` of a symmetric matrix of which the lower triangle counts.
+fn exchange(gram: &mut [f64], q: usize, a: usize, b: usize) {
+    if a == b {
+        return;
+    }
+    for j in 0..a {
+        gram.swap(a * q + j, b * q + j);
+    }
+    gram.swap(a * (q + 1), b * (q + 1));
+    for i in a + 1..b {
+        gram.swap(i * q + a, b * q + i);
+    }
+    for i in b + 1..q {
+        gram.swap(i * q + a, i * q + b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_is_that_of_the_matrix_in_its_order_and_what_is_invisible_is_left_out() {
+        // Columns of a 7 x 5 matrix, the fourth of which is the sum of the first two.
+        let entry = |i: usize, j: usize| ((3 * i + 5 * j * j + 2 * i * j) % 7) as f64 / 7.0 - 0.4;
+        let value = |i: usize, j: usize| if j == 3 { entry(i, 0) + entry(i, 1) } else { entry(i, j) };
+        let gram: Vec<f64> = (0..25).map(|k| (0..7).map(|i| value(i, k / 5) * value(i, k % 5)).sum()).collect();
+        let factor = PivotedCholesky::of(gram.clone(), 5);
+        assert_eq!(factor.rank(), 4);
+        for (a, i) in factor.order.iter().enumerate() {
+            for (b, j) in factor.order.iter().enumerate() {
+                let product: f64 = factor.row(a).iter().zip(factor.row(b)).map(|(x, y)| x * y).sum();
+                assert!((product - gram[i * 5 + j]).abs() < 1e-12, "{i} {j}");
+            }
+        }
+        // Forward and backward solve the normal equations of the kept columns.
+        let right = [1.0, -2.0, 0.5, 3.0, 0.25];
+        let solved = factor.backward(&factor.forward(|k| right[k]));
+        for i in &factor.order {
+            let sum: f64 = factor.order.iter().zip(&solved).map(|(j, x)| gram[i * 5 + j] * x).sum();
+            assert!((sum - right[*i]).abs() < 1e-9);
+        }
     }
 }
