@@ -29,10 +29,10 @@ pub(crate) struct NearbyFits<'a> {
     columns: Vec<usize>,
     /// Of all parts and the priors.
     whole: TriangularFactor,
-    parts: Vec<Part<'a>>,
+    parts: Vec<LeftOut<'a>>,
 }
 
-struct Part<'a> {
+struct LeftOut<'a> {
     rows: &'a [usize],
     factor: TriangularFactor,
     /// Root of the Huber weight of each term.
@@ -51,9 +51,9 @@ impl<'a> NearbyFits<'a> {
             let problem = Problem { data, rows, excess };
             let seen = problem.observe(model, columns);
             let shares = problem.errors(&seen.residuals).into_iter().map(|(error, axes)| share(error, axes)).collect();
-            Part { rows, factor: seen.factor, shares }
+            LeftOut { rows, factor: seen.factor, shares }
         };
-        let parts: Vec<Part> = parts.par_iter().map(part).collect();
+        let parts: Vec<LeftOut> = parts.par_iter().map(part).collect();
         let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
         let (whole, _) = model.with_priors(columns, all);
         Some(Self { data, model, excess, columns: columns.to_vec(), whole, parts })
@@ -76,12 +76,12 @@ impl<'a> NearbyFits<'a> {
         }
         let open: Vec<usize> =
             self.columns.iter().zip(steps).filter(|(_, step)| step.is_none()).map(|(parameter, _)| *parameter).collect();
-        let beside = Beside { whole, inverse, model, open };
+        let beside = FitOfAll { whole, inverse, model, open };
         Some(self.parts.par_iter().map(|part| self.without(part, &beside, &part.factor.given(steps))).collect())
     }
 
-    fn without(&self, part: &Part, beside: &Beside, factor: &TriangularFactor) -> Option<Vec<f64>> {
-        let Beside { whole, inverse, model, open } = beside;
+    fn without(&self, part: &LeftOut, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
+        let FitOfAll { whole, inverse, model, open } = beside;
         let p = open.len();
         let seen = Mat::from_fn(p, p, |i, j| factor.entry(i, j)) * inverse;
         let taken = seen.transpose() * &seen;
@@ -103,7 +103,7 @@ impl<'a> NearbyFits<'a> {
     }
 
     /// Errors (m) of a part's rows under a model, and the root of their whitened square.
-    fn arrive(&self, part: &Part, model: &Model) -> (Vec<f64>, f64) {
+    fn arrive(&self, part: &LeftOut, model: &Model) -> (Vec<f64>, f64) {
         let mut scratch = model.stack.scratch(&model.robot);
         let (mut lengths, mut square) = (Vec::with_capacity(part.rows.len()), 0.0);
         let mut shares = part.shares.iter();
@@ -120,7 +120,7 @@ impl<'a> NearbyFits<'a> {
 }
 
 /// A fit to all parts.
-struct Beside {
+struct FitOfAll {
     whole: TriangularFactor,
     inverse: Mat<f64>,
     model: Model,

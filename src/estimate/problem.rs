@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 /// Rows of the recording that one thread takes at once: fixed, so that sums do not depend on the number of threads.
-const SPAN: usize = 4096;
+const SPAN: usize = 1024;
 /// Rows whose derivatives are held at once: three lines each of some fifty columns stay in the processor's cache.
 const CHUNK: usize = 256;
 

