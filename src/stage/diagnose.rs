@@ -57,7 +57,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 10;
+    const IMPLEMENTATION: u32 = 11;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
