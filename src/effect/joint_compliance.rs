@@ -45,8 +45,20 @@ impl Cause for JointCompliance {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        UnweighedWindup::sentence(summary)
-            .unwrap_or_else(|| format!("{} winds up under its load by {}", summary.place, summary.value()))
+        let place = summary.place;
+        let Some(weight) = UnweighedWindup::size(summary) else {
+            return format!("{place} winds up under its load by {}", summary.value());
+        };
+        match summary.of_form::<Windup>().next() {
+            Some(own) => format!(
+                "{place} winds up under its load by {:.3e} {}, and under its own weight, which the robot file does not give, {weight}",
+                own.value, own.unit
+            ),
+            None => format!(
+                "{place} winds up under gravity, {weight}; how stiff it is cannot be separated from their weight, which the robot file does \
+                 not give"
+            ),
+        }
     }
 
     fn finer(&self) -> &'static [&'static str] {

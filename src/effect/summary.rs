@@ -45,6 +45,12 @@ impl<'a> Summary<'a> {
         self.forms.iter().find_map(Form::as_a)
     }
 
+    /// The numbers of the first form of a type.
+    pub(super) fn of_form<T: super::Placed>(&self) -> impl Iterator<Item = &'a ParameterEstimate> {
+        let number = self.forms.iter().position(|form| form.as_a::<T>().is_some());
+        self.parameters.iter().filter(move |estimate| Some(estimate.form) == number)
+    }
+
     /// The terms under a cause's name.
     pub(super) fn terms(&self, name: &'static str) -> impl Iterator<Item = &'a Term> {
         self.estimates(name).map(|(term, _)| term)

@@ -108,15 +108,10 @@ impl UnweighedWindup {
         Some(WindupShape::deserialize(body).map(|shape| Self { cause, shape }.into()))
     }
 
-    /// The sentence of a finding that has such a form.
-    pub fn sentence(summary: &Summary) -> Option<String> {
+    /// The deflection of a finding that has such a form, in words: up to so many arcsec.
+    pub fn size(summary: &Summary) -> Option<String> {
         let windup: &Self = summary.form()?;
-        let size = figure(windup.largest(summary), 0);
-        Some(format!(
-            "{} winds up under gravity, by up to {size} arcsec where its links stretch out level; how stiff it is cannot be separated from \
-             their weight, which the robot file does not give",
-            summary.place
-        ))
+        Some(format!("by up to {} arcsec where its links stretch out level", figure(windup.largest(summary), 0)))
     }
 
     /// The deflection (arcsec) of a finding's form with all its bodies level.

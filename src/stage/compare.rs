@@ -41,7 +41,7 @@ writes! {
 impl Stage for Compare {
     const NAME: &'static str = "compare";
     const SUMMARY: &'static str = "Tests which parameters changed since an earlier recording of the same robot";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = CompareReads;
     type Writes = CompareWrites;
 

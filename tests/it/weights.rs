@@ -1,7 +1,10 @@
 //! Wind-up of arms whose masses nobody knows: gravity's torque of whatever masses is made of the moments that the form has.
 
 use crate::fixture;
-use calib::effect::{Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, Place, Survey, hypotheses, whole};
+use calib::effect::{
+    Clock, Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place,
+    Summary, Survey, hypotheses, people, whole,
+};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
@@ -124,4 +127,31 @@ fn the_weight_of_the_next_link_alone_is_an_eccentric_gear_by_another_name() {
         }
     }
     assert!(kinds[0] == 1 && kinds[1] == 1 && kinds[2] > 1, "{kinds:?}");
+}
+
+/// A payload tells how stiff a joint is, also where nobody knows the arm's own masses.
+#[test]
+fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
+    let robot = RobotModel::new(fixture::spherical());
+    let data = data(&robot);
+    let at = |robot: &RobotModel| windups(robot, &data).into_iter().find(|form| form.place() == Place::Joint(2)).expect("a form");
+    let (weight, load) = (at(&bare(fixture::spherical())), at(&robot));
+    let said = |forms: &[Form]| {
+        let own = |(form, of): (usize, &Form)| {
+            let specs = of.parameters(&robot).into_iter();
+            let number = |spec: ParameterSpec| {
+                let (unit, symbol) = people(spec.unit);
+                ParameterEstimate { name: spec.name, form, value: unit.from_si(1e-4), unit: symbol, sigma: None }
+            };
+            specs.map(number).collect::<Vec<_>>()
+        };
+        let parameters: Vec<ParameterEstimate> = forms.iter().enumerate().flat_map(own).collect();
+        let summary = Summary { place: Place::Joint(2), forms, parameters: &parameters, clock: Clock::Rows };
+        forms[0].cause().sentence(&summary)
+    };
+    // 1e-4 rad are 20.6 arcsec.
+    let alone = said(&[weight.clone()]);
+    assert!(alone.contains("by up to 21 arcsec") && alone.contains("cannot be separated from their weight"), "{alone}");
+    let both = said(&[weight, load]);
+    assert!(both.contains("1.000e-4 rad/Nm, and under its own weight") && both.contains("by up to 21 arcsec"), "{both}");
 }
