@@ -77,7 +77,9 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     text.push_str(&summary::searches(&outcome, &store)?);
     text.push_str(&summary::rejected(&outcome));
     text.push_str(&summary::headline(&outcome, standing.as_ref(), &store)?);
-    text.push_str(&wrong_setup_of(&outcome.manifest, &store)?.map_or_else(String::new, |wrong| format!("not accepted: {wrong}\n")));
+    text.push_str(
+        &wrong_setup_of(&outcome.manifest, &store)?.map_or_else(String::new, |wrong| format!("not accepted: {wrong}\n")),
+    );
     for path in &outcome.documents {
         text.push_str(&format!("report: {}\n", path.display()));
     }

@@ -69,7 +69,9 @@ impl IdentifiedModel {
         }
         let wrong = wrong_setup_of(manifest, store)?;
         if let (None, Some(wrong)) = (step, &wrong) {
-            let message = format!("no model of it is good for anything: {wrong}. Mend it and run again, or take a step on purpose with --step");
+            let message = format!(
+                "no model of it is good for anything: {wrong}. Mend it and run again, or take a step on purpose with --step"
+            );
             return Err(Error::data(run, message));
         }
         let stands = if step.is_none() { standing_of(manifest, store)? } else { None };

@@ -1,8 +1,8 @@
 //! The verdict, the table of errors after every step, and their pictures; held-out and training points never together.
 
 use super::Tables;
-use super::findings::wrong_setup;
 use super::distribution::{self, cumulative, histogram};
+use super::findings::wrong_setup;
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};

@@ -25,7 +25,9 @@ mod write;
 
 pub use columns::Columns;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
-pub use mapped::{ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn};
+pub use mapped::{
+    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn,
+};
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
 

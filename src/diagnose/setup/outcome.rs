@@ -1,6 +1,6 @@
 //! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
-use super::compare::{AsStated, Explanation};
+use super::compare::{AsStated, ExplainedSetup};
 use super::pairs::median;
 use super::words::{mm, words};
 use crate::diagnose::misfit::Misfit;
@@ -17,20 +17,23 @@ const NAMED: f64 = 0.98;
 const FAR: f64 = 4.0;
 
 /// A set-up error that explains what the nominal robot leaves.
-pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explanation) -> Diagnosis {
+pub(super) fn explained(question: &Question, stated: &AsStated, found: &ExplainedSetup) -> Diagnosis {
     let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
     let all: Vec<_> = found.wrong.iter().map(|wrong| own(*wrong)).collect();
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
     let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
     let (before, after) = (stated.placed.left, found.placed.left);
     let mut text = format!(
-        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it {}",
+        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it: {}",
         what.join(", and "),
         mm(before),
         mm(after),
         mend.join("; ")
     );
-    let alike: Vec<String> = found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
+    let mut alike: Vec<String> =
+        found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
+    alike.dedup();
+    alike.retain(|other| !what.contains(&other.as_str()));
     if !alike.is_empty() {
         text.push_str(&format!(". These data are explained as well where {}", alike.join(", or ")));
     }

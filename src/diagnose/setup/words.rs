@@ -22,14 +22,12 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
     let list = |of: &dyn Fn(usize) -> String| (0..joints).map(of).collect::<Vec<_>>().join(", ");
     let (what, mend) = match wrong {
         WrongSetup::PointUnit(unit) => return of_lengths(unit, reach),
-        WrongSetup::InRadians => (
-            "the joints are in rad and were read in deg".into(),
-            "in `ingest`: `columns: {q: {.., unit: rad}}`".into(),
-        ),
-        WrongSetup::InDegrees => (
-            "the joints are in deg and were read in rad".into(),
-            "in `ingest`: `columns: {q: {.., unit: deg}}`".into(),
-        ),
+        WrongSetup::InRadians => {
+            ("the joints are in rad and were read in deg".into(), "in `ingest`: `columns: {q: {.., unit: rad}}`".into())
+        }
+        WrongSetup::InDegrees => {
+            ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
+        }
         WrongSetup::Sign(joint) => {
             let signs = list(&|k| if k == joint { "-1".into() } else { "1".into() });
             (
@@ -39,7 +37,13 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
         }
         WrongSetup::Exchanged(a, b) => {
             let order = list(&|k| {
-                let from = if k == a { b } else if k == b { a } else { k };
+                let from = if k == a {
+                    b
+                } else if k == b {
+                    a
+                } else {
+                    k
+                };
                 format!("<joint {}>", from + 1)
             });
             (
@@ -59,7 +63,9 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             let (how, ratio) = if sign < 0.0 { ("less", -1) } else { ("plus", 1) };
             let (moved, by) = (moved + 1, by + 1);
             (
-                format!("joint {moved} is reported {how} the angle of joint {by}, against the horizon and not against the link before it"),
+                format!(
+                    "joint {moved} is reported {how} the angle of joint {by}, against the horizon and not against the link before it"
+                ),
                 format!("in `ingest`: `columns: {{q: {{.., coupled: [{{joint: {moved}, by: {by}, ratio: {ratio}}}]}}}}`"),
             )
         }
@@ -140,7 +146,11 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
             mend: format!("in the robot file: look for a typing error between joints {} and {}", joint + 1, joint + 2),
         },
         FreeNumber::Axis(joint) => SetupWords {
-            what: format!("the axis of joint {} alone stands elsewhere than the robot file says: by {}", joint + 1, displacement(values)),
+            what: format!(
+                "the axis of joint {} alone stands elsewhere than the robot file says: by {}",
+                joint + 1,
+                displacement(values)
+            ),
             mend: format!("in the robot file: look for a typing error in the point of joint {}'s axis", joint + 1),
         },
         FreeNumber::Zero(joint) => {
