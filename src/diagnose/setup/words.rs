@@ -91,7 +91,7 @@ fn unit_name(unit: &str) -> &'static str {
 
 fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     let (factor, read, is) = LENGTHS[unit];
-    if reach >= ARMS[0] && reach <= ARMS[1] {
+    if (ARMS[0]..=ARMS[1]).contains(&reach) {
         let what = format!("the points are in {} and were read in {}", unit_name(is), unit_name(read));
         let mend = if is == "cm" {
             "export the points in mm; cm cannot be read".into()
