@@ -113,7 +113,7 @@ impl<'a> AsStated<'a> {
         let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(SECOND);
         let both = |a: WrongSetup| {
             let others = all.iter().filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
-            others.map(move |b| vec![a, *b])
+            others.map(move |b| if b.rank() < a.rank() { vec![*b, a] } else { vec![a, *b] })
         };
         let pairs: Vec<Vec<WrongSetup>> = first.flat_map(both).collect();
         let two: Vec<Try> = pairs.into_par_iter().map(|wrong| self.tried(wrong)).collect();

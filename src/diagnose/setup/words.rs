@@ -56,7 +56,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
             (
                 format!("the zero of joint {} is {degrees} deg in the recording's numbers", joint + 1),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}` (in the unit of the column)"),
+                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
         WrongSetup::Coupled { moved, by, sign } => {

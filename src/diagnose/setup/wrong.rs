@@ -64,6 +64,18 @@ impl WrongSetup {
         out
     }
 
+    /// The place of its mend in the order in which `ingest` applies them: columns, units, zeros, signs, couplings.
+    pub fn rank(self) -> usize {
+        match self {
+            Self::Order(_) | Self::Exchanged(..) => 0,
+            Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
+            Self::Zero(..) => 2,
+            Self::Sign(_) => 3,
+            Self::Coupled { .. } => 4,
+            Self::Number(_) => 5,
+        }
+    }
+
     /// The number of the robot file that is to be found.
     pub fn number(self) -> Option<FreeNumber> {
         if let Self::Number(number) = self { Some(number) } else { None }
