@@ -22,7 +22,8 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
     let all: Vec<_> = found.wrong.iter().map(|wrong| own(*wrong)).collect();
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
     let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
-    let (before, after) = (stated.placed.left, found.placed.left);
+    let scale: f64 = all.iter().map(|words| words.scale).product();
+    let (before, after) = (stated.placed.left, scale * found.placed.left);
     let mut text = format!(
         "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it: {}",
         what.join(", and "),
@@ -39,8 +40,8 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
     }
     let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
     let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();
-    let lengths = |off: &[f64]| {
-        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| *off).collect();
+    let lengths = |off: &[f64], scale: f64| {
+        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| scale * off).collect();
         ErrorLengths::of_lengths(&kept)
     };
     let name = NAMED / (1.0 + found.alike.len() as f64);
@@ -49,7 +50,7 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
         probabilities: Probabilities { name, place: NAMED, none: 1.0 - NAMED },
         ..finding(format!("{text}."))
     };
-    let errors = (lengths(&stated.placed.off), lengths(&found.placed.off));
+    let errors = (lengths(&stated.placed.off, 1.0), lengths(&found.placed.off, scale));
     Diagnosis { before: errors.0, after: errors.1, ..wrong(question, vec![finding]) }
 }
 

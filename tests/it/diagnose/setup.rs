@@ -226,6 +226,19 @@ fn a_length_by_which_no_arm_is_made_is_an_error_of_the_robot_file() {
 }
 
 #[test]
+fn a_robot_file_in_another_unit_is_blamed_and_not_the_points() {
+    let mut inputs = recorded(&fixture::offset_wrist(), 47, json!([]));
+    let small = |point: [f64; 3]| point.map(|value| value * 1e-3);
+    inputs.robot.joints.iter_mut().for_each(|joint| (joint.point, joint.centre) = (small(joint.point), joint.centre.map(small)));
+    inputs.robot.tool = small(inputs.robot.tool);
+    let said = diagnosed(&inputs).expect("a diagnosis");
+    let statement = &said.findings[0].statement;
+    assert!(statement.starts_with("the lengths of the robot file are in metres and were read in millimetres"), "{statement}");
+    let after = statement.split("without it ").nth(1).and_then(|text| text.split(" mm").next()).expect("a length");
+    assert!((0.3..3.0).contains(&after.parse::<f64>().expect("mm")), "{statement}");
+}
+
+#[test]
 fn a_robot_file_of_another_arm_is_refused_with_what_to_look_at() {
     let mut inputs = recorded(&fixture::offset_wrist(), 7, json!([]));
     inputs.robot = fixture::spherical();
