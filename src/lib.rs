@@ -73,6 +73,7 @@
 //! | repeatability | standard deviation of a joint that comes back to a pose |
 //! | fold | a part of the rows to fit, whole poses, that is predicted by a fit to the others |
 //! | held out | rows that no step is fitted to: they judge in the end and choose nothing |
+//! | set-up error | what is wrong between files and robot file before any physics: a unit, sign, zero, order, frame, typed number |
 //! | suspect | a row that no smooth model can follow; it is set aside and kept |
 //! | redundant | a parameter whose effect other free parameters have too; unseen: one that the data do not show |
 //! | confounded | causes that these data cannot separate |

@@ -4,6 +4,8 @@
 //! library and form-free signatures are projected off it and compared in one pool; what wins is refitted together with the base
 //! on the full model, and everything is looked at again from there, until nothing changes.
 //!
+//! Before all of it a wrong `setup` is looked for: physics that is found on top of one is none.
+//!
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
 //! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
 
@@ -25,6 +27,7 @@ mod words;
 pub use outside::against_simulation;
 pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
+pub use setup::wrong_setup;
 pub use types::{
     Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question, RivalCause,
     SETUP, SpectrumLine, VerdictKind,
@@ -37,12 +40,9 @@ use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, corre
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
 use words::{LastRound, conclude};
 
-/// Diagnoses a recording; of very few rows only what the nominal robot makes of them, of a wrong set-up what is wrong. `tell` receives
-/// the progress, a line each.
+/// Diagnoses a recording; of very few rows only what the nominal robot makes of them. `tell` receives the progress, a line each. Ask for
+/// a [`wrong_setup`] before.
 pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis {
-    if let Some(wrong) = setup::wrong_from_the_start(question) {
-        return wrong;
-    }
     if question.fit.len() < too_few::FEWEST {
         return too_few::not_asked(question);
     }

@@ -8,8 +8,8 @@ use crate::table::{Corrected, Findings, Parameters, Prediction, Standing, Step, 
 
 /// What the last diagnosis of a run says of a wrong set-up; none where it is right. Fails where a table has left the store.
 pub fn wrong_setup_of(manifest: &Manifest, store: &Store) -> Result<Option<String>> {
-    let diagnosed = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
-    let Some(stage) = diagnosed.last() else { return Ok(None) };
+    let mut diagnosed = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
+    let Some(stage) = diagnosed.next_back() else { return Ok(None) };
     let of = |kind: &str| stage.outputs.iter().find(|output| output.kind == kind).map(|output| output.table.clone());
     let (Some(verdict), Some(findings)) = (of(Verdict::KIND), of(Findings::KIND)) else { return Ok(None) };
     let (verdict, findings) = (store.load(&verdict)?, store.load(&findings)?);

@@ -43,9 +43,11 @@ impl Name {
     pub fn joint(&self) -> Option<(String, usize)> {
         let at = self.words.iter().rposition(|word| word.ends_with(|c: char| c.is_ascii_digit()))?;
         let stem = self.words[at].trim_end_matches(|c: char| c.is_ascii_digit());
-        let number = self.words[at][stem.len()..].parse().ok()?;
+        let number: usize = self.words[at][stem.len()..].parse().ok()?;
         let before = self.words[..at].iter().map(String::as_str);
-        let after = self.words[at + 1..].iter().map(String::as_str);
+        // Yaskawa's URDFs say both: `joint_1_s`, `joint_2_l`.
+        let letter = number.checked_sub(1).and_then(|k| words::NAMED_JOINTS[0].get(k));
+        let after = self.words[at + 1..].iter().map(String::as_str).filter(|word| Some(word) != letter);
         let place = format!("{stem}#");
         Some((before.chain([place.as_str()]).chain(after).collect::<Vec<_>>().join("_").replace("_#", "#"), number))
     }
@@ -184,6 +186,15 @@ mod tests {
         assert_eq!(joints(&names(&["i1", "i2", "Achse 1", "Achse 2"]), |_| false), [[2, 3]]);
         assert_eq!(joints(&names(&["T", "S", "L", "U", "R", "B"]), |_| false), [[1, 2, 3, 4, 5, 0]]);
         assert_eq!(joints(&names(&["q1_cmd", "q2_cmd", "q1_act", "q2_act"]), |_| true), [[2, 3], [0, 1]]);
+        let yaskawa = ["joint_1_s", "joint_2_l", "joint_3_u", "joint_4_r", "joint_5_b", "joint_6_t"];
+        assert_eq!(joints(&names(&yaskawa), |_| true), [[0, 1, 2, 3, 4, 5]]);
+        for pattern in
+            ["J#", "A#", "Axis_#", "q_#", "panda_joint#", "iiwa_joint_#", "lbr_A#", "robot1/joint_#", "joint_#_position"]
+        {
+            let all: Vec<String> = (1..=6).map(|n| pattern.replace('#', &n.to_string())).collect();
+            let all: Vec<&str> = all.iter().map(String::as_str).collect();
+            assert_eq!(joints(&names(&all), |_| true), [[0, 1, 2, 3, 4, 5]], "{pattern}");
+        }
         assert_eq!(joints(&names(&["dq1", "dq2", "q0", "q1"]), |_| true), [[2, 3]]);
         let robot = ["ur_shoulder_pan_joint", "ur_shoulder_lift_joint", "ur_elbow_joint"];
         let wrist = ["ur_wrist_1_joint", "ur_wrist_2_joint", "ur_wrist_3_joint"];

@@ -1,6 +1,6 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
-use crate::diagnose::{Question, VerdictKind as Said, against_simulation, diagnose};
+use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
@@ -118,21 +118,10 @@ impl Stage for Diagnose {
             prior_weight: self.prior_weight,
             seed: context.seed,
         };
-        let mut diagnosis = diagnose(&question, |line| context.services.note(line));
-        if diagnosis.verdict == Said::NotAsked {
-            context.services.warn(diagnosis.not_observable.join("; "));
-        }
-        if diagnosis.verdict == Said::WrongSetup {
-            match diagnosis.findings.first() {
-                Some(finding) => context.services.warn(format!("the set-up is wrong: {}", finding.statement)),
-                None => return Err(Error::data("table recording", diagnosis.statement)),
-            }
-        }
-        let asked_for_physics = !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked);
-        if let Some(warning) = weightless::warning(&robot, &data, &fit).filter(|_| asked_for_physics) {
-            diagnosis.statement.push_str(&format!("; {warning}"));
-            context.services.warn(warning);
-        }
+        // Points beside an outside simulation are moved by it: what moves them says nothing of this robot file.
+        let wrong = if corrected == Corrected::RobotFile { wrong_setup(&question) } else { None };
+        let diagnosis = wrong.unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
+        let diagnosis = said(diagnosis, &question, context)?;
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
         fit.iter().for_each(|row| held_out[*row] = false);
@@ -156,4 +145,22 @@ impl Stage for Diagnose {
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })
     }
+}
+
+/// Tells a person at once what must not be read past: a wrong set-up, too few rows, and what cannot be known without masses.
+fn said(mut diagnosis: Diagnosis, question: &Question, context: &Context) -> Result<Diagnosis> {
+    match diagnosis.verdict {
+        Said::NotAsked => context.services.warn(diagnosis.not_observable.join("; ")),
+        Said::WrongSetup => match diagnosis.findings.first() {
+            Some(finding) => context.services.warn(format!("the set-up is wrong: {}", finding.statement)),
+            None => return Err(Error::data("table recording", diagnosis.statement)),
+        },
+        _ => {
+            if let Some(warning) = weightless::warning(question.robot, question.data, question.fit) {
+                diagnosis.statement.push_str(&format!("; {warning}"));
+                context.services.warn(warning);
+            }
+        }
+    }
+    Ok(diagnosis)
 }

@@ -21,9 +21,9 @@ pub(super) fn warning(robot: &RobotModel, data: &Measurements, rows: &[usize]) -
     if bare == 0 || gravity.norm() == 0.0 || !(0..robot.joints()).any(turned) {
         return None;
     }
-    let given = match joints.len() - bare {
-        0 => "no link masses".to_string(),
-        some => format!("mass and centre of {some} of {} links alone", joints.len()),
+    let (given, windup) = match joints.len() - bare {
+        0 => ("no link masses".to_string(), "is found without its stiffness at best"),
+        some => (format!("mass and centre of {some} of {} links alone", joints.len()), "cannot be computed"),
     };
     let loaded = rows.iter().filter(|row| data.payload[**row] > 0.0).count();
     let load = match loaded {
@@ -31,7 +31,7 @@ pub(super) fn warning(robot: &RobotModel, data: &Measurements, rows: &[usize]) -
         _ => format!(" ({} of {} carry a payload)", counted(loaded, "row"), rows.len()),
     };
     Some(format!(
-        "the robot file gives {given}, and weight turns joints of these poses{load}: wind-up under the arm's own weight, bending and \
+        "the robot file gives {given}, and weight turns joints of these poses{load}: wind-up under the arm's own weight {windup}, bending and \
          counterbalances cannot be computed, and what they do may be called by another name (gear, hose). Fill in `links` of the robot file"
     ))
 }

@@ -3,7 +3,7 @@
 use super::manufacture::{ANGLE, length_error};
 use super::number::FreeNumber;
 use super::order::RowOrder;
-use super::pairs::{Pairs, sampled};
+use super::pairs::{PointPairs, sampled};
 use super::placement::{Placement, place};
 use super::wrong::WrongSetup;
 use crate::diagnose::types::Question;
@@ -17,8 +17,10 @@ const NOMINAL: f64 = 0.02;
 const BETTER: f64 = 3.0;
 /// What has numbers of its own must leave so many times less than what has none.
 const OWN_NUMBERS: f64 = 2.0;
-/// Others that leave no more than so many times as much explain as well.
+/// Others that leave no more than so many times as much explain as well; of those that are all but the same by kinematics the list's
+/// first counts: a sign is wrong more often than a zero by half a turn.
 const ALIKE: f64 = 1.3;
+const SAME: f64 = 1.02;
 /// Set-up errors that are tried together with another where none explains alone.
 const SECOND: usize = 6;
 
@@ -35,7 +37,7 @@ pub(super) struct AsStated<'a> {
 }
 
 /// Set-up errors that together explain what the nominal robot leaves, those that explain as well, and what is left without them.
-pub(super) struct Explanation {
+pub(super) struct ExplainedSetup {
     pub wrong: Vec<WrongSetup>,
     pub alike: Vec<WrongSetup>,
     pub placed: Placement,
@@ -55,7 +57,7 @@ impl<'a> AsStated<'a> {
         let rows: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row)).collect();
         let sample = sampled(question.fit);
         let judges = sample.iter().filter_map(|row| rows.binary_search(row).ok()).collect();
-        let pairs = Pairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
+        let pairs = PointPairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
         Self { question, rows, judges, placed: place(&pairs, None), reach: pairs.reach(), cloud: pairs.cloud() }
     }
 
@@ -79,11 +81,11 @@ impl<'a> AsStated<'a> {
     }
 
     /// The rows that judge, with set-up errors mended.
-    fn mended(&self, wrong: &[WrongSetup]) -> Pairs<'a> {
+    fn mended(&self, wrong: &[WrongSetup]) -> PointPairs<'a> {
         let (data, rows) = (self.question.data, &self.rows);
         let order = wrong.iter().find_map(|one| one.order()).unwrap_or(RowOrder::Shifted(0));
         let partners = order.partners(rows.len());
-        let pairs = Pairs::of(self.question.robot, data, self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])));
+        let pairs = PointPairs::of(self.question.robot, data, self.judges.iter().map(|k| (rows[*k], rows[partners[*k]])));
         wrong.iter().fold(pairs, |pairs, one| one.mended(&pairs))
     }
 
@@ -99,33 +101,34 @@ impl<'a> AsStated<'a> {
     }
 
     /// What explains it: one set-up error, else two.
-    pub fn explained(&self) -> Option<Explanation> {
+    pub fn explained(&self) -> Option<ExplainedSetup> {
         let data = self.question.data;
-        let in_order = Pairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
+        let in_order = PointPairs::of(self.question.robot, data, self.rows.iter().map(|row| (*row, *row)));
         let all = WrongSetup::all(&in_order);
         let mut one: Vec<Try> = all.par_iter().map(|wrong| self.tried(vec![*wrong])).collect();
-        one.sort_by(|a, b| a.share.total_cmp(&b.share));
         if let Some(found) = chosen(&one) {
             return Some(found);
         }
+        one.sort_by(|a, b| a.share.total_cmp(&b.share));
         let first = one.iter().map(|tried| tried.wrong[0]).filter(|wrong| wrong.number().is_none()).take(SECOND);
         let both = |a: WrongSetup| {
             let others = all.iter().filter(move |b| a != **b && !(a.order().is_some() && b.order().is_some()));
-            others.map(move |b| vec![a, *b])
+            others.map(move |b| if b.rank() < a.rank() { vec![*b, a] } else { vec![a, *b] })
         };
         let pairs: Vec<Vec<WrongSetup>> = first.flat_map(both).collect();
-        let mut two: Vec<Try> = pairs.into_par_iter().map(|wrong| self.tried(wrong)).collect();
-        two.sort_by(|a, b| a.share.total_cmp(&b.share));
+        let two: Vec<Try> = pairs.into_par_iter().map(|wrong| self.tried(wrong)).collect();
         chosen(&two)
     }
 }
 
-/// The best of tries in their order, if it explains.
-fn chosen(tries: &[Try]) -> Option<Explanation> {
-    let best = tries.iter().find(|tried| tried.explains)?;
-    let is_rival = |tried: &&Try| tried.explains && tried.wrong != best.wrong && tried.share < ALIKE * best.share;
-    let alike = tries.iter().filter(is_rival).filter(|tried| tried.wrong.len() == 1).map(|tried| tried.wrong[0]).collect();
-    Some(Explanation { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
+/// The best of tries in the order of the list, if one explains.
+fn chosen(tries: &[Try]) -> Option<ExplainedSetup> {
+    let explaining: Vec<&Try> = tries.iter().filter(|tried| tried.explains).collect();
+    let least = explaining.iter().map(|tried| tried.share).fold(f64::INFINITY, f64::min);
+    let best = explaining.iter().find(|tried| tried.share <= SAME * least)?;
+    let is_rival = |tried: &&&Try| tried.wrong != best.wrong && tried.share < ALIKE * least && tried.wrong.len() == 1;
+    let alike = explaining.iter().filter(is_rival).map(|tried| tried.wrong[0]).collect();
+    Some(ExplainedSetup { wrong: best.wrong.clone(), alike, placed: best.placed.clone() })
 }
 
 /// Whether a number of the robot file is off by more than manufacture errs.

@@ -22,7 +22,7 @@ use compare::AsStated;
 const FEWEST: usize = 10;
 
 /// What is wrong with the set-up, if the nominal robot is far off its points; without findings where nothing of the list explains it.
-pub(crate) fn wrong_from_the_start(question: &Question) -> Option<Diagnosis> {
+pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
     if question.fit.len() < FEWEST {
         return None;
     }

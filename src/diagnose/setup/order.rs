@@ -1,6 +1,6 @@
 //! Orders in which points and joints of two files are joined wrongly: shifted, reversed, or one of them sorted by name as text.
 
-use super::pairs::{Pairs, median};
+use super::pairs::{PointPairs, median};
 use nalgebra::Vector3;
 
 /// How the points stand beside the joints.
@@ -30,7 +30,7 @@ const SORTED: usize = 11;
 
 impl RowOrder {
     /// Those that these rows, in their order, may be in.
-    pub fn all(pairs: &Pairs) -> Vec<Self> {
+    pub fn all(pairs: &PointPairs) -> Vec<Self> {
         let mut out = likely_shifts(pairs);
         out.push(Self::Reversed);
         if pairs.rows() >= SORTED {
@@ -60,7 +60,7 @@ impl RowOrder {
 }
 
 /// The shifts by which the steps from point to point are most like those of the nominal arm: a rigid motion does not change them.
-fn likely_shifts(pairs: &Pairs) -> Vec<RowOrder> {
+fn likely_shifts(pairs: &PointPairs) -> Vec<RowOrder> {
     let (robot, count) = (pairs.robot, pairs.rows());
     let model: Vec<Vector3<f64>> = (0..count).map(|row| robot.forward(pairs.q(row)).translation).collect();
     let (model, measured) = (steps(&model), steps(&pairs.points));

@@ -1,6 +1,6 @@
 //! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
-use super::compare::{AsStated, Explanation};
+use super::compare::{AsStated, ExplainedSetup};
 use super::pairs::median;
 use super::words::{mm, words};
 use crate::diagnose::misfit::Misfit;
@@ -17,27 +17,31 @@ const NAMED: f64 = 0.98;
 const FAR: f64 = 4.0;
 
 /// A set-up error that explains what the nominal robot leaves.
-pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explanation) -> Diagnosis {
+pub(super) fn explained(question: &Question, stated: &AsStated, found: &ExplainedSetup) -> Diagnosis {
     let own = |wrong| words(wrong, question.robot, &found.placed.values, stated.reach);
     let all: Vec<_> = found.wrong.iter().map(|wrong| own(*wrong)).collect();
     let what: Vec<&str> = all.iter().map(|words| words.what.as_str()).collect();
     let mend: Vec<&str> = all.iter().map(|words| words.mend.as_str()).collect();
-    let (before, after) = (stated.placed.left, found.placed.left);
+    let scale: f64 = all.iter().map(|words| words.scale).product();
+    let (before, after) = (stated.placed.left, scale * found.placed.left);
     let mut text = format!(
-        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it {}",
+        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it: {}",
         what.join(", and "),
         mm(before),
         mm(after),
         mend.join("; ")
     );
-    let alike: Vec<String> = found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
+    let mut alike: Vec<String> =
+        found.alike.iter().filter(|wrong| wrong.number().is_none()).map(|wrong| own(*wrong).what).collect();
+    alike.dedup();
+    alike.retain(|other| !what.contains(&other.as_str()));
     if !alike.is_empty() {
         text.push_str(&format!(". These data are explained as well where {}", alike.join(", or ")));
     }
     let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
     let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();
-    let lengths = |off: &[f64]| {
-        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| *off).collect();
+    let lengths = |off: &[f64], scale: f64| {
+        let kept: Vec<f64> = off.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(off, _)| scale * off).collect();
         ErrorLengths::of_lengths(&kept)
     };
     let name = NAMED / (1.0 + found.alike.len() as f64);
@@ -46,7 +50,7 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explanat
         probabilities: Probabilities { name, place: NAMED, none: 1.0 - NAMED },
         ..finding(format!("{text}."))
     };
-    let errors = (lengths(&stated.placed.off), lengths(&found.placed.off));
+    let errors = (lengths(&stated.placed.off, 1.0), lengths(&found.placed.off, scale));
     Diagnosis { before: errors.0, after: errors.1, ..wrong(question, vec![finding]) }
 }
 

@@ -10,7 +10,7 @@ const MOST: usize = 240;
 
 /// Rows of joints and points.
 #[derive(Clone)]
-pub(super) struct Pairs<'a> {
+pub(super) struct PointPairs<'a> {
     pub robot: &'a RobotModel,
     /// rad or m, row-major.
     pub q: Vec<f64>,
@@ -26,7 +26,7 @@ pub(super) fn sampled(rows: &[usize]) -> Vec<usize> {
     rows.iter().copied().step_by(rows.len().div_ceil(MOST).max(1)).collect()
 }
 
-impl<'a> Pairs<'a> {
+impl<'a> PointPairs<'a> {
     /// Joints of rows, each beside the point of a row.
     pub fn of(robot: &'a RobotModel, data: &Measurements, rows: impl Iterator<Item = (usize, usize)>) -> Self {
         let (mut q, mut points, mut target) = (Vec::new(), Vec::new(), Vec::new());
@@ -68,16 +68,18 @@ impl<'a> Pairs<'a> {
         (self.points.iter().map(|point| (point - centre).norm_squared()).sum::<f64>() / count).sqrt()
     }
 
-    /// How far the tool point gets from the first axis that turns in these rows, m.
+    /// How far the tool point of the robot file gets in these rows from the first axis that turns, or from its middle, m.
     pub fn reach(&self) -> f64 {
         let robot = self.robot;
-        let first = (0..robot.joints()).find(|joint| robot.is_revolute(*joint)).unwrap_or(0);
-        let distance = |row: usize| {
-            let bodies = bodies(robot, self.q(row));
-            let tool = bodies[robot.joints()].point(&robot.home().translation);
-            (tool - bodies[first].point(robot.point(first))).norm()
+        let first = (0..robot.joints()).find(|joint| robot.is_revolute(*joint));
+        let all: Vec<Vec<Pose>> = (0..self.rows()).map(|row| bodies(robot, self.q(row))).collect();
+        let tool = |bodies: &Vec<Pose>| bodies[robot.joints()].point(&robot.home().translation);
+        let middle = all.iter().map(tool).sum::<Vector3<f64>>() / all.len().max(1) as f64;
+        let distance = |bodies: &Vec<Pose>| {
+            let of_axis = first.map(|joint| (tool(bodies) - bodies[joint].point(robot.point(joint))).norm());
+            of_axis.unwrap_or(0.0).max((tool(bodies) - middle).norm())
         };
-        (0..self.rows()).map(distance).fold(0.0, f64::max)
+        all.iter().map(distance).fold(0.0, f64::max)
     }
 }
 

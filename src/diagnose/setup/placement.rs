@@ -2,7 +2,7 @@
 //! that is asked. Gauss-Newton from Kabsch's solution, with far points trimmed.
 
 use super::number::{FreeNumber, SeenNumber};
-use super::pairs::{Pairs, bodies, median};
+use super::pairs::{PointPairs, bodies, median};
 use crate::estimate::align_points;
 use crate::spatial::{Pose, hat};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
@@ -32,7 +32,7 @@ pub(super) struct Placement {
 }
 
 /// The best placement.
-pub(super) fn place(pairs: &Pairs, number: Option<FreeNumber>) -> Placement {
+pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement {
     let robot = pairs.robot;
     let bodies: Vec<Pose> = (0..pairs.rows()).map(|row| bodies(robot, pairs.q(row))[robot.joints()]).collect();
     let seats = vec![robot.home().translation; pairs.targets];
@@ -57,7 +57,7 @@ pub(super) fn place(pairs: &Pairs, number: Option<FreeNumber>) -> Placement {
 }
 
 struct PlacementProblem<'a, 'b> {
-    pairs: &'b Pairs<'a>,
+    pairs: &'b PointPairs<'a>,
     bodies: Vec<Pose>,
     number: Option<FreeNumber>,
 }

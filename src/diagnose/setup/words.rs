@@ -11,6 +11,14 @@ use crate::robot::RobotModel;
 pub(super) struct SetupWords {
     pub what: String,
     pub mend: String,
+    /// By how much lengths of the robot file are longer when it is mended.
+    pub scale: f64,
+}
+
+impl SetupWords {
+    fn of(what: String, mend: String) -> Self {
+        Self { what, mend, scale: 1.0 }
+    }
 }
 
 /// An arm that reaches less far, or farther, is not what a robot file in the right unit describes, m.
@@ -56,7 +64,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
             (
                 format!("the zero of joint {} is {degrees} deg in the recording's numbers", joint + 1),
-                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}` (in the unit of the column)"),
+                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
         WrongSetup::Coupled { moved, by, sign } => {
@@ -76,7 +84,7 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
         WrongSetup::Order(order) => return of_order(order),
         WrongSetup::Number(number) => return of_number(number, values),
     };
-    SetupWords { what, mend }
+    SetupWords::of(what, mend)
 }
 
 fn unit_name(unit: &str) -> &'static str {
@@ -91,14 +99,14 @@ fn unit_name(unit: &str) -> &'static str {
 
 fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     let (factor, read, is) = LENGTHS[unit];
-    if reach >= ARMS[0] && reach <= ARMS[1] {
+    if (ARMS[0]..=ARMS[1]).contains(&reach) {
         let what = format!("the points are in {} and were read in {}", unit_name(is), unit_name(read));
         let mend = if is == "cm" {
             "export the points in mm; cm cannot be read".into()
         } else {
             format!("in `ingest`: `columns: {{x: {{.., unit: {is}}}, y: {{.., unit: {is}}}, z: {{.., unit: {is}}}}}`")
         };
-        return SetupWords { what, mend };
+        return SetupWords::of(what, mend);
     }
     // As much too small as the points seem too large.
     let own = LENGTHS.iter().find(|other| (other.0 * factor - 1.0).abs() < 1e-9 && other.2 != "cm");
@@ -106,6 +114,7 @@ fn of_lengths(unit: usize, reach: f64) -> SetupWords {
     SetupWords {
         what: format!("the lengths of the robot file are in {} and were read in {}", unit_name(is), unit_name(read)),
         mend: format!("in the robot file: `units: {{length: {is}, ..}}`"),
+        scale: 1.0 / factor,
     }
 }
 
@@ -131,36 +140,37 @@ fn of_order(order: RowOrder) -> SetupWords {
             "in `ingest`: `join: {by: id}`, or sort the joints as they were moved to",
         ),
     };
-    SetupWords { what, mend: mend.into() }
+    SetupWords::of(what, mend.into())
 }
 
 fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
-    match number {
-        FreeNumber::Length(joint) => SetupWords {
-            what: format!(
+    let (what, mend) = match number {
+        FreeNumber::Length(joint) => (
+            format!(
                 "a length of the robot file from joint {} to joint {} is wrong: what is behind it stands farther by {}",
                 joint + 1,
                 joint + 2,
                 displacement(values)
             ),
-            mend: format!("in the robot file: look for a typing error between joints {} and {}", joint + 1, joint + 2),
-        },
-        FreeNumber::Axis(joint) => SetupWords {
-            what: format!(
+            format!("in the robot file: look for a typing error between joints {} and {}", joint + 1, joint + 2),
+        ),
+        FreeNumber::Axis(joint) => (
+            format!(
                 "the axis of joint {} alone stands elsewhere than the robot file says: by {}",
                 joint + 1,
                 displacement(values)
             ),
-            mend: format!("in the robot file: look for a typing error in the point of joint {}'s axis", joint + 1),
-        },
+            format!("in the robot file: look for a typing error in the point of joint {}'s axis", joint + 1),
+        ),
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
-            SetupWords {
-                what: format!("the zero of joint {} is off by {} deg, more than manufacture errs", joint + 1, figure(degrees, 2)),
-                mend: format!("master joint {} anew, or put its zero right in the robot file", joint + 1),
-            }
+            (
+                format!("the zero of joint {} is off by {} deg, more than manufacture errs", joint + 1, figure(degrees, 2)),
+                format!("master joint {} anew, or put its zero right in the robot file", joint + 1),
+            )
         }
-    }
+    };
+    SetupWords::of(what, mend)
 }
 
 /// Base axes that matter, mm.

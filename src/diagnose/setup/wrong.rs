@@ -2,7 +2,7 @@
 
 use super::number::FreeNumber;
 use super::order::RowOrder;
-use super::pairs::Pairs;
+use super::pairs::PointPairs;
 use crate::robot::RobotModel;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -48,7 +48,7 @@ const PARALLEL: f64 = 0.99;
 
 impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
-    pub fn all(pairs: &Pairs) -> Vec<Self> {
+    pub fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
@@ -64,6 +64,18 @@ impl WrongSetup {
         out
     }
 
+    /// The place of its mend in the order in which `ingest` applies them: columns, units, zeros, signs, couplings.
+    pub fn rank(self) -> usize {
+        match self {
+            Self::Order(_) | Self::Exchanged(..) => 0,
+            Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
+            Self::Zero(..) => 2,
+            Self::Sign(_) => 3,
+            Self::Coupled { .. } => 4,
+            Self::Number(_) => 5,
+        }
+    }
+
     /// The number of the robot file that is to be found.
     pub fn number(self) -> Option<FreeNumber> {
         if let Self::Number(number) = self { Some(number) } else { None }
@@ -74,7 +86,7 @@ impl WrongSetup {
     }
 
     /// The recording without it; the order of rows and numbers of the robot file are mended elsewhere.
-    pub fn mended<'a>(self, pairs: &Pairs<'a>) -> Pairs<'a> {
+    pub fn mended<'a>(self, pairs: &PointPairs<'a>) -> PointPairs<'a> {
         let robot = pairs.robot;
         let scaled = |factor: f64| {
             pairs.with_joints(|q| (0..q.len()).filter(|joint| robot.is_revolute(*joint)).for_each(|joint| q[joint] *= factor))

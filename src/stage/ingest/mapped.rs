@@ -199,7 +199,8 @@ impl JointColumns {
                 faults.push(Fault::new(format!("{place}.ratio"), "not a finite number, e.g. 1 or -1"));
             }
         }
-        if !are_positions && !(self.zero.is_empty() && self.coupled.is_empty()) {
+        let is_plain = self.zero.is_empty() && self.coupled.is_empty();
+        if !are_positions && !is_plain {
             faults.push(Fault::new(place, "`zero` and `coupled` are for positions; say them at `q`"));
         }
         faults
