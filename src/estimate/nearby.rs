@@ -29,10 +29,10 @@ pub(crate) struct NearbyFits<'a> {
     columns: Vec<usize>,
     /// Of all parts and the priors.
     whole: TriangularFactor,
-    parts: Vec<LeftOut<'a>>,
+    parts: Vec<LeftOutRows<'a>>,
 }
 
-struct LeftOut<'a> {
+struct LeftOutRows<'a> {
     rows: &'a [usize],
     factor: TriangularFactor,
     /// Root of the Huber weight of each term.
@@ -51,9 +51,9 @@ impl<'a> NearbyFits<'a> {
             let problem = Problem { data, rows, excess };
             let seen = problem.observe(model, columns);
             let shares = problem.errors(&seen.residuals).into_iter().map(|(error, axes)| share(error, axes)).collect();
-            LeftOut { rows, factor: seen.factor, shares }
+            LeftOutRows { rows, factor: seen.factor, shares }
         };
-        let parts: Vec<LeftOut> = parts.par_iter().map(part).collect();
+        let parts: Vec<LeftOutRows> = parts.par_iter().map(part).collect();
         let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
         let (whole, _) = model.with_priors(columns, all);
         Some(Self { data, model, excess, columns: columns.to_vec(), whole, parts })
@@ -80,7 +80,7 @@ impl<'a> NearbyFits<'a> {
         Some(self.parts.par_iter().map(|part| self.without(part, &beside, &part.factor.given(steps))).collect())
     }
 
-    fn without(&self, part: &LeftOut, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
+    fn without(&self, part: &LeftOutRows, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
         let FitOfAll { whole, inverse, model, open } = beside;
         let p = open.len();
         let seen = Mat::from_fn(p, p, |i, j| factor.entry(i, j)) * inverse;
@@ -103,7 +103,7 @@ impl<'a> NearbyFits<'a> {
     }
 
     /// Errors (m) of a part's rows under a model, and the root of their whitened square.
-    fn arrive(&self, part: &LeftOut, model: &Model) -> (Vec<f64>, f64) {
+    fn arrive(&self, part: &LeftOutRows, model: &Model) -> (Vec<f64>, f64) {
         let mut scratch = model.stack.scratch(&model.robot);
         let (mut lengths, mut square) = (Vec::with_capacity(part.rows.len()), 0.0);
         let mut shares = part.shares.iter();
