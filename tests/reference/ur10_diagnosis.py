@@ -3,7 +3,7 @@
 
     python3 tests/reference/ur10_diagnosis.py --calib target/release/calib --data ../shared/data/ipa_ur10 [--only NAME ...]
 
-Runs the UR10 recording of Fraunhofer IPA (pipelines/ur10/README.md says where it comes from) whole, by blocks, and with
+Runs the UR10 recording of Fraunhofer IPA (pipelines/gallery.md says where it comes from) whole, by blocks, and with
 a shifted joint log, exchanged rows, a joint of the wrong sign and a slow drift of the temperature written into copies of the
 file. Prints a line a case: held-out mean and largest error before and after, seconds, findings. Needs no packages.
 """
