@@ -4,7 +4,8 @@ use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulati
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
-use crate::stage::{Context, Stage, screened, weightless};
+use crate::stage::weightless::{WeightlessLinks, weightless_links};
+use crate::stage::{Context, Stage, screened};
 use crate::table::{
     Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
     Split, Suspects, Verdict,
@@ -156,8 +157,8 @@ fn said(mut diagnosis: Diagnosis, question: &Question, context: &Context) -> Res
             None => return Err(Error::data("table recording", diagnosis.statement)),
         },
         _ => {
-            if let Some(warning) = weightless::warning(question.robot, question.data, question.fit) {
-                diagnosis.statement.push_str(&format!("; {warning}"));
+            if let Some(WeightlessLinks { missing, warning }) = weightless_links(question.robot, question.data, question.fit) {
+                diagnosis.statement.push_str(&format!("; {missing}"));
                 context.services.warn(warning);
             }
         }

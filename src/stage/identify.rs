@@ -10,7 +10,8 @@ use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::screened::fit_rows;
-use crate::stage::{Context, Stage, weightless};
+use crate::stage::weightless::weightless_links;
+use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -93,8 +94,8 @@ impl Stage for Identify {
                 Some(reason) => context.services.note(format!("{} is left out: {reason}", effect.name())),
                 None => {
                     let by_weight = effect.name() == JointCompliance::NAME && matches!(self.load, LoadSetting::Gravity);
-                    if let Some(warning) = weightless::warning(&robot, &data, &rows).filter(|_| by_weight) {
-                        context.services.warn(warning);
+                    if let Some(links) = weightless_links(&robot, &data, &rows).filter(|_| by_weight) {
+                        context.services.warn(links.warning);
                     }
                     effects.push(effect);
                 }

@@ -7,8 +7,16 @@ use nalgebra::Vector3;
 /// Cosine from which on gravity does not turn a joint.
 const UPRIGHT: f64 = 0.99;
 
-/// A warning where links without masses are under load in these rows; none where all masses are known, or weight turns no joint.
-pub(super) fn warning(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<String> {
+/// What is said where links without masses are under load.
+pub(super) struct WeightlessLinks {
+    /// What is missing, for a verdict.
+    pub missing: String,
+    /// The same with what it costs and what to do.
+    pub warning: String,
+}
+
+/// Of some rows; none where all masses are known, or weight turns no joint.
+pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<WeightlessLinks> {
     let joints = &robot.description().joints;
     let bare = joints.iter().filter(|joint| joint.mass.is_none() || joint.centre.is_none()).count();
     let gravity = Vector3::from(robot.description().gravity);
@@ -30,8 +38,10 @@ pub(super) fn warning(robot: &RobotModel, data: &Measurements, rows: &[usize]) -
         0 => String::new(),
         _ => format!(" ({} of {} carry a payload)", counted(loaded, "row"), rows.len()),
     };
-    Some(format!(
-        "the robot file gives {given}, and weight turns joints of these poses{load}: wind-up under the arm's own weight {windup}, bending and \
-         counterbalances cannot be computed, and what they do may be called by another name (gear, hose). Fill in `links` of the robot file"
-    ))
+    let missing = format!("the robot file gives {given}, and weight turns joints of these poses{load}");
+    let warning = format!(
+        "{missing}: wind-up under the arm's own weight {windup}, bending and counterbalances cannot be computed, and what they do may be \
+         called by another name (gear, hose). Fill in `links` of the robot file"
+    );
+    Some(WeightlessLinks { missing, warning })
 }
