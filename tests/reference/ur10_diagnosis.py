@@ -107,8 +107,9 @@ def main():
                 print(f"{name}: exit {run.returncode}\n{run.stderr}")
                 continue
             said = json.loads(run.stdout)
-            before, after = (said[key] for key in ("before", "after"))
-            errors = (f"{what} {before[key]:.3f} -> {after[key]:.3f} mm"
+            before, after = (said[key] or {} for key in ("before", "after"))
+            figure = lambda of, key: "-" if of.get(key) is None else f"{of[key]:.3f}"
+            errors = (f"{what} {figure(before, key)} -> {figure(after, key)} mm"
                       for what, key in (("mean", "validate_mean_mm"), ("max", "validate_max_mm")))
             print(f"{name}: {said['verdict']}, {', '.join(errors)}, {seconds:.0f} s")
             for finding in said["findings"]:
