@@ -52,6 +52,8 @@ const FORMS: usize = 3;
 const PHASE: f64 = 1.5;
 /// rad; one sigma of what is known.
 const WIDE: f64 = 0.01;
+/// rad, under the weight of one body at full stretch; the softest joints (20,000 Nm/rad under 200 Nm) yield as much.
+const LARGEST: f64 = 0.01;
 
 impl PartialEq for UnweighedWindup {
     fn eq(&self, other: &Self) -> bool {
@@ -96,7 +98,7 @@ impl UnweighedWindup {
             if out.iter().any(|other| other.form == form) {
                 continue;
             }
-            let hypothesis = Hypothesis::new(form, FORMS);
+            let hypothesis = Hypothesis::new(form, FORMS).within(LARGEST);
             out.push(if positive { hypothesis.positive() } else { hypothesis });
         }
         out
