@@ -20,6 +20,7 @@ mod separate;
 mod setup;
 mod too_few;
 mod types;
+mod unasked;
 mod verdict_statement;
 mod whitened;
 mod words;

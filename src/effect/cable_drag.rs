@@ -7,10 +7,14 @@ use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, 
 
 pub struct CableDrag;
 
+impl CableDrag {
+    pub const NAME: &'static str = "cable_drag";
+}
+
 impl Cause for CableDrag {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "cable_drag",
+            name: Self::NAME,
             place: "joint",
             formula: "t by the angles of the joint and its neighbour",
             size: "1 to 10 % of the joint's torque",

@@ -7,10 +7,14 @@ use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, 
 
 pub struct Counterbalance;
 
+impl Counterbalance {
+    pub const NAME: &'static str = "counterbalance";
+}
+
 impl Cause for Counterbalance {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "counterbalance",
+            name: Self::NAME,
             place: "joint 2 or 3",
             formula: "t = a sin q + b cos q, and of 2 q, on top of gravity",
             size: "10 to 60 % of the gravity torque",

@@ -80,10 +80,12 @@ pub use summary::{ParameterEstimate, Summary, people};
 pub use survey::{Hypothesis, Survey};
 pub use term::Term;
 pub use tool_offset::ToolOffset;
+pub use tool_shift::ToolShift;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
 pub use words::{Clock, figure};
+pub use zero_shift::ZeroShift;
 
 use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel};
 use crate::spatial::Pose;

@@ -5,10 +5,14 @@ use crate::robot::RobotModel;
 
 pub struct ToolShift;
 
+impl ToolShift {
+    pub const NAME: &'static str = "tool_shift";
+}
+
 impl Cause for ToolShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "tool_shift",
+            name: Self::NAME,
             place: "tool",
             formula: "the target moves at some time",
             size: "20 to 500 um",

@@ -5,10 +5,14 @@ use crate::robot::RobotModel;
 
 pub struct ZeroShift;
 
+impl ZeroShift {
+    pub const NAME: &'static str = "zero_shift";
+}
+
 impl Cause for ZeroShift {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: "zero_shift",
+            name: Self::NAME,
             place: "joint",
             formula: "d = c after some time",
             size: "10 to 500 arcsec",

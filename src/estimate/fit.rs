@@ -241,10 +241,12 @@ impl Minimisation {
             }
             let weighted_so = !first || round > 0 || problem.excess == ExcessSigma::default();
             let start = if weighted_so && free == candidates { sight } else { problem.evaluate(model, &free) };
-            let effort = match () {
-                () if first && round == 0 => FIRST,
-                () if round + 1 < ROUNDS => ROUGH,
-                () => FINE,
+            let effort = if first && round == 0 {
+                FIRST
+            } else if round + 1 < ROUNDS {
+                ROUGH
+            } else {
+                FINE
             };
             let (steps, mut stop, mut end) = minimise(problem, model, &free, start, effort);
             self.course.extend(steps);

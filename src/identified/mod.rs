@@ -3,6 +3,7 @@
 mod robot_file;
 mod scatter;
 mod standing;
+mod written;
 
 pub use robot_file::robot_file;
 pub use standing::{standing_of, wrong_setup_of};
@@ -21,6 +22,7 @@ use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
 use std::path::{Path, PathBuf};
+use written::written;
 
 /// What was identified, and from what.
 pub struct IdentifiedModel {
@@ -98,8 +100,7 @@ impl IdentifiedModel {
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
         let warnings = stands.iter().flat_map(Standing::warnings).chain(wrong).collect();
-        let covariance = stage.outputs.iter().find(|output| output.kind == CovarianceTable::KIND);
-        let covariance = covariance.map(|output| CovarianceTable::from_frame(&load(&output.table)?)).transpose()?;
+        let covariance: Option<CovarianceTable> = written(stage, load)?;
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned.filter(|_| correction.is_some()), load)?;

@@ -1,11 +1,12 @@
 //! How an arm scatters about its identified model, by the tables of the stages that identified it.
 
+use super::written::written;
 use crate::compensate::Scatter;
 use crate::error::Result;
 use crate::pipeline::StageReport;
 use crate::store::TableRef;
 use crate::store::frame::Frame;
-use crate::table::{Corrections, Observability, Prediction, Table, Verdict};
+use crate::table::{Corrections, Observability, Prediction, Verdict};
 
 /// Of the stage whose model stands, and of the one that learned a correction on top of it.
 pub(super) fn of(
@@ -27,10 +28,4 @@ pub(super) fn of(
         unexplained = unexplained.min((left / 3.0).max(0.0).sqrt());
     }
     Ok(Scatter { unexplained: unexplained * 1e-3, repeatability: repeatability.unwrap_or(0.0) })
-}
-
-/// The table of a kind that a stage wrote, if it wrote one.
-fn written<T: Table>(stage: &StageReport, load: impl Fn(&TableRef) -> Result<Frame>) -> Result<Option<T>> {
-    let own = stage.outputs.iter().find(|output| output.kind == T::KIND);
-    own.map(|output| T::from_frame(&load(&output.table)?)).transpose()
 }

@@ -1,5 +1,6 @@
 //! The step that stands for a run, by what its stages wrote: what its closing line speaks of, and what is compensated and exported.
 
+use super::written::written;
 use crate::error::Result;
 use crate::pipeline::{Manifest, StageReport};
 use crate::stage::{Diagnose, Stage};
@@ -10,10 +11,9 @@ use crate::table::{Corrected, Findings, Parameters, Prediction, Standing, Step, 
 pub fn wrong_setup_of(manifest: &Manifest, store: &Store) -> Result<Option<String>> {
     let mut diagnosed = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
     let Some(stage) = diagnosed.next_back() else { return Ok(None) };
-    let of = |kind: &str| stage.outputs.iter().find(|output| output.kind == kind).map(|output| output.table.clone());
-    let (Some(verdict), Some(findings)) = (of(Verdict::KIND), of(Findings::KIND)) else { return Ok(None) };
-    let (verdict, findings) = (store.load(&verdict)?, store.load(&findings)?);
-    Ok(Verdict::from_frame(&verdict)?.wrong_setup(&Findings::from_frame(&findings)?))
+    let load = |table: &TableRef| store.load(table);
+    let (verdict, findings): (Option<Verdict>, Option<Findings>) = (written(stage, load)?, written(stage, load)?);
+    Ok(verdict.zip(findings).and_then(|(verdict, findings)| verdict.wrong_setup(&findings)))
 }
 
 /// The step that stands for a run; none where nothing predicts, the last diagnosis speaks of an outside simulation, or the set-up is

@@ -9,6 +9,9 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
+/// Forms that one thread tries at once: fixed, so that no rounding depends on the number of threads.
+const FORMS: usize = 4;
+
 /// A set of hypotheses and the base model, beside which forms are tried.
 pub(crate) struct Beside<'p, 'a> {
     pool: &'p CachedHypotheses<'a>,
@@ -23,9 +26,7 @@ pub(crate) struct Beside<'p, 'a> {
 impl<'p, 'a> Beside<'p, 'a> {
     pub fn of(pool: &'p CachedHypotheses<'a>, set: &[usize]) -> Self {
         let (factor, own) = (pool.factor(set), pool.columns_of(set));
-        let rank = factor.rank();
-        let lower = Mat::from_fn(rank, rank, |i, j| if j <= i { factor.row(i)[j] } else { 0.0 });
-        let mut columns = Mat::zeros(pool.residual_rows, rank);
+        let mut columns = Mat::zeros(pool.residual_rows, factor.rank());
         for (k, column) in factor.order.iter().enumerate() {
             columns.col_as_slice_mut(k).copy_from_slice(pool.column(own[*column]));
         }
@@ -34,13 +35,12 @@ impl<'p, 'a> Beside<'p, 'a> {
         for (k, coefficient) in coefficients.iter().enumerate() {
             residual.iter_mut().zip(columns.col_as_slice(k)).for_each(|(value, c)| *value -= coefficient * c);
         }
-        Self { pool, columns, lower, residual }
+        Self { pool, columns, lower: factor.lower(), residual }
     }
 
     /// By how much each form would lower the squared residual.
     pub fn gains(&self, forms: &[Form]) -> Vec<f64> {
-        let half = forms.len().div_ceil(rayon::current_num_threads()).max(1);
-        forms.par_chunks(half).flat_map_iter(|forms| self.gains_of(forms)).collect()
+        forms.par_chunks(FORMS).flat_map_iter(|forms| self.gains_of(forms)).collect()
     }
 
     fn gains_of(&self, forms: &[Form]) -> Vec<f64> {

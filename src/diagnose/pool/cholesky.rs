@@ -1,6 +1,7 @@
 //! Least squares by a pivoted Cholesky factor of a small Gram matrix: what the data do not see is left out.
 
 use super::linear::INVISIBLE;
+use faer::Mat;
 
 /// A pivoted Cholesky factor of a small Gram matrix: what is below [`INVISIBLE`] is left out.
 pub(super) struct PivotedCholesky {
@@ -41,6 +42,11 @@ impl PivotedCholesky {
     pub fn row(&self, a: usize) -> &[f64] {
         let start = a * (a + 1) / 2;
         &self.triangle[start..=start + a]
+    }
+
+    /// The whole factor, lower triangular.
+    pub fn lower(&self) -> Mat<f64> {
+        Mat::from_fn(self.rank(), self.rank(), |i, j| if j <= i { self.row(i)[j] } else { 0.0 })
     }
 
     pub fn rank(&self) -> usize {

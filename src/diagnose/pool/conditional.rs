@@ -5,7 +5,7 @@ use super::criterion::fall;
 use super::hypotheses::HypothesisSet;
 use super::linear::dot;
 use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, MatMut, MatRef, Par};
+use faer::{MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 /// Columns whose shares one thread computes at once.
@@ -51,7 +51,7 @@ impl Conditional {
         let (rank, own) = (factor.rank(), pool.columns_of(set));
         let mut share = vec![0.0; rank * pool.scale.len()];
         if rank > 0 {
-            let lower = Mat::from_fn(rank, rank, |i, j| if j <= i { factor.row(i)[j] } else { 0.0 });
+            let lower = factor.lower();
             let kept: Vec<&SetProducts> = factor.order.iter().map(|k| &products[*k]).collect();
             share.par_chunks_mut(rank * COLUMNS).enumerate().for_each(|(chunk, share)| {
                 for (n, column) in share.chunks_mut(rank).enumerate() {

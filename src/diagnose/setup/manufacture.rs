@@ -1,7 +1,7 @@
 //! Numbers that leave the robot file by more than manufacture errs: lengths by 2 %, angles by 2 deg, ratios by 1 %.
 
 use crate::diagnose::round::FitState;
-use crate::effect::{Place, figure};
+use crate::effect::{Place, ReductionRatio, figure};
 use crate::estimate::ParameterStatus;
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -33,7 +33,7 @@ pub(super) fn beyond(now: &FitState, robot: &RobotModel, reach: f64) -> Vec<Stri
             let limit = match (effect.name(), spec.place, spec.unit) {
                 ("link_geometry", Place::Links(link, _), Unit::Millimetre) => length_error(robot, link, reach),
                 ("link_geometry" | "joint_offset", _, Unit::Radian) => ANGLE,
-                ("reduction_ratio", ..) => RATIO,
+                (ReductionRatio::NAME, ..) => RATIO,
                 _ => continue,
             };
             if value.abs() > limit + CLEARLY * sigma {

@@ -3,13 +3,10 @@
 use super::compare::{AsStated, ExplainedSetup};
 use super::pairs::median;
 use super::words::{mm, words};
-use crate::diagnose::misfit::Misfit;
-use crate::diagnose::types::{
-    Diagnosis, ErrorLengths, Finding, JointRepeatability, Located, Probabilities, Question, SETUP, VerdictKind,
-};
-use crate::diagnose::verdict_statement::statement;
-use crate::effect::{BasePlacement, Effect, EffectStack, ParameterEstimate, Place};
-use crate::estimate::{FitOptions, Model, Screening, align, fit};
+use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
+use crate::diagnose::unasked::{on_its_base, unasked};
+use crate::effect::{ParameterEstimate, Place};
+use crate::estimate::{FitOptions, Screening, fit};
 
 /// That it is what it is called: nothing else of the list explains it, or others share it alike.
 const NAMED: f64 = 0.98;
@@ -93,41 +90,12 @@ fn finding(statement: String) -> Finding {
 
 /// The nominal robot with its base where the rows to fit have it.
 fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
-    let Question { robot, data, fit: rows, .. } = *question;
-    let base = align(robot, data, rows);
-    let effect: Box<dyn Effect> = Box::new(BasePlacement::new(base));
-    let start = Model::nominal(robot.clone(), EffectStack::new(robot, base, vec![effect]));
-    let candidates: Vec<usize> = (0..start.x.len()).collect();
+    let Question { data, fit: rows, .. } = *question;
+    let (start, candidates) = on_its_base(question);
     let (model, fitted) = fit(&start, data, &FitOptions { rows, candidates: &candidates });
+    let before = ErrorLengths::of(data, &model.predict(data), rows);
     let screening = Screening { kept: rows.to_vec(), ..Screening::default() };
-    let predicted = model.predict(data);
-    let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
-    let errors = ErrorLengths::of(data, &predicted, rows);
-    Diagnosis {
-        verdict: VerdictKind::WrongSetup,
-        statement: statement(VerdictKind::WrongSetup, &misfit.ground(data, data.noise_basis, 0)),
-        noise_basis: data.noise_basis,
-        noise_floor: misfit.noise_floor,
-        before: errors,
-        after: None,
-        held_out: false,
-        folds: None,
-        findings,
-        withdrawn: Vec::new(),
-        clock: data.has_clock(),
-        not_observable: vec!["what is missing: it is asked when the set-up is right".into()],
-        signature: None,
-        next_measurements: Vec::new(),
-        leftover_rms: misfit.leftover_rms,
-        chi_square: misfit.chi_square,
-        gate_first: None,
-        gate_last: None,
-        repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
-        located_before: Located::default(),
-        located_after: Located::default(),
-        kept: rows.to_vec(),
-        screening,
-        model,
-        fitted,
-    }
+    let not_observable = vec!["what is missing: it is asked when the set-up is right".into()];
+    let diagnosis = unasked(question, VerdictKind::WrongSetup, (model, fitted, screening));
+    Diagnosis { before, held_out: false, findings, not_observable, ..diagnosis }
 }

@@ -4,8 +4,8 @@ use super::holder::stepped;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::FitState;
 use crate::effect::{
-    AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, Unknown,
-    Variable, cause,
+    AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, ToolShift,
+    Unknown, Variable, ZeroShift, cause,
 };
 use std::collections::BTreeMap;
 
@@ -118,7 +118,7 @@ fn holders(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize], s
         let members = groups.get(key)?;
         members.iter().map(|i| stepped(&pool.hypotheses[set[*i]].form, survey.joints())).collect::<Option<Vec<f64>>>()
     };
-    let [tool, zero] = [("tool_shift", Place::Tool), ("zero_shift", Place::Joint(survey.joints() - 1))];
+    let [tool, zero] = [(ToolShift::NAME, Place::Tool), (ZeroShift::NAME, Place::Joint(survey.joints() - 1))];
     let (Some(moved), Some(stepped)) = (at(&tool), at(&zero)) else { return };
     let alone = survey.rows.iter().all(|row| survey.data.target(*row) == survey.data.target(survey.rows[0]));
     let at_once = |time: &f64| moved.iter().any(|other| survey.changes_near(*time).contains(other));

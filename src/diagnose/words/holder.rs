@@ -4,14 +4,12 @@
 
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::RivalCause;
-use crate::effect::{Basis, Clock, Effect, Form, Place, Variable, figure};
+use crate::effect::{Basis, Clock, Form, Place, ToolShift, Variable, ZeroShift, figure};
 use crate::robot::{Measurements, Travel};
 use nalgebra::Vector3;
 
 /// The radius, and the place along the axis, may change by this share of the displacement.
 const CONSTANT: f64 = 0.1;
-const ZERO: &str = "zero_shift";
-const TOOL: &str = "tool_shift";
 
 /// A target that has turned about the last axis.
 pub(super) struct HolderTurn {
@@ -25,8 +23,8 @@ pub(super) struct HolderTurn {
 
 /// Whether a form is a step of the last joint's zero, or of the target on the tool; when.
 pub(super) fn stepped(form: &Form, joints: usize) -> Option<f64> {
-    let last = form.name() == ZERO && form.place() == Place::Joint(joints - 1);
-    let law = form.term().filter(|_| last || form.name() == TOOL)?.law();
+    let last = form.is(&ZeroShift) && form.place() == Place::Joint(joints - 1);
+    let law = form.term().filter(|_| last || form.is(&ToolShift))?.law();
     match (law.first.of, law.first.basis) {
         (Variable::Time, Basis::After { at }) => Some(at),
         _ => None,
@@ -67,7 +65,8 @@ impl HolderTurn {
 
     /// The other name of what is called `effect`.
     pub fn rival(&self, effect: &str) -> RivalCause {
-        let (effect, place) = if effect == ZERO { (TOOL, Place::Tool) } else { (ZERO, Place::Joint(self.joint)) };
+        let zero = (ZeroShift::NAME, Place::Joint(self.joint));
+        let (effect, place) = if effect == ZeroShift::NAME { (ToolShift::NAME, Place::Tool) } else { zero };
         RivalCause { effect, place, delta_bic: 0.0, probability: 0.0 }
     }
 }
