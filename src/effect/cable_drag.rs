@@ -7,14 +7,10 @@ use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, 
 
 pub struct CableDrag;
 
-impl CableDrag {
-    pub const NAME: &'static str = "cable_drag";
-}
-
 impl Cause for CableDrag {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
-            name: Self::NAME,
+            name: "cable_drag",
             place: "joint",
             formula: "t by the angles of the joint and its neighbour",
             size: "1 to 10 % of the joint's torque",

@@ -7,8 +7,7 @@ use super::counterbalance::Counterbalance;
 use super::form::parameters;
 use super::skeleton::moments;
 use super::{
-    ArmState, CableDrag, Cause, Deflection, Effect, Form, GearCyclic, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey,
-    Variable, figure,
+    ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
 };
 use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
 use crate::units::Unit;
@@ -131,7 +130,7 @@ impl UnweighedWindup {
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.
     pub fn identities(form: &Form) -> Vec<(&'static str, Place)> {
         let alone = form.as_a::<Self>().is_some_and(|windup| windup.shape.own_angle);
-        if alone { vec![(GearCyclic::NAME, form.place()), (Counterbalance::NAME, form.place())] } else { Vec::new() }
+        if alone { vec![("gear_cyclic", form.place()), (Counterbalance::NAME, form.place())] } else { Vec::new() }
     }
 }
 
@@ -240,8 +239,8 @@ impl Placed for UnweighedWindup {
         let (outwards, across) = (sum(true), sum(false));
         let has = |outwards: bool| self.shape.moments.iter().any(|moment| moment.outwards == outwards);
         match self.shape.own_angle {
-            true if has(false) && across > PHASE * outwards => GearCyclic::NAME,
-            _ if has(true) && outwards < 0.0 => CableDrag::NAME,
+            true if has(false) && across > PHASE * outwards => "gear_cyclic",
+            _ if has(true) && outwards < 0.0 => "cable_drag",
             _ => self.name(),
         }
     }
