@@ -96,7 +96,7 @@ fn metal_trails_a_ramp_by_slope_times_its_time() {
     assert!((warm[9] - 9.000_045_399_930).abs() < 1e-11, "{warm:?}");
     let at_once = remembered(Physical::JointWarming(warming(Heat::Temperature, 0.0)), &moves(&[0.0; 3]));
     assert_near(&at_once, &[1.0, 2.0, 3.0], 1e-12);
-    // Half of the growth of a link with a core is the core's: 9.000045 and, with 200 s, 8 + 2 exp(-5).
+    // Saturating at 2 K, the first kelvin is 2 tanh(1/2).
     let joint = JointWarming { full: 2.0, ..warming(Heat::Temperature, 0.0) };
     assert_near(&remembered(Physical::JointWarming(joint), &moves(&[0.0])), &[2.0 * 0.5f64.tanh()], 1e-12);
 }
@@ -122,7 +122,7 @@ fn read(effect: Physical, memory: f64, point: [f64; 3]) -> [f64; 3] {
     effect.sight(&row(&[0.0], vec![memory]), memory, point)
 }
 
-/// At azimuth 90 deg and 3 m from the standing axis 10 arcsec are 3e5 arcsec of way against x; at 45 deg of elevation a tangent is 1.
+/// At azimuth 90 deg and 3 m from the standing axis 10 arcsec are 3 m times 10 arcsec against x; at 45 deg of elevation a tangent is 1.
 #[test]
 fn an_instrument_errs_in_range_azimuth_and_elevation_about_its_own_origin() {
     let circle = |circle, phase_deg| Physical::TrackerCircle(TrackerCircle { circle, amplitude_arcsec: 10.0, phase_deg });
