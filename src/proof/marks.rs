@@ -41,6 +41,9 @@ fn rows(case: &Case) -> Vec<ScoreboardRow> {
         form: None,
         visibility: None,
         outcome: None,
+        place_right: None,
+        name_or_unknown: None,
+        wrong_name: None,
         said: case.strays.first().cloned(),
         strays: case.strays.len() as i64,
         verdict: case.verdict.clone(),
@@ -56,6 +59,9 @@ fn rows(case: &Case) -> Vec<ScoreboardRow> {
         form: Some(cause.form.clone()),
         visibility: Some(cause.strength),
         outcome: Some(cause.outcome.name().into()),
+        place_right: Some(cause.placed.place),
+        name_or_unknown: Some(cause.placed.name_or_unknown),
+        wrong_name: Some(cause.placed.wrong_name),
         ..row(number, Some(cause.effect.clone()))
     });
     causes.collect()

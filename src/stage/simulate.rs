@@ -104,9 +104,9 @@ impl Stage for Simulate {
         if !(self.tracker.coverage > 0.0 && self.tracker.noise_um >= 0.0 && self.tracker.noise_um_per_m >= 0.0) {
             fault("tracker", "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2");
         }
-        let pace = self.climate.pace_s;
-        if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && self.climate.warm_up_h > 0.0) {
-            fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h above 0");
+        let Climate { pace_s: pace, warm_up_h, swing_h, .. } = self.climate;
+        if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && warm_up_h > 0.0 && swing_h > 0.0) {
+            fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0");
         }
         if let Some(way) = &self.motion {
             let positive = [way.rate_hz, way.speed_deg_s].iter().all(|value| *value > 0.0 && value.is_finite());

@@ -11,7 +11,7 @@ crate::table::rows! { "scoreboard",
         robot: String,
         /// Points to fit.
         points: i64,
-        /// Null where nothing is concealed, as are the next four.
+        /// Null where nothing is concealed, as are the next seven.
         effect: Option<String>,
         place: Option<String>,
         form: Option<String>,
@@ -19,6 +19,12 @@ crate::table::rows! { "scoreboard",
         visibility: Option<f64>,
         /// `exact`, `in_set`, `wrong`, `silent`.
         outcome: Option<String>,
+        /// The strongest finding but for faults of points is at its place.
+        place_right: Option<bool>,
+        /// Named rightly, or `unknown` at its place.
+        name_or_unknown: Option<bool>,
+        /// A name was given that is not there.
+        wrong_name: Option<bool>,
         /// The strongest finding that is not there; null without any.
         said: Option<String>,
         /// Findings that are not there.

@@ -2,6 +2,7 @@
 
 use super::arm::{Arm, Posture};
 use super::effect::{Physical, State};
+use super::matrix::{self, Matrix, Vector};
 use super::motion::Motion;
 use super::statics::{Loads, Row};
 
@@ -25,9 +26,9 @@ pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
     for _ in 0..ROUNDS {
         let held = hold(arm, row, motion);
         let mut next = Motion::none(arm.links.len());
-        let state = State { arm, row, posture: &held.0, loads: &held.1, torque: &held.2 };
-        for effect in effects {
-            effect.act(&state, &mut next);
+        for (index, effect) in effects.iter().enumerate() {
+            let memory = remembered(row, index);
+            effect.act(&State { arm, row, posture: &held.0, loads: &held.1, torque: &held.2, memory }, &mut next);
         }
         let change = next.distance(&held.3);
         motion = next;
@@ -37,6 +38,16 @@ pub fn settle(arm: &Arm, row: &Row, effects: &[Physical]) -> Equilibrium {
     }
     let (posture, _, torque, motion) = hold(arm, row, motion);
     Equilibrium { posture, motion, torque }
+}
+
+/// What the tracker reads of the measured point, m in its frame, without its noise; `base` is the base frame as it sees it at first.
+pub fn sighted(rest: &Equilibrium, base: &Matrix, row: &Row, effects: &[Physical]) -> Vector {
+    let there = matrix::place(&matrix::times(&rest.motion.tracker, base), rest.posture.tool);
+    effects.iter().enumerate().fold(there, |point, (index, effect)| effect.sight(row, remembered(row, index), point))
+}
+
+fn remembered(row: &Row, effect: usize) -> f64 {
+    row.memory.get(effect).copied().unwrap_or(0.0)
 }
 
 fn hold(arm: &Arm, row: &Row, motion: Motion) -> (Posture, Loads, Vec<f64>, Motion) {

@@ -10,6 +10,7 @@ use super::noise::{Noise, Purpose};
 use crate::robot::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// Which poses may be measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -55,18 +56,36 @@ pub struct Climate {
     pub rise_k: f64,
     /// Time constant of the warm-up, h.
     pub warm_up_h: f64,
+    /// A swing of the temperature on top, K, and its period, h: sun, doors, pauses.
+    #[serde(skip_serializing_if = "no_swing")]
+    pub swing_k: f64,
+    #[serde(skip_serializing_if = "usual_swing")]
+    pub swing_h: f64,
+}
+
+const SWING_H: f64 = 1.0;
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn no_swing(kelvin: &f64) -> bool {
+    *kelvin == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn usual_swing(hours: &f64) -> bool {
+    *hours == SWING_H
 }
 
 impl Default for Climate {
     fn default() -> Self {
-        Self { pace_s: [15.0, 25.0], start_c: 20.0, rise_k: 0.0, warm_up_h: 1.5 }
+        Self { pace_s: [15.0, 25.0], start_c: 20.0, rise_k: 0.0, warm_up_h: 1.5, swing_k: 0.0, swing_h: SWING_H }
     }
 }
 
 impl Climate {
     /// Temperature of the arm at a time, C.
     pub fn temperature(&self, time_s: f64) -> f64 {
-        self.start_c + self.rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp())
+        let warm = self.start_c + self.rise_k * (1.0 - (-time_s / (3600.0 * self.warm_up_h)).exp());
+        if self.swing_k == 0.0 { warm } else { warm + self.swing_k * (TAU * time_s / (3600.0 * self.swing_h)).sin() }
     }
 }
 

@@ -2,9 +2,10 @@
 //! the moving arm, on which statics hold all the same: it is slow against its own vibrations.
 
 use super::arm::Arm;
-use super::effect::{JointCompliance, Physical};
-use super::equilibrium::settle;
-use super::matrix::{self, Vector};
+use super::effect::{self, JointCompliance, Physical};
+use super::equilibrium::{settle, sighted};
+use super::matrix::Vector;
+use super::memory;
 use super::motion::Motion;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Block, Climate, Point, Poses};
@@ -78,6 +79,9 @@ impl Experiment<'_> {
             effect.shape(&mut arm);
         }
         let later: f64 = effects.iter().map(Physical::later).sum();
+        let times = (0..rows).map(|row| row as f64 / way.rate_hz);
+        let course = times.map(|time_s| (path.at(time_s + later).0, time_s, self.climate.temperature(time_s)));
+        let mut memories = effect::recall(&effects, &memory::along(course));
         let base = self.tracker.base();
         let mut beam = Beam::new(self.seed);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
@@ -103,9 +107,11 @@ impl Experiment<'_> {
             }
             let temperature_c = self.climate.temperature(time_s);
             let payload_kg = load.payload_kg;
-            let row = Row { command, drive, direction: direction.clone(), time_s, temperature_c, payload_kg, velocity };
+            let memory = std::mem::take(&mut memories[row]);
+            let direction = direction.clone();
+            let row = Row { command, drive, direction, time_s, temperature_c, payload_kg, velocity, memory };
             let rest = settle(&arm, &row, &effects);
-            let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            let seen = sighted(&rest, &base, &row, &effects);
             let before = q.clone();
             for effect in &effects {
                 effect.log(&mut q, &before);
@@ -137,17 +143,19 @@ impl Experiment<'_> {
         let mut beam = Beam::new(self.seed);
         let mut meter = Noise::new(self.seed, Purpose::Current);
         let mut play = Noise::new(self.seed, Purpose::Repeatability);
+        let memories = effect::recall(&effects, &memory::past(&points));
         let mut shots = Vec::with_capacity(points.len());
-        for point in points {
+        for (point, memory) in points.into_iter().zip(memories) {
             let mut drive = self.truth.drive(self.robot, &point.q);
             for ((position, sigma), link) in drive.iter_mut().zip(self.repeatability_arcsec).zip(&arm.links) {
                 *position += sigma * if link.revolute { ARCSEC } else { 1e-6 } * play.normal();
             }
             let Point { block, before, time_s, temperature_c, payload_kg, .. } = point;
             let direction = point.direction;
-            let row = Row { command: point.q, drive, direction, time_s, temperature_c, payload_kg, velocity: Vec::new() };
+            let velocity = Vec::new();
+            let row = Row { command: point.q, drive, direction, time_s, temperature_c, payload_kg, velocity, memory };
             let rest = settle(&arm, &row, &effects);
-            let seen = matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool);
+            let seen = sighted(&rest, &base, &row, &effects);
             let mut q = row.command;
             for effect in &effects {
                 effect.log(&mut q, &before);

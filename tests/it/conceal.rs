@@ -247,6 +247,45 @@ fn a_rival_and_a_run_of_links_count_as_the_set() {
     assert_eq!(board["shares"][1]["share"]["count"], 0, "what has the truth for a rival is no stray");
 }
 
+/// The share of due effects of which this holds, as count and of how many.
+fn placed(board: &Value, what: &str) -> (u64, u64) {
+    let share = &board["places"]["all"][what];
+    (share["count"].as_u64().expect("a count"), share["of"].as_u64().expect("a count"))
+}
+
+#[test]
+fn the_place_counts_apart_from_the_name_and_unknown_is_no_wrong_name() {
+    let score_of = |say: &dyn Fn(&Value) -> Vec<Value>| {
+        let root = tempfile::tempdir().expect("a folder");
+        let (set, verdicts) = judged(root.path(), say);
+        let board = score(&set, &verdicts);
+        let [place, name, wrong] = ["place", "name_or_unknown", "wrong_name"].map(|what| placed(&board, what));
+        assert!(place.1 >= 4 && place.1 == name.1 && place.1 == wrong.1, "{place:?}");
+        ([place.0, name.0, wrong.0], place.1)
+    };
+    let at_its_place = |effect: &str, truth: &Value| -> Vec<Value> {
+        let renamed = |name: &Value| json!({ "effect": effect, "where": name["where"], "rivals": [name] });
+        wanted(truth).iter().map(renamed).collect()
+    };
+    let (said, all) = score_of(&wanted);
+    assert_eq!(said, [all, all, 0]);
+    let (said, all) = score_of(&|truth| at_its_place("unknown", truth));
+    assert_eq!(said, [all, all, 0]);
+    // The true name for a rival saves the place and not the name.
+    let (said, all) = score_of(&|truth| at_its_place("no_such_effect", truth));
+    assert_eq!(said, [all, 0, all]);
+    let (said, all) = score_of(&|_| vec![json!({ "effect": "no_such_effect", "where": "joint 9" })]);
+    assert_eq!(said, [0, 0, all]);
+    let (said, _) = score_of(&|_| vec![json!({ "effect": "unknown", "where": "joint 9" })]);
+    assert_eq!(said, [0, 0, 0]);
+    // Faults of points have no place.
+    let (said, all) = score_of(&|truth| {
+        let fault = json!({ "effect": "outlier", "where": "recording" });
+        [fault].into_iter().chain(wanted(truth)).collect()
+    });
+    assert_eq!(said[..2], [all, all]);
+}
+
 #[test]
 fn one_changed_byte_breaks_the_seal() {
     let root = tempfile::tempdir().expect("a folder");

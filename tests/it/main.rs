@@ -10,6 +10,7 @@
 #[cfg(target_os = "linux")]
 mod alone;
 mod arms;
+mod beyond;
 mod bucket;
 mod check;
 mod circles;

@@ -49,7 +49,8 @@ fn lever() -> RobotDescription {
 
 fn row(q: &[f64], payload_kg: f64) -> Row {
     let direction = vec![1.0; q.len()];
-    Row { command: q.to_vec(), drive: q.to_vec(), direction, time_s: 0.0, temperature_c: 20.0, payload_kg, velocity: Vec::new() }
+    let (velocity, memory) = (Vec::new(), Vec::new());
+    Row { command: q.to_vec(), drive: q.to_vec(), direction, time_s: 0.0, temperature_c: 20.0, payload_kg, velocity, memory }
 }
 
 fn rest(robot: &RobotDescription, effects: &[Physical], q: &[f64], payload_kg: f64) -> Equilibrium {

@@ -119,6 +119,10 @@ class Arm:
             elif k == "thermal":
                 for link in e["links"]:
                     m.body_pos[self.kids[link]] *= 1 + size * row["warm"]
+            elif k == "link_state":
+                m.body_pos[self.kids[e["link"]]] *= 1 + size * e["state"][row["i"]]
+            elif k == "joint_state":
+                drive[j] += size * e["state"][row["i"]]
             elif k == "wobble":
                 side, turn = e["side"], e["order"] * q[j] + e["phase"]
                 d.qpos[self.at[f"{side}u{j}"]] += size * np.cos(turn)
@@ -178,10 +182,14 @@ class Arm:
         """Reflector in the base frame (m) and load torques at the joints (Nm)."""
         soft = self.set_row(row, effects)
         load = self.settle(soft)
-        gaps = [e for e in effects if e["kind"] == "gap"]
-        if gaps:
-            for e in gaps:
+        loaded = [e for e in effects if e["kind"] in ("gap", "torque_state")]
+        if loaded:
+            for e in loaded:
                 torque = load[self.at[f"q{e['joint']}"]]
+                if e["kind"] == "torque_state":
+                    held = e["full"] * np.tanh(torque / e["full"]) if e["full"] else torque
+                    self.data.qpos[self.at[f"q{e['joint']}"]] += e["size"] * e["state"][row["i"]] * held
+                    continue
                 side = np.sign(torque) if abs(torque) > e["friction"] else e["follow"] * row["dir"][e["joint"]]
                 self.data.qpos[self.at[f"q{e['joint']}"]] += e["size"] * side
             load = self.settle(soft)

@@ -1,5 +1,6 @@
 """Effects that mujoco_maker.py can conceal: how each is drawn, how large it must be to be seen, and what it is called."""
 from mujoco_arm import across, np, seen, unit
+from mujoco_beyond import BEYOND, read
 
 ARCSEC = np.pi / 180 / 3600
 
@@ -184,7 +185,7 @@ class Case:
     """What a family may ask when it draws an effect."""
 
     def __init__(self, rng, robot, arm, rows, torque):
-        self.rng, self.robot, self.arm, self.n = rng, robot, arm, arm.n
+        self.rng, self.robot, self.arm, self.n, self.rows = rng, robot, arm, arm.n, rows
         self.torque = np.abs(torque).max(0)
         self.carry = [j for j in range(self.n) if self.torque[j] > 0.03 * self.torque.max()]
         self.reach = np.linalg.norm(np.diff(np.vstack([arm.points, arm.tool]), axis=0), axis=1).sum()
@@ -212,6 +213,8 @@ def positions(arm, rows, effects, frames=False):
         if e["kind"] in ("base_step", "drift", "sway"):
             f = (t > e["time"]) if e["kind"] == "base_step" else (t / e["span"]) ** e["power"] if e["kind"] == "drift" else np.sin(2 * np.pi * t / e["period"] + e["phase"])
             P = P + (e["size"] * f)[:, None] * (np.array(e["way"]) + np.cross(e.get("turn", [0, 0, 0]), P))
+        if e["kind"] == "instrument":
+            P = read(P, e)
     return [P] + out[1:]
 
 
@@ -252,7 +255,7 @@ def conceal(rng, robot, arm, rows, family, jitter, least):
     """Draws effects until each is visible; makes them larger first."""
     arm.build([])
     case = Case(rng, robot, arm, rows, arm.run(rows, [])[1])
-    names = {**SINGLE, **OPEN}
+    names = {**SINGLE, **OPEN, **BEYOND}
     for _ in range(40):
         if family == "null":
             kinds = []
@@ -262,6 +265,8 @@ def conceal(rng, robot, arm, rows, family, jitter, least):
             kinds = [str(rng.choice(list(SINGLE)))]
         elif family == "open":
             kinds = [str(rng.choice(list(OPEN)))]
+        elif family == "beyond":
+            kinds = [str(rng.choice(list(BEYOND)))]
         else:
             kinds = family.split("+")
         effects = [e for kind in kinds for e in names[kind](case)]

@@ -7,6 +7,8 @@ Arms are rigid bodies on hinges in series: a driven one, elastic ones for gears,
 engine's static equilibrium under gravity, springs and tendons, so effects emerge; none is a column of a regression. Every arm has
 manufacturing errors (axes, points, zeros, ratios, couplings). A case folder holds robot.json, controller.csv and tracker.csv, the
 secret truth.json, and want.json with the effects' names (`accept` lists sets that the recording cannot tell from it).
+`--family beyond` draws instruments, memory and interactions (mujoco_beyond.py) in turn, with short moves, a swinging temperature, an arm of
+five joints, too, and a tracker that scatters in one of four ways. Robot files hold hinges only, so no arm stands on a track.
 Effects too small to matter are drawn larger: L = sum of squares / noise variance, after rigid geometry has absorbed what it can, is at
 least `--visible`, and stands in truth.json. Same seed, same bytes. Lengths mm in files, m in here; angles deg in files, rad in here.
 """
@@ -17,6 +19,7 @@ import json
 import pathlib
 
 from mujoco_arm import Arm, noise_sigma, np, unit
+from mujoco_beyond import BEYOND, SCATTERS, scatter
 from mujoco_effects import IN_TIME, OPEN, SINGLE, conceal, positions
 
 X, Y, Z = [1, 0, 0], [0, 1, 0], [0, 0, 1]
@@ -55,10 +58,19 @@ ROBOTS = {
         ratio=[179, 185, 171, 140, 126, 91], kt=[0.8, 0.85, 0.8, 0.5, 0.5, 0.45], payload=60, payload_com=[110, 25, 45],
         coupling=[[5, 4]], limits=[(-140, 140), (-70, 55), (-55, 95), (-160, 160), (-105, 105), (-170, 170)], stand=3.0, fine=3e-4),
 }
+# Beyond the list only: arms whose cases were drawn before stay as they were.
+FIVE = {
+    "five": dict(  # 8 kg, no turn of the forearm
+        axes=[Z, Y, Y, Y, X], points=[[0, 0, 0], [140, 0, 390], [140, 0, 890], [720, 0, 960], [720, 0, 960]],
+        tool=[865, 24, 975], mass=[48, 27, 17, 6, 1.6], com=[[80, 0, 240], [150, 35, 600], [300, -15, 930], [760, 0, 960], [835, 0, 960]],
+        ratio=[141, 161, 121, 101, 81], kt=[0.35, 0.35, 0.3, 0.2, 0.18], payload=8, payload_com=[40, 10, -15],
+        coupling=[], limits=[(-165, 165), (-60, 80), (-80, 65), (-115, 115), (-170, 170)], stand=2.0, fine=2e-4),
+}
 ROBOTS = {name: dict(robot, name=name) for name, robot in ROBOTS.items()}
+FIVE = {name: dict(robot, name=name) for name, robot in FIVE.items()}
 
 
-def record(rng, robot, count, span, jitter, repeats):
+def record(rng, robot, count, span, jitter, repeats, beyond=False):
     """Rows as the arm lived them: joints the controller logged, payload, time, warm-up, direction and length of the last move."""
     n, limits = len(robot["axes"]), np.radians(robot["limits"])
     first = count // 3
@@ -68,15 +80,21 @@ def record(rng, robot, count, span, jitter, repeats):
         for i in sorted(rng.choice(np.arange(1, count), count // 10, replace=False)):
             if i not in (first, 2 * first):
                 q[i], payload[i] = q[i - 1], payload[i - 1]
+    if beyond:  # short moves, in which memory shows
+        for i in range(1, count):
+            if i not in (first, 2 * first) and rng.random() < 0.35:
+                away = np.radians(np.exp(rng.uniform(np.log(0.2), np.log(6))))
+                q[i] = np.clip(q[i - 1] + rng.uniform(-away, away, n), limits[:, 0], limits[:, 1])
     q = np.radians(np.round(np.degrees(q), 4))
     time = np.round(np.cumsum(rng.uniform(0.65, 1.35, count)) * span / count, 2)
     tau, rise = rng.uniform(0.2, 0.6) * span, rng.uniform(8, 16)
+    swing, period, phase = (rng.uniform(2, 4), span / rng.uniform(2, 5), 0.0) if beyond else (0.0, 1.0, 0.0)  # else warmth is a function of time
     rows, way, before = [], np.ones(n), np.zeros(n)
     for i in range(count):
         move = q[i] - before
         way, before = np.where(move == 0, way, np.sign(move)), q[i]
         rows.append(dict(q=q[i], time=float(time[i]), payload=float(payload[i]), use="fit" if i < 2 * first else "validate", dir=way,
-                         move=move, warm=float(rise * (1 - np.exp(-time[i] / tau))), jitter=rng.normal(0, 1, n) * jitter))
+                         move=move, warm=float(rise * (1 - np.exp(-time[i] / tau)) + swing * np.sin(2 * np.pi * time[i] / period)), i=i, jitter=rng.normal(0, 1, n) * jitter))
     return rows
 
 
@@ -118,7 +136,8 @@ def make(folder, seed, robot, family, options):
     count = options.points or int(rng.integers(100, 261))
     jitter = options.jitter * 1e-6 if options.jitter is not None else float(rng.choice([0, rng.uniform(2e-6, 16e-6)]))
     repeats = rng.random() < 0.5
-    rows = record(rng, robot, count, rng.uniform(15, 24) * count, jitter, repeats)
+    beyond = family == "beyond" or bool(set(family.split("+")) & set(BEYOND))
+    rows = record(rng, robot, count, rng.uniform(15, 24) * count, jitter, repeats, beyond)
     arm = Arm(robot, rng)
     kinds, effects, visible, near = conceal(rng, robot, arm, rows, family, jitter, options.visible)
     P, load = positions(arm, rows, effects)
@@ -129,14 +148,20 @@ def make(folder, seed, robot, family, options):
             hidden.add("time")
         if set(kinds) & {"counterbalance", "cable", "hose"}:
             hidden.discard("current")
+        hidden -= {name for e in effects for name in e.get("needs", [])}
     # The tracker stands somewhere, upright within some milliradians, and looks at the reflector.
     a = rng.uniform(-np.pi, np.pi, 2)
     turn = np.array([[np.cos(a[0]), -np.sin(a[0]), 0], [np.sin(a[0]), np.cos(a[0]), 0], [0, 0, 1]])
     lean, sides = rng.normal(0, 3e-3, 2), np.eye(3)
     sides[0, 2], sides[2, 0], sides[1, 2], sides[2, 1] = lean[0], -lean[0], lean[1], -lean[1]
     turn = np.linalg.qr(sides @ turn)[0] * np.sign(np.diag(np.linalg.qr(sides @ turn)[1]))
-    P = P @ turn.T + np.array([np.cos(a[1]), np.sin(a[1]), 0]) * robot["stand"] * rng.uniform(0.8, 1.2) + [0, 0, rng.uniform(-1, 0.2)]
-    P = P + rng.normal(0, 1, P.shape) * noise_sigma(P)[:, None]
+    at = np.array([np.cos(a[1]), np.sin(a[1]), 0]) * robot["stand"] * rng.uniform(0.8, 1.2) + [0, 0, rng.uniform(-1, 0.2)]
+    for e in effects:
+        if "stand" in e:  # what is wrong with the instrument was drawn for where it stands
+            turn, at = np.array(e["stand"]["turn"]), np.array(e["stand"]["at"])
+    P = P @ turn.T + at
+    noise = options.scatter or (str(rng.choice(SCATTERS, p=[0.55, 0.15, 0.15, 0.15])) if beyond else "gaussian")
+    P = P + scatter(rng, P, noise_sigma(P), noise)
     outliers = options.outliers if options.outliers is not None else int(rng.choice([0, 1, 2], p=[0.88, 0.07, 0.05]))
     exchanged = options.exchanged if options.exchanged is not None else int(rng.random() < 0.06)
     spoiled = spoil(rng, P, rows, outliers, exchanged)
@@ -176,8 +201,8 @@ def make(folder, seed, robot, family, options):
     if "lag" in kinds and not outliers:  # nobody knows from where the arm came to the first point
         accept += [s + [("outlier", "recording")] + extra for s in sets]
     (folder / "want.json").write_text(json.dumps(dict(case=folder.name, effects=named(sets[0] + extra), accept=[named(s) for s in accept]), indent=1) + "\n")
-    truth = dict(label=folder.name, robot=robot["name"], seed=seed, family=family, kinds=kinds, effects=[dict(e, L=round(L, 1)) for e, L in zip(effects, visible)],
-                 hide=sorted(hidden), outliers=outliers, exchanged=exchanged, spoiled=[ids[i] for i in spoiled], jitter_rad=jitter, repeats=bool(repeats),
+    truth = dict(label=folder.name, robot=robot["name"], seed=seed, family=family, kinds=kinds, effects=[dict({k: v for k, v in e.items() if k != "state"}, L=round(L, 1)) for e, L in zip(effects, visible)],
+                 hide=sorted(hidden), outliers=outliers, exchanged=exchanged, spoiled=[ids[i] for i in spoiled], jitter_rad=jitter, **(dict(scatter=noise) if noise != "gaussian" else {}), repeats=bool(repeats),
                  points=count, friction_nm=friction, true=dict(axis=arm.axes, point=1e3 * arm.points, tool=1e3 * arm.tool, off=arm.zero, red=arm.scale,
                                                                cpl={f"{m}<-{b}": r for (m, b), r in arm.coupled.items()}))
     (folder / "truth.json").write_text(json.dumps(truth, indent=1, default=lambda x: x.tolist()) + "\n")
@@ -196,22 +221,25 @@ def main():
     p.add_argument("out", type=pathlib.Path)
     p.add_argument("--cases", type=int, default=10)
     p.add_argument("--seed", type=int, default=1)
-    p.add_argument("--family", default="single", help="null, single, pairs, open, all (every single in turn), or names joined by +: " + ", ".join([*SINGLE, *OPEN]))
-    p.add_argument("--robot", help="one of " + ", ".join(ROBOTS) + ", or a robot.json of your own, to which `limits` (deg, a pair a joint; default 110 both ways) and `stand` (m) may be added; default: any of them")
+    p.add_argument("--family", default="single", help="null, single, pairs, open, all (every single in turn), beyond (every one beyond the list in turn), or names joined by +: " + ", ".join([*SINGLE, *OPEN, *BEYOND]))
+    p.add_argument("--robot", help="one of " + ", ".join([*ROBOTS, *FIVE]) + ", or a robot.json of your own, to which `limits` (deg, a pair a joint; default 110 both ways) and `stand` (m) may be added; default: any of them")
     p.add_argument("--points", type=int, help="rows, a third of them for validation; default 100 to 260")
     p.add_argument("--hide", nargs="*", default=[], choices=["temp", "dir", "current", "time"], help="columns to leave out; default: some, at random")
     p.add_argument("--jitter", type=float, help="repeatability of each joint, urad; default: none in half of the cases, else 2 to 16")
+    p.add_argument("--scatter", choices=SCATTERS, help="how the tracker scatters; default: gaussian, beyond the list any of them")
     p.add_argument("--outliers", type=int)
     p.add_argument("--exchanged", type=int, help="pairs of points")
     p.add_argument("--visible", type=float, default=100, help="smallest L of every effect")
     options = p.parse_args()
-    if options.robot and options.robot not in ROBOTS:
+    arms = ROBOTS | FIVE if options.family == "beyond" or options.robot in FIVE else ROBOTS
+    if options.robot and options.robot not in arms:
         own = json.loads(pathlib.Path(options.robot).read_text())
         robots = [dict(stand=3.0, limits=[(-110, 110)] * len(own["axes"])) | own]
     else:
-        robots = [ROBOTS[options.robot]] if options.robot else list(ROBOTS.values())
+        robots = [arms[options.robot]] if options.robot else list(arms.values())
     for i in range(options.cases):
-        family = list(SINGLE)[i % len(SINGLE)] if options.family == "all" else options.family
+        turns = {"all": list(SINGLE), "beyond": list(BEYOND)}.get(options.family, [options.family])
+        family = turns[i % len(turns)]
         seed = options.seed * 100_000 + i
         robot = robots[int(np.random.default_rng([seed, 1]).integers(len(robots)))]
         kinds, effects, visible = make(options.out / f"m{seed}", seed, robot, family, options)

@@ -5,10 +5,10 @@ use super::super::{emit, emit_json};
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
-use crate::twin::conceal::family::FAMILIES;
-use crate::twin::conceal::robots::KINDS;
+use crate::twin::conceal::family::Collection;
+use crate::twin::conceal::robots::ALL_KINDS;
 use crate::twin::tracker::{SCATTERS, Scatter};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -22,7 +22,8 @@ use std::path::PathBuf;
   calib simulate conceal --out blind --seed 7 --cases 40 --nulls 0.25
   calib simulate conceal --out gears --cases 20 --family gear_cyclic,backlash --robot sr210d --points 200
   calib simulate conceal --out pairs --seed 3 --cases 30 --pairs 1
-  calib simulate conceal --out strange --cases 30 --open 1")]
+  calib simulate conceal --out strange --cases 30 --open 1
+  calib simulate conceal --out further --cases 30 --families beyond")]
 pub(super) struct ConcealArguments {
     /// The folder to make; it must not exist, or be empty
     #[arg(long, short, value_name = "DIR")]
@@ -33,10 +34,13 @@ pub(super) struct ConcealArguments {
     /// Recordings to make
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=9999))]
     cases: u32,
+    /// The list that effects are drawn from
+    #[arg(long, value_enum, value_name = "LIST", default_value_t = Families::Library)]
+    families: Families,
     /// Effects to draw from, by canonical name [default: all]
     #[arg(long, value_name = "EFFECT,..", value_delimiter = ',')]
     family: Vec<String>,
-    /// Robots to draw from: sr210d, compact6, seven7r [default: all]
+    /// Robots to draw from: sr210d, compact6, seven7r, five5r [default: the first three; beyond the library all]
     #[arg(long, value_name = "ROBOT,..", value_delimiter = ',')]
     robot: Vec<String>,
     /// Points to fit; 25 to 50 % of them are added to validate [default: 50 to 400]
@@ -61,7 +65,7 @@ pub(super) struct ConcealArguments {
     #[arg(long, value_name = "SHARE", default_value_t = 0.08)]
     faulty: f64,
     /// How trackers scatter: gaussian, student (heavy tails), uneven, wandering (0.9 from point to point), directional (2.5 to 1)
-    /// [default: gaussian, of nulls also student and uneven]
+    /// [default: gaussian, of nulls also student and uneven; beyond the library mostly gaussian]
     #[arg(long, value_name = "FORM")]
     scatter: Option<String>,
     /// As most cells have it: robot files without masses, nothing on the tool, no motor currents
@@ -76,6 +80,15 @@ pub(super) struct ConcealArguments {
     /// Prints one JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
+}
+
+/// The lists of effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Families {
+    /// Effects of the library, from hardly visible to plain
+    Library,
+    /// Instruments, memory and interactions: one cause a recording, L of 50 to 200
+    Beyond,
 }
 
 impl ConcealArguments {
@@ -120,12 +133,23 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
     if arguments.nulls + arguments.pairs + arguments.open > 1.0 + 1e-9 {
         faults.push(Fault::new("--nulls, --pairs, --open", "add up to more than 1"));
     }
-    let mut allowed: Vec<&str> = FAMILIES.iter().map(|family| family.name).collect();
-    allowed.dedup();
+    let collection = match arguments.families {
+        Families::Library => Collection::Library,
+        Families::Beyond => Collection::Beyond,
+    };
+    if collection == Collection::Beyond && arguments.pairs + arguments.open > 0.0 {
+        faults.push(Fault::new("--pairs, --open", "are of the library; with `--families beyond` every recording has one cause"));
+    }
+    let mut allowed: Vec<&str> = Vec::new();
+    for family in collection.families() {
+        if !allowed.contains(&family.name) {
+            allowed.push(family.name);
+        }
+    }
     for name in arguments.family.iter().filter(|name| !allowed.contains(&name.as_str())) {
         faults.push(unknown("--family", name, &allowed));
     }
-    let kinds: Vec<&str> = KINDS.iter().map(|kind| kind.name()).collect();
+    let kinds: Vec<&str> = ALL_KINDS.iter().map(|kind| kind.name()).collect();
     for name in arguments.robot.iter().filter(|name| !kinds.contains(&name.as_str())) {
         faults.push(unknown("--robot", name, &kinds));
     }
@@ -148,8 +172,9 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
     Ok(Design {
         seed: arguments.seed,
         cases: arguments.cases as usize,
+        collection,
         families: arguments.family.clone(),
-        robots: KINDS.into_iter().filter(|kind| arguments.robot.iter().any(|name| name == kind.name())).collect(),
+        robots: ALL_KINDS.into_iter().filter(|kind| arguments.robot.iter().any(|name| name == kind.name())).collect(),
         points: arguments.points.map(|points| points as usize),
         nulls: arguments.nulls,
         pairs: arguments.pairs,

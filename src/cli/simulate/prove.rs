@@ -18,7 +18,8 @@ use std::process::{Command, Stdio};
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate prove --out proof --seed 7 --cases 60 --nulls 0.2 --pairs 0.2 --open 0.1
-  calib simulate prove --out gears --cases 30 --family gear_cyclic,gear_motor_cyclic --json > score.json")]
+  calib simulate prove --out gears --cases 30 --family gear_cyclic,gear_motor_cyclic --json > score.json
+  calib simulate prove --out further --seed 7 --cases 300 --families beyond")]
 pub(super) struct ProveArguments {
     #[command(flatten)]
     conceal: ConcealArguments,

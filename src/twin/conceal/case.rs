@@ -1,31 +1,19 @@
 //! One concealed recording: a drawn robot, its errors, its effects sized to be as visible as drawn, and what was measured.
 
 use super::design::{Content, Design};
-use super::family::{Bench, Cause, Column, Draft, FAMILIES, Form};
+use super::family::{Bench, Collection, Column, Draft};
 use super::points::{self, Amount, FIT};
 use super::robots::Kind;
-use super::visible::{Shadow, Site, norm};
+use super::size::{Concealed, Sight, beyond, drafts, size};
+use super::visible::Site;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::twin::effect::{HoldingFriction, Physical};
 use crate::twin::noise::{Noise, Purpose};
 use crate::twin::plan::{Climate, Poses};
 use crate::twin::recorder::{Experiment, Motors, Shot};
-use crate::twin::tracker::{Scatter, Tracker};
+use crate::twin::tracker::{SCATTERS, Scatter, Tracker};
 use crate::twin::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
 use std::collections::BTreeSet;
-
-/// A cause with how visible it is at the points to fit.
-#[derive(Debug, Clone)]
-pub struct Concealed {
-    pub cause: Cause,
-    pub form: &'static str,
-    /// Root mean square of its displacement per axis, mm: all of it, and what geometry and the other causes leave.
-    pub raw_mm: f64,
-    pub visible_mm: f64,
-    /// Squared visible displacement over the noise's variance, `3 N SNR^2`: beside the other causes, and with geometry alone.
-    pub strength: f64,
-    pub strength_alone: f64,
-}
 
 /// A recording that was tampered with.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +28,7 @@ pub struct Tampering {
 pub struct Case {
     pub name: String,
     pub content: Content,
+    pub collection: Collection,
     pub seed: u64,
     pub kind: Kind,
     pub robot: RobotDescription,
@@ -67,6 +56,8 @@ pub struct Case {
 
 /// Standard deviation of the thermometer, K.
 const THERMOMETER_K: f64 = 0.15;
+/// Share of points that are approached from near by, where memory is to be seen.
+const NEAR: f64 = 0.35;
 
 impl Case {
     /// The case of this number; fails with what is wrong where no pose is allowed.
@@ -80,28 +71,46 @@ impl Case {
         let robot = kind.description(aside);
         let truth = errors(&robot, &mut draw);
         let tracker = tracker(kind, content == Content::Null, &mut draw);
-        let tracker = Tracker { scatter: design.scatter.unwrap_or(tracker.scatter), ..tracker };
+        let beyond_list = design.collection == Collection::Beyond;
+        let scatter = design.scatter.or_else(|| beyond_list.then(|| scatter(&mut draw)));
+        let tracker = Tracker { scatter: scatter.unwrap_or(tracker.scatter), ..tracker };
         let (play_rad, repeated) = if draw.chance(0.5) { (1e-6 * draw.uniform(4.0, 16.0), 0.1) } else { (0.0, 0.0) };
         let fit = design.points.unwrap_or_else(|| draw.size(50.0, 400.0).round() as usize);
         let validate = (draw.uniform(0.25, 0.5) * fit as f64).round().max(1.0) as usize;
-        let climate = Climate {
-            pace_s: [12.0, 26.0],
-            start_c: 20.0,
-            rise_k: 15.0,
-            // Two time constants in a recording, more or less.
-            warm_up_h: (fit + validate) as f64 * 19.0 / draw.uniform(1.5, 3.5) / 3600.0,
+        let lasts_s = (fit + validate) as f64 * 19.0;
+        // Two time constants in a recording, more or less.
+        let warm_up_h = lasts_s / draw.uniform(1.5, 3.5) / 3600.0;
+        let climate = Climate { pace_s: [12.0, 26.0], start_c: 20.0, rise_k: 15.0, warm_up_h, ..Climate::default() };
+        // Else temperature is a function of time, and what lags it another one.
+        let swing = |draw: &mut Noise| Climate {
+            swing_k: draw.uniform(2.0, 4.0),
+            swing_h: lasts_s / draw.uniform(2.0, 5.0) / 3600.0,
+            ..climate.clone()
         };
+        let climate = if beyond_list { swing(&mut draw) } else { climate };
         let ranges: Vec<[f64; 2]> =
             robot.joints.iter().map(|joint| narrowed(joint.limits.unwrap_or_default(), &mut draw)).collect();
-        let points = points::plan(kind, &ranges, Amount { fit, validate, repeated, loaded: !design.bare }, &climate, seed)?;
+        let points = points::plan(
+            kind,
+            &ranges,
+            Amount { fit, validate, repeated, near: if beyond_list { NEAR } else { 0.0 }, loaded: !design.bare },
+            &climate,
+            seed,
+        )?;
         let to_fit = &points[..fit.min(points.len())];
         let site = Site { robot: &robot, truth: &truth, tracker: &tracker, points: to_fit };
         let held_out = Site { points: &points[fit.min(points.len())..], ..site };
         let noise_mm = [&site, &held_out].map(|site| 1e3 * site.noise(play_rad));
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
-        let drafts = drafts(design, content, &bench, &mut draw);
-        let concealed = size(design, &drafts, &site, &shadow, 1e-3 * noise_mm[0], &mut draw);
+        let sight = Sight { site: &site, shadow: &shadow, noise: 1e-3 * noise_mm[0] };
+        let (drafts, concealed) = if beyond_list {
+            beyond(design, content, &bench, &sight, &mut draw)
+        } else {
+            let drafts = drafts(design, content, &bench, &mut draw);
+            let concealed = size(design, &drafts, &sight, &mut draw);
+            (drafts, concealed)
+        };
         let mut hidden = hidden(&drafts, &mut draw);
         hidden.extend(design.bare.then_some(Column::Current));
 
@@ -132,6 +141,7 @@ impl Case {
         Ok(Case {
             name: format!("c{:04}", number + 1),
             content,
+            collection: design.collection,
             seed,
             kind,
             accepted: drafts.iter().flat_map(|draft| draft.accepted.clone()).collect(),
@@ -228,6 +238,12 @@ fn tracker(kind: Kind, null: bool, draw: &mut Noise) -> Tracker {
     }
 }
 
+/// Mostly Gaussian, else one of the other kinds.
+fn scatter(draw: &mut Noise) -> Scatter {
+    let (plain, other) = (draw.chance(0.6), draw.index(SCATTERS.len() - 1));
+    if plain { Scatter::Gaussian } else { SCATTERS[1 + other] }
+}
+
 /// Rounds angles (rad) of revolute joints to whole steps, as a controller's log does.
 fn round(q: &mut [f64], robot: &RobotDescription, step_deg: f64) {
     let step = step_deg.to_radians();
@@ -241,92 +257,6 @@ fn narrowed(limits: [f64; 2], draw: &mut Noise) -> [f64; 2] {
     let (free, place) = (draw.uniform(0.75, 1.0), draw.uniform(0.0, 1.0));
     let from = lower + place * (1.0 - free) * (upper - lower);
     [from.round(), (from + free * (upper - lower)).round()]
-}
-
-/// Draws the families of a case; a pair does not sit twice in one place.
-fn drafts(design: &Design, content: Content, bench: &Bench, draw: &mut Noise) -> Vec<Draft> {
-    let rows = match content {
-        Content::Null => vec![],
-        Content::Single(row) => vec![row],
-        Content::Pair(first, second) => vec![first, second],
-    };
-    let mut out: Vec<Draft> = Vec::new();
-    for row in rows {
-        for _ in 0..50 {
-            let form = if draw.chance(design.other_forms) { Form::Other } else { Form::Obvious };
-            let Some(draft) = (FAMILIES[row].draw)(bench, form, draw) else { continue };
-            let taken = |place: &str| out.iter().flat_map(|other| &other.causes).any(|cause| cause.place == place);
-            let several = matches!(content, Content::Pair(..)) && draft.causes.len() > 1;
-            if !several && !draft.causes.iter().any(|cause| taken(&cause.place)) {
-                out.push(draft);
-                break;
-            }
-        }
-    }
-    out
-}
-
-/// A visibility to aim at: mostly 50 to 1000, some hardly there, some plain.
-fn aim(draw: &mut Noise) -> f64 {
-    match draw.uniform(0.0, 1.0) {
-        u if u < 0.1 => draw.size(1.0, 5.0),
-        u if u < 0.25 => draw.size(5.0, 50.0),
-        u if u < 0.85 => draw.size(50.0, 1000.0),
-        _ => draw.size(1000.0, PLAINEST),
-    }
-}
-
-/// The largest visibility of an effect whose size may be changed.
-const PLAINEST: f64 = 5000.0;
-/// Bounds of the factor on a natural size.
-const SMALLEST: f64 = 2e-3;
-const LARGEST: f64 = 4.0;
-
-/// Gives the causes their size and says how visible they are then.
-fn size(design: &Design, drafts: &[Draft], site: &Site, shadow: &Shadow, noise: f64, draw: &mut Noise) -> Vec<Concealed> {
-    let mut causes: Vec<(Cause, &'static str)> =
-        drafts.iter().flat_map(|draft| draft.causes.iter().map(|cause| (cause.clone(), draft.form))).collect();
-    let strength = |column: &[f64]| (norm(column) / noise).powi(2);
-    for index in 0..causes.len() {
-        let natural = draw.chance(design.natural);
-        let wanted = aim(draw);
-        if !causes[index].0.sized {
-            continue;
-        }
-        let found = strength(&shadow.outside(alone(&causes, index, site))).max(1e-9);
-        // What is of natural size stays so, but where it would be too plain to test anything.
-        let wanted = if natural { found.min(PLAINEST) } else { wanted };
-        let factor = (wanted / found).sqrt().clamp(SMALLEST, LARGEST);
-        let cause = &mut causes[index].0;
-        cause.physical = cause.physical.iter().map(|effect| effect.scaled(factor)).collect();
-    }
-    let columns: Vec<Vec<f64>> = (0..causes.len()).map(|index| alone(&causes, index, site)).collect();
-    let rms = |column: &[f64]| 1e3 * norm(column) / (column.len().max(1) as f64).sqrt();
-    (causes.into_iter().enumerate())
-        .map(|(index, (cause, form))| {
-            let mut beside = shadow.clone();
-            columns.iter().enumerate().filter(|(other, _)| *other != index).for_each(|(_, column)| beside.add(column.clone()));
-            let left = beside.outside(columns[index].clone());
-            Concealed {
-                cause,
-                form,
-                raw_mm: rms(&columns[index]),
-                visible_mm: rms(&left),
-                strength: strength(&left),
-                strength_alone: strength(&shadow.outside(columns[index].clone())),
-            }
-        })
-        .collect()
-}
-
-/// What one cause does beside all others: the displacement with all of them less that without it, m.
-fn alone(causes: &[(Cause, &'static str)], index: usize, site: &Site) -> Vec<f64> {
-    let effects = |skipped: Option<usize>| -> Vec<Physical> {
-        let kept = causes.iter().enumerate().filter(|(other, _)| Some(*other) != skipped);
-        kept.flat_map(|(_, (cause, _))| cause.physical.clone()).collect()
-    };
-    let (with, without) = (site.displacement(&effects(None)), site.displacement(&effects(Some(index))));
-    with.iter().zip(&without).map(|(with, without)| with - without).collect()
 }
 
 /// Columns that the recording lacks: what a form takes away, and now and then one that it can do without.

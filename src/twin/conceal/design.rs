@@ -1,7 +1,7 @@
 //! What a set of concealed recordings is drawn from, and which kind each of its cases is.
 
-use super::family::{FAMILIES, Family};
-use super::robots::{KINDS, Kind};
+use super::family::{Collection, Family};
+use super::robots::Kind;
 use crate::twin::noise::{Noise, Purpose};
 use crate::twin::tracker::Scatter;
 
@@ -10,7 +10,8 @@ use crate::twin::tracker::Scatter;
 pub struct Design {
     pub seed: u64,
     pub cases: usize,
-    /// Canonical names that single effects and pairs are drawn from; empty: all but `unknown`.
+    pub collection: Collection,
+    /// Canonical names that single effects and pairs are drawn from; empty: all, of the library but `unknown`.
     pub families: Vec<String>,
     /// Empty: all.
     pub robots: Vec<Kind>,
@@ -39,6 +40,7 @@ impl Default for Design {
         Self {
             seed: 1,
             cases: 20,
+            collection: Collection::Library,
             families: Vec::new(),
             robots: Vec::new(),
             points: None,
@@ -59,7 +61,7 @@ impl Default for Design {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Content {
     Null,
-    /// One effect of this row of the families.
+    /// One effect of this row of the collection's families.
     Single(usize),
     Pair(usize, usize),
 }
@@ -68,15 +70,16 @@ impl Design {
     /// Rows of the families that single effects are drawn from.
     fn listed(&self) -> Vec<usize> {
         let chosen = |family: &Family| match self.families.is_empty() {
-            true => family.name != "unknown",
+            true => self.collection == Collection::Beyond || family.name != "unknown",
             false => self.families.iter().any(|name| name == family.name),
         };
-        (0..FAMILIES.len()).filter(|row| chosen(&FAMILIES[*row])).collect()
+        let families = self.collection.families();
+        (0..families.len()).filter(|row| chosen(&families[*row])).collect()
     }
 
     /// Robots to draw from.
     pub fn kinds(&self) -> Vec<Kind> {
-        if self.robots.is_empty() { KINDS.to_vec() } else { self.robots.clone() }
+        if self.robots.is_empty() { self.collection.robots().to_vec() } else { self.robots.clone() }
     }
 
     /// What every case conceals: shares kept exactly, families in turn, in an order that says nothing.
@@ -84,8 +87,9 @@ impl Design {
         let mut draw = Noise::new(self.seed, Purpose::Design);
         let count = |share: f64| (share * self.cases as f64).round() as usize;
         let listed = self.listed();
-        let open: Vec<usize> = (0..FAMILIES.len()).filter(|row| FAMILIES[*row].name == "unknown").collect();
-        let paired: Vec<usize> = listed.iter().copied().filter(|row| FAMILIES[*row].paired).collect();
+        let families = self.collection.families();
+        let open: Vec<usize> = (0..families.len()).filter(|row| families[*row].name == "unknown").collect();
+        let paired: Vec<usize> = listed.iter().copied().filter(|row| families[*row].paired).collect();
         let mut out = vec![Content::Null; count(self.nulls).min(self.cases)];
         let room = |out: &Vec<Content>, wanted: usize| wanted.min(self.cases - out.len());
         for turn in 0..room(&out, count(self.open)) {

@@ -4,10 +4,14 @@
 //! they are. Names and places are the canonical ones.
 
 mod gears;
+mod instruments;
+mod interactions;
 mod loads;
+mod memories;
 mod mounts;
 mod unlisted;
 
+use super::robots::{ALL_KINDS, KINDS, Kind};
 use crate::robot::description::RobotDescription;
 use crate::twin::arm::Arm;
 use crate::twin::effect::Physical;
@@ -130,6 +134,7 @@ impl<'a> Bench<'a> {
                 temperature_c: point.temperature_c,
                 payload_kg: point.payload_kg,
                 velocity: Vec::new(),
+                memory: Vec::new(),
             };
             let rest = settle(&arm, &row, &[]);
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
@@ -234,3 +239,50 @@ pub const FAMILIES: &[Family] = &[
     Family { name: "unknown", draw: unlisted::product, paired: false },
     Family { name: "unknown", draw: unlisted::sway, paired: false },
 ];
+
+/// Families of physics that no list of effects holds yet: instruments, memory, interactions.
+pub const BEYOND: &[Family] = &[
+    Family { name: "tracker_circle", draw: instruments::circle, paired: false },
+    Family { name: "tracker_elevation", draw: instruments::elevation, paired: false },
+    Family { name: "tracker_offset", draw: instruments::offset, paired: false },
+    Family { name: "tracker_refraction", draw: instruments::refraction, paired: false },
+    Family { name: "unknown", draw: instruments::swing, paired: false },
+    Family { name: "base_shift", draw: instruments::knock, paired: false },
+    Family { name: "presliding", draw: memories::presliding, paired: false },
+    Family { name: "joint_warming", draw: memories::own_heat, paired: false },
+    Family { name: "joint_warming", draw: memories::late_heat, paired: false },
+    Family { name: "thermal_growth", draw: memories::lagging_link, paired: false },
+    Family { name: "gear_load", draw: interactions::gear_load, paired: false },
+    Family { name: "gear_flank", draw: interactions::gear_flank, paired: false },
+    Family { name: "joint_warming", draw: interactions::warm_ratio, paired: false },
+    Family { name: "joint_warming", draw: interactions::warm_spring, paired: false },
+    Family { name: "backlash", draw: interactions::spring_by_direction, paired: false },
+    Family { name: "backlash", draw: interactions::growing_gap, paired: false },
+    Family { name: "unknown", draw: interactions::bent_link, paired: false },
+];
+
+/// What a set of recordings is drawn from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Collection {
+    /// [`FAMILIES`] on the robots of [`KINDS`].
+    #[default]
+    Library,
+    /// [`BEYOND`], one plain cause a recording, on an arm of five joints, too.
+    Beyond,
+}
+
+impl Collection {
+    pub fn families(self) -> &'static [Family] {
+        match self {
+            Self::Library => FAMILIES,
+            Self::Beyond => BEYOND,
+        }
+    }
+
+    pub fn robots(self) -> &'static [Kind] {
+        match self {
+            Self::Library => &KINDS,
+            Self::Beyond => &ALL_KINDS,
+        }
+    }
+}

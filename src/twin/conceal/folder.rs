@@ -1,9 +1,10 @@
 //! A case as text: what the user has (robot.json, controller.csv, tracker.csv), and the truth that is sealed apart.
 
-use super::case::{Case, Concealed};
+use super::case::Case;
 use super::design::Content;
-use super::family::{Column, FAMILIES};
+use super::family::Column;
 use super::points::FIT;
+use super::size::Concealed;
 use crate::robot::description::RobotDescription;
 use crate::twin::effect::Physical;
 use crate::twin::folder::{Decimals, Log, robot};
@@ -41,11 +42,12 @@ impl Case {
             let points: Vec<String> = one.rows.iter().map(|row| id(*row)).collect();
             json!({ "effect": one.effect, "where": "recording", "points": points })
         });
+        let families = self.collection.families();
         let (family, content) = match self.content {
             Content::Null => (String::new(), "null"),
-            Content::Single(row) if FAMILIES[row].name == "unknown" => ("unknown".into(), "open"),
-            Content::Single(row) => (FAMILIES[row].name.into(), "single"),
-            Content::Pair(a, b) => (format!("{}+{}", FAMILIES[a].name, FAMILIES[b].name), "pair"),
+            Content::Single(row) if families[row].name == "unknown" => ("unknown".into(), "open"),
+            Content::Single(row) => (families[row].name.into(), "single"),
+            Content::Pair(a, b) => (format!("{}+{}", families[a].name, families[b].name), "pair"),
         };
         pretty(&json!({
             "case": self.name,
@@ -120,7 +122,7 @@ fn effect(one: &Concealed) -> Value {
         .iter()
         .flat_map(Physical::truth)
         .map(|number| json!({ "name": number.name, "value": number.value, "unit": number.unit }));
-    json!({
+    let mut out = json!({
         "effect": one.cause.effect,
         "where": one.cause.place,
         "form": one.form,
@@ -131,5 +133,9 @@ fn effect(one: &Concealed) -> Value {
         "visible_rms_mm": one.visible_mm,
         "parameters": numbers.collect::<Vec<_>>(),
         "physical": one.cause.physical,
-    })
+    });
+    if one.strange {
+        out["strange"] = json!(true);
+    }
+    out
 }

@@ -1,8 +1,10 @@
 //! Concealed recordings: a seed draws a robot, its errors and what physics is hidden in it; the truth is sealed apart.
 //!
 //! `design` says what is drawn, [`family`] which effects there are and in which forms, `points` what is measured, [`visible`] how much
-//! of an effect is left when geometry has absorbed what it can, [`case`] makes one recording of it and `folder` writes it down.
-//! Adding a family: a function in `family/` and a line in [`family::FAMILIES`].
+//! of an effect is left when geometry has absorbed what it can, [`size`] how large it is made, [`case`] makes one recording of it and
+//! `folder` writes it down.
+//! Adding a family: a function in `family/` and a line in [`family::FAMILIES`], or in [`family::BEYOND`] for what no library
+//! of effects holds yet.
 
 pub mod case;
 pub mod design;
@@ -10,4 +12,5 @@ pub mod family;
 pub mod folder;
 pub mod points;
 pub mod robots;
+pub mod size;
 pub mod visible;

@@ -17,6 +17,8 @@ pub struct Amount {
     pub validate: usize,
     /// Share of points that repeat the one before.
     pub repeated: f64,
+    /// Share of points that are approached from near by.
+    pub near: f64,
     /// Whether half of the points carry the full payload.
     pub loaded: bool,
 }
@@ -48,7 +50,11 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
         let (q, before) = match again {
             Some(last) => (last.q.clone(), last.before.clone()),
             None => {
-                let (q, _) = plan::allowed(&arm, &poses, &ranges, &mut draw)?;
+                let close = match out.last() {
+                    Some(last) if amount.near > 0.0 && draw.chance(amount.near) => Some(around(&last.q, &ranges, &mut draw)),
+                    _ => None,
+                };
+                let (q, _) = plan::allowed(&arm, &poses, close.as_ref().unwrap_or(&ranges), &mut draw)?;
                 let q = q.iter().map(|angle| ((angle.to_degrees() / STEP_DEG).round() * STEP_DEG).to_radians()).collect();
                 (q, out.last().map_or_else(|| vec![0.0; ranges.len()], |last| last.q.clone()))
             }
@@ -57,4 +63,13 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
         out.push(Point { block, q, before, direction, time_s: time, temperature_c, payload_kg });
     }
     Ok(out)
+}
+
+/// Shortest and longest of the short moves, deg.
+const SHORT_DEG: [f64; 2] = [0.2, 6.0];
+
+/// The part of the ranges that a short move reaches, rad.
+fn around(q: &[f64], ranges: &[[f64; 2]], draw: &mut Noise) -> Vec<[f64; 2]> {
+    let away = draw.size(SHORT_DEG[0], SHORT_DEG[1]).to_radians();
+    q.iter().zip(ranges).map(|(q, [low, high])| [(q - away).max(*low), (q + away).min(*high)]).collect()
 }

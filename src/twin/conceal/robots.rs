@@ -1,4 +1,4 @@
-//! The three robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
+//! The robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
 
 use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 
@@ -11,9 +11,13 @@ pub enum Kind {
     Compact6,
     /// 12 kg, 7R, alternating axes.
     Seven7r,
+    /// 20 kg, 5R: base, shoulder, elbow, pitch and roll of the hand.
+    Five5r,
 }
 
+/// Those that recordings with effects of the library are made of.
 pub const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r];
+pub const ALL_KINDS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 
 /// Joint by joint: axis, point on it (mm), mass (kg), its centre (mm), gear, Nm/A, range of measurement (deg).
 type Row = ([f64; 3], [f64; 3], f64, [f64; 3], f64, f64, [f64; 2]);
@@ -52,12 +56,21 @@ const SEVEN7R: [Row; 7] = [
     (Z, [0.0, 0.0, 1266.0], 0.6, [0.0, 0.0, 1266.0], 160.0, 0.1, [-165.0, 165.0]),
 ];
 
+const FIVE5R: [Row; 5] = [
+    (Z, [0.0, 0.0, 0.0], 62.0, [90.0, 0.0, 260.0], 141.0, 0.4, [-165.0, 165.0]),
+    (Y, [160.0, 0.0, 430.0], 34.0, [180.0, 40.0, 690.0], 161.0, 0.4, [-60.0, 80.0]),
+    (Y, [160.0, 0.0, 1030.0], 21.0, [330.0, -20.0, 1090.0], 141.0, 0.35, [-80.0, 65.0]),
+    (Y, [860.0, 0.0, 1130.0], 7.5, [905.0, 0.0, 1130.0], 101.0, 0.22, [-115.0, 115.0]),
+    (X, [860.0, 0.0, 1130.0], 2.1, [975.0, 0.0, 1130.0], 81.0, 0.2, [-170.0, 170.0]),
+];
+
 impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Kind::Sr210d => "sr210d",
             Kind::Compact6 => "compact6",
             Kind::Seven7r => "seven7r",
+            Kind::Five5r => "five5r",
         }
     }
 
@@ -67,6 +80,7 @@ impl Kind {
             Kind::Sr210d => (&SR210D, [1854.0, 0.0, 1310.0], 210.0, [170.0, 35.0, 55.0]),
             Kind::Compact6 => (&COMPACT6, [1184.3, 256.0, 11.6], 10.0, [20.0, 55.0, -12.0]),
             Kind::Seven7r => (&SEVEN7R, [0.0, 0.0, 1296.0], 12.0, [12.0, 10.0, 40.0]),
+            Kind::Five5r => (&FIVE5R, [1010.0, 0.0, 1130.0], 20.0, [45.0, 15.0, -20.0]),
         };
         let metres = |v: [f64; 3]| v.map(|x| 1e-3 * x);
         let joints =
@@ -101,6 +115,7 @@ impl Kind {
             Kind::Sr210d => [-200.0, 500.0],
             Kind::Compact6 => [20.0, 150.0],
             Kind::Seven7r => [50.0, 100.0],
+            Kind::Five5r => [50.0, 200.0],
         }
     }
 
@@ -110,6 +125,7 @@ impl Kind {
             Kind::Sr210d => 2.7,
             Kind::Compact6 => 1.3,
             Kind::Seven7r => 0.95,
+            Kind::Five5r => 1.6,
         }
     }
 }

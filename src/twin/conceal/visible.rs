@@ -3,9 +3,10 @@
 
 use crate::robot::description::RobotDescription;
 use crate::twin::arm::Arm;
-use crate::twin::effect::Physical;
-use crate::twin::equilibrium::settle;
+use crate::twin::effect::{self, Physical};
+use crate::twin::equilibrium::{settle, sighted};
 use crate::twin::matrix;
+use crate::twin::memory;
 use crate::twin::motion::Motion;
 use crate::twin::plan::Point;
 use crate::twin::statics::Row;
@@ -43,7 +44,8 @@ impl Site<'_> {
         let mut arm = Arm::new(self.robot, self.truth);
         effects.iter().for_each(|effect| effect.shape(&mut arm));
         let base = self.tracker.base();
-        let seen = self.points.iter().flat_map(|point| {
+        let memories = effect::recall(effects, &memory::past(self.points));
+        let seen = self.points.iter().zip(memories).flat_map(|(point, memory)| {
             let row = Row {
                 command: point.q.clone(),
                 drive: self.truth.drive(self.robot, &point.q),
@@ -52,9 +54,10 @@ impl Site<'_> {
                 temperature_c: point.temperature_c,
                 payload_kg: point.payload_kg,
                 velocity: Vec::new(),
+                memory,
             };
             let rest = settle(&arm, &row, effects);
-            matrix::place(&matrix::times(&rest.motion.tracker, &base), rest.posture.tool)
+            sighted(&rest, &base, &row, effects)
         });
         let bare = self.bare(self.truth, self.tracker, effects);
         seen.zip(bare).map(|(seen, bare)| seen - bare).collect()

@@ -4,6 +4,7 @@
 
 mod axis_wobble;
 mod backlash;
+mod backlash_growth;
 mod base_compliance;
 mod base_shift;
 mod base_sway;
@@ -12,27 +13,40 @@ mod counterbalance;
 mod gear_cyclic;
 mod gear_eccentricity;
 mod gear_flank;
+mod gear_load;
 mod holding_friction;
 mod joint_bump;
 mod joint_compliance;
 mod joint_hardening;
 mod joint_hinge;
+mod joint_hysteresis;
 mod joint_log_lag;
 mod joint_product;
+mod joint_warming;
 mod link_compliance;
 mod link_hinge;
 mod link_mass;
 mod payload_error;
+mod presliding;
+mod thermal_bow;
 mod thermal_growth;
+mod thermal_lag;
 mod thermal_warm_up;
 mod tool_shift;
+mod tracker_circle;
 mod tracker_drift;
+mod tracker_elevation;
+mod tracker_knock;
+mod tracker_offset;
+mod tracker_refraction;
 mod tracker_scale;
+mod tracker_sway;
 mod viscous_windup;
 mod zero_shift;
 
 pub use axis_wobble::AxisWobble;
 pub use backlash::Backlash;
+pub use backlash_growth::BacklashGrowth;
 pub use base_compliance::BaseCompliance;
 pub use base_shift::BaseShift;
 pub use base_sway::BaseSway;
@@ -41,26 +55,40 @@ pub use counterbalance::{Balancer, Counterbalance};
 pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
 pub use gear_eccentricity::GearEccentricity;
 pub use gear_flank::GearFlank;
+pub use gear_load::GearLoad;
 pub use holding_friction::HoldingFriction;
 pub use joint_bump::JointBump;
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::{Curve, JointHardening};
 pub use joint_hinge::JointHinge;
+pub use joint_hysteresis::JointHysteresis;
 pub use joint_log_lag::JointLogLag;
 pub use joint_product::JointProduct;
+pub use joint_warming::{Heat, JointWarming};
 pub use link_compliance::LinkCompliance;
 pub use link_hinge::LinkHinge;
 pub use link_mass::LinkMass;
 pub use payload_error::PayloadError;
+pub use presliding::Presliding;
+pub use thermal_bow::ThermalBow;
 pub use thermal_growth::ThermalGrowth;
+pub use thermal_lag::ThermalLag;
 pub use thermal_warm_up::ThermalWarmUp;
 pub use tool_shift::ToolShift;
+pub use tracker_circle::{Circle, TrackerCircle};
 pub use tracker_drift::{Course, TrackerDrift};
+pub use tracker_elevation::TrackerElevation;
+pub use tracker_knock::TrackerKnock;
+pub use tracker_offset::TrackerOffset;
+pub use tracker_refraction::TrackerRefraction;
 pub use tracker_scale::TrackerScale;
+pub use tracker_sway::TrackerSway;
 pub use viscous_windup::ViscousWindup;
 pub use zero_shift::ZeroShift;
 
 use super::arm::{Arm, Posture};
+use super::matrix::Vector;
+use super::memory::Moment;
 use super::motion::Motion;
 use super::statics::{Loads, Row};
 use super::true_value::{TrueValue, true_value};
@@ -75,6 +103,8 @@ pub struct State<'a> {
     pub loads: &'a Loads,
     /// Torque of gravity and of other loads on each joint, Nm.
     pub torque: &'a [f64],
+    /// What this effect makes of the rows before.
+    pub memory: f64,
 }
 
 /// An effect of the twin.
@@ -83,6 +113,14 @@ trait Act {
     fn act(&self, state: &State, motion: &mut Motion);
     /// Changes what the arm is for the whole recording: masses and centres.
     fn shape(&self, _arm: &mut Arm) {}
+    /// What it makes of the rows before at each of them, the row itself included; empty: it has no memory.
+    fn remember(&self, _past: &[Moment]) -> Vec<f64> {
+        Vec::new()
+    }
+    /// What the tracker reads of a point, m in its frame.
+    fn sight(&self, _row: &Row, _memory: f64, point: Vector) -> Vector {
+        point
+    }
     /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
     fn log(&self, _q: &mut [f64], _before: &[f64]) {}
     /// How much later than the joints beside it a point is measured, s.
@@ -178,6 +216,32 @@ physical! {
     ToolShift,
     /// A joint trails behind while it turns.
     ViscousWindup,
+    /// Lost motion that grows with time.
+    BacklashGrowth,
+    /// Run-out that grows with the load.
+    GearLoad,
+    /// Wind-up that depends on the direction of approach.
+    JointHysteresis,
+    /// A joint that is warm by its own work or with the arm.
+    JointWarming,
+    /// Lost motion that builds up over a travel.
+    Presliding,
+    /// A bent link grows with temperature.
+    ThermalBow,
+    /// A link grows with a temperature that lags.
+    ThermalLag,
+    /// The tracker's horizontal circle is off.
+    TrackerCircle,
+    /// The tracker's head is off in elevation.
+    TrackerElevation,
+    /// The tracker's stand is knocked.
+    TrackerKnock,
+    /// The tracker's ranges are off.
+    TrackerOffset,
+    /// The tracker's ranges grow with the air's temperature.
+    TrackerRefraction,
+    /// The tracker's stand swings slowly.
+    TrackerSway,
 }
 
 impl Physical {
@@ -188,6 +252,10 @@ impl Physical {
     /// Changes what the arm is for the whole recording.
     pub fn shape(&self, arm: &mut Arm) {
         self.inner().shape(arm);
+    }
+    /// What the tracker reads of a point, m in its frame.
+    pub fn sight(&self, row: &Row, memory: f64, point: Vector) -> Vector {
+        self.inner().sight(row, memory, point)
     }
     /// Changes what the controller logs of the joint positions `q` after a move from `before`, rad or m.
     pub fn log(&self, q: &mut [f64], before: &[f64]) {
@@ -216,4 +284,13 @@ impl Physical {
         let seat = self.inner().seat()?;
         (!(1..=joints).contains(&seat)).then(|| format!("sits on joint or link {seat}; allowed: 1 to {joints}"))
     }
+}
+
+/// What every effect makes of the rows before, row by row: [`Row::memory`] of each.
+pub fn recall(effects: &[Physical], past: &[Moment]) -> Vec<Vec<f64>> {
+    let own: Vec<Vec<f64>> = effects.iter().map(|effect| effect.inner().remember(past)).collect();
+    if own.iter().all(Vec::is_empty) {
+        return vec![Vec::new(); past.len()];
+    }
+    (0..past.len()).map(|row| own.iter().map(|all| all.get(row).copied().unwrap_or(0.0)).collect()).collect()
 }

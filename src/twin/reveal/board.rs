@@ -1,6 +1,7 @@
 //! The scoreboard: outcomes by visibility, by family and by what was said instead, false alarms, held-out errors, intervals.
 
 use super::mark::{Case, Marked, Outcome};
+use super::place::Places;
 use super::reliability::{Reliability, Subject, reliability};
 use super::share::Share;
 use std::collections::BTreeMap;
@@ -9,6 +10,8 @@ use std::collections::BTreeMap;
 pub const BINS: [f64; 5] = [0.0, 5.0, 15.0, 50.0, 200.0];
 /// From this visibility on an effect should be named.
 pub const DUE: f64 = 50.0;
+/// A held-out error that is no larger over its bound is as good as can be expected.
+pub const NEAR_BOUND: f64 = 1.15;
 
 /// Outcomes of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -90,10 +93,25 @@ impl Board {
         names.into_iter().map(|name| (name, due(name))).filter(|(_, counts)| counts.all() > 0).collect()
     }
 
+    /// Places and names of due causes: of all, and by effect.
+    pub fn places(&self) -> (Places, BTreeMap<&str, Places>) {
+        let due = || self.causes().map(|(_, cause)| cause).filter(|cause| cause.strength >= DUE);
+        let of = |name: &str| Places::of(due().filter(|cause| cause.effect == name).map(|cause| cause.placed));
+        let by_effect = due().map(|cause| (cause.effect.as_str(), of(&cause.effect))).collect();
+        (Places::of(due().map(|cause| cause.placed)), by_effect)
+    }
+
+    /// Recordings with a due effect whose held-out error is near its bound.
+    pub fn near_bound(&self) -> Share {
+        let [due, _] = self.ratios();
+        Share::of(due.iter().map(|ratio| *ratio <= NEAR_BOUND))
+    }
+
     /// Due causes whose formula the library has, or has not: outcomes, and the mean probability that the true name was given.
     pub fn by_formula(&self, shared: bool) -> (Counts, Option<f64>) {
         let due = || self.causes().map(|(_, cause)| cause).filter(|cause| cause.strength >= DUE);
-        let own: Vec<&Marked> = due().filter(|cause| OWN_FORMS.contains(&cause.form.as_str()) != shared).collect();
+        let own: Vec<&Marked> =
+            due().filter(|cause| (cause.strange || OWN_FORMS.contains(&cause.form.as_str())) != shared).collect();
         let stated: Vec<f64> = own.iter().filter_map(|cause| cause.probability).collect();
         let mean = (!stated.is_empty()).then(|| stated.iter().sum::<f64>() / stated.len() as f64);
         (Counts::of(own.into_iter()), mean)

@@ -2,6 +2,7 @@
 
 use super::interval::{Interval, intervals};
 use super::paper::{Answer, Atoms, Finding, Truth, atoms};
+use super::place::{Placed, placed};
 use super::reliability::{Statement, statements};
 use std::collections::BTreeSet;
 
@@ -35,8 +36,11 @@ pub struct Marked {
     pub effect: String,
     pub place: String,
     pub form: String,
+    /// Made by a formula that the library is not expected to hold.
+    pub strange: bool,
     pub strength: f64,
     pub outcome: Outcome,
+    pub placed: Placed,
     /// What was said instead, strongest first: `effect at place`.
     pub said: Option<String>,
     /// The stated probability of the true name, 0 where nothing was called so; none where no finding states any.
@@ -133,8 +137,10 @@ pub fn mark(truth: &Truth, answer: &Answer) -> Case {
             effect: cause.effect.clone(),
             place: cause.place.clone(),
             form: cause.form.clone(),
+            strange: cause.strange,
             strength: cause.strength,
             outcome,
+            placed: placed(cause, truth, &answer.findings, &known, reach),
             said: (outcome == Outcome::Wrong).then(|| strays.first().cloned()).flatten(),
             probability: probability_of(&own, &answer.findings),
         }

@@ -1,4 +1,5 @@
-//! Verdicts held against sealed truths: [`paper`] reads both, [`mark`] marks one case, [`board`] counts, `text` prints the board.
+//! Verdicts held against sealed truths: [`paper`] reads both, [`mark`] marks one case, [`place`] says
+//! whether the place was right, [`board`] counts, `text` prints the board.
 //!
 //! Nothing of the diagnosis is used: what it said is read as any reader of its JSON would.
 
@@ -6,6 +7,7 @@ pub mod board;
 pub mod interval;
 pub mod mark;
 pub mod paper;
+pub mod place;
 pub mod reliability;
 pub mod share;
 mod text;

@@ -29,6 +29,9 @@ pub struct Cause {
     #[serde(rename = "where")]
     pub place: String,
     pub form: String,
+    /// Made by a formula that the library is not expected to hold.
+    #[serde(default)]
+    pub strange: bool,
     /// False for what goes along with another cause: it may be named, or counted to that one.
     #[serde(default = "yes")]
     pub wanted: bool,

@@ -1,7 +1,8 @@
 //! The scoreboard for people and for programs.
 
-use super::board::{BINS, Board, Company, Counts, DUE};
+use super::board::{BINS, Board, Company, Counts, DUE, NEAR_BOUND};
 use super::mark::Case;
+use super::place::Places;
 use super::reliability::{Bin, Reliability, Subject};
 use super::share::Share;
 use crate::statistics::quantile;
@@ -35,6 +36,7 @@ impl Board {
                 let _ = writeln!(out, "  {effect:<22}{}", line(&counts));
             }
         }
+        self.tell_places(&mut out);
         for (title, shared) in FORMULAS {
             let (counts, mean) = self.by_formula(shared);
             if counts.all() > 0 {
@@ -97,6 +99,32 @@ impl Board {
         out
     }
 
+    /// Places and names of due effects, and their recordings' held-out errors.
+    fn tell_places(&self, out: &mut String) {
+        let (all, by_effect) = self.places();
+        if all.place.of == 0 {
+            return;
+        }
+        let _ = writeln!(
+            out,
+            "\nplaces and names of effects with L of {DUE} or more\n  effect                     n  place  name or unknown  wrong name"
+        );
+        for (effect, Places { place, name_or_unknown, wrong_name }) in by_effect {
+            let _ = writeln!(
+                out,
+                "  {effect:<22}{:>6}{:>7}{:>17}{:>12}",
+                place.of, place.count, name_or_unknown.count, wrong_name.count
+            );
+        }
+        for (title, share) in titled(&all) {
+            let _ = writeln!(out, "{title}: {}", percent(&share));
+        }
+        let near = self.near_bound();
+        if near.of > 0 {
+            let _ = writeln!(out, "held-out rms within {NEAR_BOUND} of its bound: {}", percent(&near));
+        }
+    }
+
     fn shares(&self) -> Vec<(String, Share)> {
         let [pairs, strongest] = self.whole("pair");
         let mut out = vec![
@@ -129,6 +157,13 @@ impl Board {
             let bin = |bin: &Bin| json!({ "from": bin.from, "to": bin.to, "stated": bin.stated, "right": share(&bin.right) });
             json!({ "of": subject.name(), "brier": brier, "auc": auc, "bins": bins.iter().map(bin).collect::<Vec<_>>() })
         });
+        let places = |of: &Places| {
+            let each = [("place", of.place), ("name_or_unknown", of.name_or_unknown), ("wrong_name", of.wrong_name)];
+            each.iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>()
+        };
+        let (placed, placed_by_effect) = self.places();
+        let placed_by_effect: serde_json::Map<_, _> =
+            placed_by_effect.iter().map(|(name, of)| (name.to_string(), json!(places(of)))).collect();
         let [due, null] = self.ratios();
         let spread = |sorted: &[f64]| json!({ "n": sorted.len(), "median": quantile(sorted, 0.5), "p90": quantile(sorted, 0.9) });
         json!({
@@ -138,15 +173,24 @@ impl Board {
             "beside": bins(Company::Beside),
             "by_effect": self.by_effect().iter().map(|(name, of)| (name.to_string(), counts(of))).collect::<serde_json::Map<_, _>>(),
             "by_formula": by_formula,
+            "places": { "all": places(&placed), "by_effect": placed_by_effect },
             "confusion": self.confusion(),
             "reliability": reliability,
             "shares": self.shares().iter().map(|(title, of)| json!({ "what": title.trim(), "share": share(of) })).collect::<Vec<_>>(),
             "intervals": self.intervals().iter().map(|(name, of)| (name.to_string(), share(of))).collect::<serde_json::Map<_, _>>(),
-            "held_out_over_bound": { "due": spread(&due), "null": spread(&null) },
+            "held_out_over_bound": { "due": spread(&due), "null": spread(&null), "due_within_1.15": share(&self.near_bound()) },
             "explained_share": spread(&self.explained()),
             "failures": self.failures().map(failure).collect::<Vec<_>>(),
         })
     }
+}
+
+fn titled(all: &Places) -> [(&'static str, Share); 3] {
+    [
+        ("place right", all.place),
+        ("name right, or unknown at the right place", all.name_or_unknown),
+        ("a wrong name given", all.wrong_name),
+    ]
 }
 
 /// E.g. `15-50`.

@@ -1,0 +1,63 @@
+//! The tracker's horizontal circle sits off its axis, or is no circle: its azimuth errs with its azimuth.
+
+use super::{Act, Motion, State, TrueValue, true_value};
+use crate::twin::matrix::Vector;
+use crate::twin::polar::Polar;
+use crate::twin::statics::Row;
+use crate::twin::truth::ARCSEC;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What is wrong with the circle, with amplitude `a` and phase `p`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Circle {
+    /// `a sin(azimuth + p)`: a small eccentricity.
+    Eccentric,
+    /// `a sin(2 azimuth + p)`: a circle bent to an ellipse, or one read at two sides.
+    Elliptic,
+    /// The direction from a centre `a` radii off the axis, by the arctangent.
+    OffCentre,
+}
+
+/// Error of the azimuth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrackerCircle {
+    pub circle: Circle,
+    /// arcsec.
+    pub amplitude_arcsec: f64,
+    #[serde(default)]
+    pub phase_deg: f64,
+}
+
+impl Act for TrackerCircle {
+    fn act(&self, _state: &State, _motion: &mut Motion) {}
+    fn sight(&self, _row: &Row, _memory: f64, point: Vector) -> Vector {
+        let seen = Polar::of(point);
+        let (size, phase) = (self.amplitude_arcsec * ARCSEC, self.phase_deg.to_radians());
+        let azimuth = match self.circle {
+            Circle::Eccentric => seen.azimuth + size * (seen.azimuth + phase).sin(),
+            Circle::Elliptic => seen.azimuth + size * (2.0 * seen.azimuth + phase).sin(),
+            Circle::OffCentre => {
+                let (sine, cosine) = seen.azimuth.sin_cos();
+                (sine + size * phase.sin()).atan2(cosine - size * phase.cos())
+            }
+        };
+        Polar { azimuth, ..seen }.point()
+    }
+    fn seat(&self) -> Option<usize> {
+        None
+    }
+    fn scale(&mut self, by: f64) {
+        self.amplitude_arcsec *= by;
+    }
+    fn truth(&self) -> Vec<TrueValue> {
+        let (sine, cosine) = self.phase_deg.to_radians().sin_cos();
+        let order = if self.circle == Circle::Elliptic { 2 } else { 1 };
+        let value = |name: &str, value| {
+            true_value("tracker_circle", "tracker", "tracker".into(), &format!("{name}{order}"), "arcsec", value)
+        };
+        vec![value("sin", self.amplitude_arcsec * cosine), value("cos", self.amplitude_arcsec * sine)]
+    }
+}

@@ -1,0 +1,53 @@
+//! The tracker's stand swings slowly, as a tripod does in the sun or beside a machine: an effect that no list expects.
+
+use super::{Act, Motion, State, TrueValue, true_value};
+use crate::twin::matrix::{self, Vector};
+use crate::twin::truth::ARCSEC;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// A sine of time in one direction of motion of what is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrackerSway {
+    /// Displacement at the peak, tracker frame, um.
+    #[serde(default)]
+    pub shift_um: Vector,
+    /// Rotation vector at the peak about the tracker's origin, arcsec.
+    #[serde(default)]
+    pub turn_arcsec: Vector,
+    /// s.
+    pub period_s: f64,
+    #[serde(default)]
+    pub phase_deg: f64,
+    /// Time in which the swing fades to 37 %, s; 0: never.
+    #[serde(default)]
+    pub fading_s: f64,
+}
+
+impl Act for TrackerSway {
+    fn act(&self, state: &State, motion: &mut Motion) {
+        let time = state.row.time_s;
+        let left = if self.fading_s > 0.0 { (-time / self.fading_s).exp() } else { 1.0 };
+        let share = left * (TAU * time / self.period_s + self.phase_deg.to_radians()).sin();
+        let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
+        let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
+        motion.tracker = matrix::times(&matrix::times(&moved, &turned), &motion.tracker);
+    }
+    fn seat(&self) -> Option<usize> {
+        None
+    }
+    fn scale(&mut self, by: f64) {
+        self.shift_um = matrix::scale(self.shift_um, by);
+        self.turn_arcsec = matrix::scale(self.turn_arcsec, by);
+    }
+    fn truth(&self) -> Vec<TrueValue> {
+        let value = |number: &str, unit, value| true_value("unknown", "tracker_sway", "tracker".into(), number, unit, value);
+        vec![
+            value("shift", "um", matrix::norm(self.shift_um)),
+            value("turn", "arcsec", matrix::norm(self.turn_arcsec)),
+            value("period", "s", self.period_s),
+        ]
+    }
+}

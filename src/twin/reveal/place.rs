@@ -1,0 +1,76 @@
+//! Whether a diagnosis looked in the right place, gave no wrong name, and said `unknown` where it knew no name.
+
+use super::paper::{Atoms, Cause, Finding, Truth, atoms};
+use super::share::Share;
+use std::collections::BTreeSet;
+
+/// Faults of single points: they say nothing about where a cause sits.
+const POINT_FAULTS: [&str; 2] = ["outlier", "mislabelled_point"];
+/// What has a place and no name.
+const NAMELESS: &str = "unknown";
+
+/// What was said of a cause.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Placed {
+    /// The strongest finding, but for faults of points and what sits at the other causes' places, is at its place or at an accepted one.
+    pub place: bool,
+    /// It has its name or an accepted one, or `unknown` stands at its place.
+    pub name_or_unknown: bool,
+    /// A name was given that is not there: by a finding that is neither wanted nor accepted nor has such a rival, or as the first choice
+    /// at the right place.
+    pub wrong_name: bool,
+}
+
+fn places(names: &Atoms) -> BTreeSet<&str> {
+    names.iter().map(|(_, place)| place.as_str()).collect()
+}
+
+/// Judges what was said of `cause`; `known` are all names that are there or accepted, `reach` all that a finding may mean.
+pub(super) fn placed(
+    cause: &Cause,
+    truth: &Truth,
+    findings: &[Finding],
+    known: &Atoms,
+    reach: impl Fn(&Finding) -> Atoms,
+) -> Placed {
+    let own = atoms(&cause.effect, &cause.place);
+    let accepted: Atoms = truth.accepted.iter().flat_map(|name| atoms(&name.effect, &name.place)).collect();
+    let right: BTreeSet<&str> = places(&own).union(&places(&accepted)).copied().collect();
+    let others: Atoms = truth.effects.iter().flat_map(|other| atoms(&other.effect, &other.place)).collect();
+    let elsewhere: BTreeSet<&str> = places(&others).difference(&right).copied().collect();
+
+    let said: Vec<(&Finding, Atoms)> = findings.iter().map(|finding| (finding, atoms(&finding.effect, &finding.place))).collect();
+    let physical = || said.iter().filter(|(finding, _)| !POINT_FAULTS.contains(&finding.effect.as_str()));
+    let there = |names: &Atoms| !places(names).is_disjoint(&right);
+    let found: Atoms = said.iter().flat_map(|(_, names)| names.clone()).collect();
+    let wrong = |finding: &Finding, names: &Atoms| {
+        finding.effect != NAMELESS && names.is_disjoint(known) && (there(names) || reach(finding).is_disjoint(known))
+    };
+    Placed {
+        place: physical().find(|(_, names)| !places(names).is_subset(&elsewhere)).is_some_and(|(_, names)| there(names)),
+        name_or_unknown: own.is_subset(&found)
+            || !accepted.is_disjoint(&found)
+            || said.iter().any(|(finding, names)| finding.effect == NAMELESS && there(names)),
+        wrong_name: said.iter().any(|(finding, names)| wrong(finding, names)),
+    }
+}
+
+/// Shares of causes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Places {
+    pub place: Share,
+    pub name_or_unknown: Share,
+    pub wrong_name: Share,
+}
+
+impl Places {
+    pub(super) fn of(causes: impl Iterator<Item = Placed>) -> Places {
+        let all: Vec<Placed> = causes.collect();
+        let share = |holds: fn(&Placed) -> bool| Share::of(all.iter().map(holds));
+        Places {
+            place: share(|one| one.place),
+            name_or_unknown: share(|one| one.name_or_unknown),
+            wrong_name: share(|one| one.wrong_name),
+        }
+    }
+}
