@@ -2,12 +2,13 @@
 
 use super::names::{LENGTHS, Name, joints};
 use super::points::{PointColumns, points};
+use super::reading::tables;
 use super::sheet::Sheet;
 use super::words;
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// No angle in rad is beyond this.
 const MOST_RADIANS: f64 = 6.5;
@@ -32,6 +33,7 @@ pub(super) struct Choice {
 
 /// A file, as far as it was understood.
 pub(super) struct ExaminedFile {
+    pub path: PathBuf,
     /// As messages name it.
     pub name: String,
     pub sheet: Sheet,
@@ -44,14 +46,19 @@ pub(super) struct ExaminedFile {
 }
 
 impl ExaminedFile {
-    pub fn read(path: &Path) -> Result<Self> {
-        let sheet = Sheet::read(path)?;
-        let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
+    /// The tables of a file, of which there is place for so many.
+    pub fn read(path: &Path, places: usize) -> Result<Vec<Self>> {
+        Ok(tables(path, places)?.into_iter().map(|sheet| Self::of(path, sheet)).collect())
+    }
+
+    fn of(path: &Path, sheet: Sheet) -> Self {
+        let own = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
+        let name = sheet.of_book.as_ref().map_or(own.clone(), |sheet| format!("{own} sheet `{sheet}`"));
         let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
         for (name, unit) in said.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
         }
-        let mut found = Self { name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
+        let mut found = Self { path: path.into(), name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
         if found.sheet.header && found.sheet.trouble.is_none() {
             found.joints();
             found.point();
@@ -60,7 +67,7 @@ impl ExaminedFile {
             found.time();
             found.texts();
         }
-        Ok(found)
+        found
     }
 
     pub fn get(&self, quantity: &str) -> Option<&Mapping> {

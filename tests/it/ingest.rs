@@ -8,6 +8,7 @@ mod moving;
 mod noise;
 mod refusals;
 mod together;
+mod workbooks;
 
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};

@@ -69,3 +69,4 @@ mod transfer;
 mod twin;
 mod vouched;
 mod weights;
+mod workbook;

@@ -11,9 +11,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
-    /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; or a flat
-    /// Parquet file, for which only `columns` matters.
+    /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a flat Parquet file, for which only `columns` matters.
     pub file: RawFile,
+    /// The sheet of a workbook; without it the only visible one with rows of numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<String>,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
     pub delimiter: String,

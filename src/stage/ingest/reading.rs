@@ -9,8 +9,9 @@ use super::lines::{RecordFields, TextReader, failed};
 use super::parquet::ParquetReader;
 use super::row::{RecordedRow, RowReader, RowRefusal};
 use crate::error::{Error, Result, counted};
+use crate::raw::{Workbook, is_workbook};
 use crate::stage::{Context, OpenedInput};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Cursor, Read};
 
 /// How many rows pass between two signs of progress.
 const STRIDE: u64 = 4096;
@@ -25,10 +26,25 @@ impl FileReader {
     fn open(source: OpenedInput, layout: &FileLayout) -> Result<Self> {
         let mut reader = BufReader::with_capacity(1 << 16, source.reader);
         // The mark of four bytes is in the first buffer of any file that is long enough to be one.
-        if reader.fill_buf().map_err(|error| failed(&source.label, &error))?.starts_with(b"PAR1") {
+        let head = reader.fill_buf().map_err(|error| failed(&source.label, &error))?;
+        if is_workbook(head) {
+            return Ok(Self::Text(sheet(reader, &source.label, layout)?));
+        }
+        let is_parquet = head.starts_with(b"PAR1");
+        if let Some(sheet) = &layout.sheet {
+            let message = format!("is no workbook, and has no sheet `{sheet}`; allowed: a file .xlsx or .xlsm, or no `sheet`");
+            return Err(Error::data(&source.label, message));
+        }
+        if is_parquet {
             return Ok(Self::Parquet(Box::new(ParquetReader::open(reader, &source.label)?)));
         }
         Ok(Self::Text(TextReader::open(reader, &source.label, layout)?))
+    }
+    fn label(&self) -> &str {
+        match self {
+            Self::Text(lines) => &lines.label,
+            Self::Parquet(columns) => &columns.label,
+        }
     }
     fn next(&mut self, record: &mut RecordFields) -> Result<bool> {
         match self {
@@ -50,6 +66,17 @@ impl FileReader {
     }
 }
 
+/// A sheet of a workbook as text: its cells are delimited, and its numbers have the decimal mark that the settings announce.
+fn sheet(source: impl Read, label: &str, layout: &FileLayout) -> Result<TextReader> {
+    let data = |message: String| Error::data(label, message);
+    let mut book = Workbook::read(source).map_err(data)?;
+    let name = book.sheet(layout.sheet.as_deref()).map_err(data)?;
+    let mark = if layout.decimal == Decimal::Comma { ',' } else { '.' };
+    let lines: Box<dyn Read + Send> = Box::new(Cursor::new(book.lines(&name, mark).map_err(data)?));
+    let layout = FileLayout { delimiter: "tab".into(), ..layout.clone() };
+    TextReader::open(BufReader::new(lines), &format!("{label} sheet `{name}`"), &layout)
+}
+
 /// An opened file below its header.
 pub(super) struct OpenedFile<'a> {
     pub label: String,
@@ -64,8 +91,8 @@ pub(super) struct OpenedFile<'a> {
 impl<'a> OpenedFile<'a> {
     /// Opens a file and finds its columns.
     pub(super) fn open(source: OpenedInput, layout: &FileLayout, arm: &'a RobotJoints, limits: LimitPolicy) -> Result<Self> {
-        let label = source.label.clone();
         let mut rows = FileReader::open(source, layout)?;
+        let label = rows.label().to_string();
         let (header, decimal) = match &rows {
             FileReader::Text(_) => (layout.header, layout.decimal),
             FileReader::Parquet(_) => (true, Decimal::Point),
