@@ -105,6 +105,11 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     if sheet.header_in_comment {
         put("header_in_comment: true");
     }
+    for mapping in &file.mappings {
+        if let Some(line) = mapping.choices.first().and_then(|choice| choice.beside.as_ref()) {
+            put(&format!("{line}   # CHECK: {}", one_line(mapping.check.as_deref().unwrap_or("is it so?"))));
+        }
+    }
     put("columns:");
     for quantity in ORDER {
         if let Some(mapping) = file.get(quantity) {

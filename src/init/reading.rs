@@ -2,8 +2,9 @@
 
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
+use crate::program::listing;
 use crate::raw::{self, Workbook, is_workbook};
-use crate::stage::ingest::encoding;
+use crate::stage::ingest::{ListedTable, encoding};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -20,6 +21,10 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
     let head = reader.fill_buf().map_err(failed)?;
     if is_workbook(head) {
         return Ok(sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]));
+    }
+    if let Some(language) = listing(&raw::ending(path), head) {
+        let table = ListedTable::read(reader, &place, language);
+        return Ok(vec![table.map_or_else(|error| Sheet::not_understood(error.to_string()), Sheet::of_program)]);
     }
     if let Some(kind) = no_text(head) {
         return Ok(vec![Sheet::not_understood(kind.into())]);

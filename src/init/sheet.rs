@@ -1,5 +1,6 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
+use crate::stage::ingest::ListedTable;
 use crate::units::{Unit, written};
 
 /// So many lines say what separates fields.
@@ -92,6 +93,19 @@ impl Sheet {
         Self { of_book: Some(name.into()), delimiter: ',', ..Self::delimited(lines, Some('\t')) }
     }
 
+    /// Joints that a program lists, in deg.
+    pub fn of_program(table: ListedTable) -> Self {
+        let units = (0..table.names.len()).map(|column| (1..=6).contains(&column).then_some("deg"));
+        Self {
+            delimiter: ',',
+            header: true,
+            units: units.collect(),
+            names: table.names.into_iter().map(String::from).collect(),
+            rows: table.rows.into_iter().map(|(_, cells)| cells).collect(),
+            ..Self::default()
+        }
+    }
+
     fn delimited(lines: &[String], given: Option<char>) -> Self {
         let comment = comment(lines);
         let is_comment = |line: &str| comment.is_some_and(|mark| line.starts_with(mark));
@@ -151,6 +165,12 @@ impl Sheet {
     /// Whether nine of ten cells are numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         !self.rows.is_empty() && 10 * self.numbers(column).count() >= 9 * self.rows.len()
+    }
+
+    /// Whether every cell that is not blank is a number, and some are.
+    pub fn holds_numbers(&self, column: usize) -> bool {
+        let numbers = self.numbers(column).count();
+        numbers > 0 && numbers == self.texts(column).count()
     }
 
     /// Largest number without its sign.

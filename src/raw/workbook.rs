@@ -170,7 +170,7 @@ fn decode<T>(work: impl FnOnce() -> Result<T, XlsxError>) -> Result<T, String> {
 
 /// Unpacks every part to nowhere, and refuses what a workbook is not, and what is larger than it may be.
 fn unpacked(bytes: &[u8]) -> Result<(), String> {
-    let foreign = |error: zip::result::ZipError| format!("is an archive that cannot be read: {error}");
+    let foreign = |error: zip::result::ZipError| format!("is an archive that cannot be read ({error}); {ALLOWED}");
     let counted = decoded(|| {
         let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(foreign)?;
         let is_book = |name: &str| name.eq_ignore_ascii_case("xl/workbook.xml");
@@ -216,7 +216,9 @@ fn texts(part: &mut impl Read, name: &str) -> Result<u64, String> {
         if end == 0 { 0 } else { number[..end].parse().unwrap_or(u64::MAX) }
     };
     match text.split("uniqueCount").skip(1).map(digits).max() {
-        Some(stated) if stated > size / SHORTEST => Err(format!("is damaged: `{name}` says that it has more texts than it can hold")),
+        Some(stated) if stated > size / SHORTEST => {
+            Err(format!("is damaged: `{name}` says that it has more texts than it can hold"))
+        }
         _ => Ok(size),
     }
 }
@@ -262,7 +264,13 @@ fn clock(moment: &ExcelDateTime, is_1904: bool) -> String {
         return days.to_string();
     };
     // There was no 29th of February in 1900, but for workbooks.
-    let first = if is_1904 { date(1904, 1, 1) } else if days < 60.0 { date(1899, 12, 31) } else { date(1899, 12, 30) };
+    let first = if is_1904 {
+        date(1904, 1, 1)
+    } else if days < 60.0 {
+        date(1899, 12, 31)
+    } else {
+        date(1899, 12, 30)
+    };
     match first.at(0, 0, 0, 0).checked_add(time) {
         Ok(moment) if (0.0..1.0).contains(&days) => moment.time().to_string(),
         // More than a day of elapsed time is no time of day.

@@ -43,8 +43,9 @@ pub fn with_texts(sheets: &[SheetText], bodies: &[String], texts: &str) -> Vec<u
     let main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     let relations = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";
     let book = format!(r#"<workbook xmlns="{main}" xmlns:r="{relations}"><sheets>{listed}</sheets></workbook>"#);
-    let related =
-        format!(r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{related}</Relationships>"#);
+    let related = format!(
+        r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{related}</Relationships>"#
+    );
     parts.extend([
         ("_rels/.rels".into(), RELATIONS.into()),
         ("xl/workbook.xml".into(), book),
@@ -58,7 +59,8 @@ pub fn with_texts(sheets: &[SheetText], bodies: &[String], texts: &str) -> Vec<u
 fn sheet(text: &str, texts: &mut Vec<String>) -> String {
     let mut rows = String::new();
     for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.is_empty()) {
-        let cells: String = ('A'..).zip(row.split('|')).map(|(column, text)| cell(&format!("{column}{line}"), text, texts)).collect();
+        let cells: String =
+            ('A'..).zip(row.split('|')).map(|(column, text)| cell(&format!("{column}{line}"), text, texts)).collect();
         rows += &format!(r#"<row r="{line}">{cells}</row>"#);
     }
     format!("<worksheet><sheetData>{rows}</sheetData></worksheet>")

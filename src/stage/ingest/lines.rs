@@ -266,6 +266,7 @@ mod tests {
             skip_below_header: 0,
             comment: comment.map(Into::into),
             header_in_comment: false,
+            targets: None,
             columns: Default::default(),
         };
         let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);

@@ -36,7 +36,7 @@ fn dates_and_times_of_day_in_cells_are_clock_times() {
     let data = DATA.replace("five", "5").replace(":0.25", "@45943.75");
     let taken = take(&book(&[("Data", &data)]), &timed, robot("rr", 1.0)).expect("a recording");
     // 2025-10-13 is day 20,374 after 1970-01-01 (45943 less 25569, the number of 1970-01-01 in a workbook).
-    let expected = [20_374.541, 20_374.5421, 20_374.75].map(|days: f64| days * 86_400.0);
+    let expected = [20374.541, 20374.5421, 20374.75].map(|days: f64| days * 86_400.0);
     let times = taken.recording.time.expect("times");
     for (time, expected) in times.iter().zip(expected) {
         assert!((time - expected).abs() < 1e-5, "{time} for {expected}");

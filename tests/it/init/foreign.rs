@@ -28,3 +28,13 @@ fn the_only_sheet_with_numbers_is_read_and_among_many_one_is_asked_for() {
     assert!(found.said.contains("has numbers in several sheets; say which, `sheet: NAME`"), "{}", found.said);
     found.says(&["# REPLACE"]);
 }
+
+#[test]
+fn joints_that_a_program_declares_join_the_points_of_a_tracker() {
+    let target = |k: usize| format!("  CONST jointtarget P{k}:=[[{}],[9E9,9E9,9E9,9E9,9E9,9E9]];\n", joints(k, ","));
+    let module = format!("MODULE Measure\n{}ENDMODULE\n", (0..30).map(target).collect::<String>());
+    let points = table("Name,X [mm],Y [mm],Z [mm]", |k| format!("P{k},{}", point(k, ",")));
+    let found = made(&[("measure.mod", module.into_bytes()), ("tracker.csv", points.into_bytes())]);
+    found.has(&["point_id: {column: \"name\"}", "q: {column: \"rax_{j}\", unit: deg}\n".trim_end(), "join: {by: id}"]);
+    found.runs(30);
+}

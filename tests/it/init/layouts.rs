@@ -283,10 +283,19 @@ fn nominal_and_actual_points_are_told_apart_in_every_order() {
 
 #[test]
 fn of_two_points_that_fit_alike_both_are_listed() {
-    let made = one(table("A1,A2,A3,A4,A5,A6,smrA_x,smrA_y,smrA_z,smrB_x,smrB_y,smrB_z", |k| {
-        format!("{},{},{}", joints(k, ","), point(k, ","), point(k + 3, ","))
-    }));
-    made.has(&["x: {column: \"smrA_x\", unit: mm}   # CHECK"]).says(&["# x: {column: \"smrB_x\", unit: mm}   # CHECK"]).runs(30);
+    let two = |header: &str| {
+        let row = |k: usize| format!("{},{},{}", joints(k, ","), point(k, ","), point(k + 3, ","));
+        one(table(&format!("A1,A2,A3,A4,A5,A6,{header}"), row))
+    };
+    let made = two("before_x,before_y,before_z,after_x,after_y,after_z");
+    made.has(&["x: {column: \"before_x\", unit: mm}   # CHECK"])
+        .says(&["# x: {column: \"after_x\", unit: mm}   # CHECK"])
+        .runs(30);
+    let made = two("smrA_x,smrA_y,smrA_z,smrB_x,smrB_y,smrB_z");
+    let both = "{smra: [\"smrA_x\", \"smrA_y\", \"smrA_z\"], smrb: [\"smrB_x\", \"smrB_y\", \"smrB_z\"]}}   # CHECK";
+    made.has(&[&format!("targets: {{unit: mm, columns: {both}")])
+        .says(&["# x: {column: \"smrB_x\", unit: mm}   # CHECK"])
+        .runs(60);
 }
 
 #[test]
@@ -306,7 +315,7 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
     made.has(&["header: false", "q: {columns: [1, 2, 3, 4, 5, 6], unit: deg}   # REPLACE"]);
     made.says(&["column 7: ", " to "]);
     let sheet = one(&b"PK\x03\x04\x14\x00\x06\x00binary"[..]);
-    sheet.says(&["REPLACE", "save it as CSV"]);
+    sheet.says(&["REPLACE", "saved as CSV"]);
     let prose = one("nothing\nto see\n");
     prose.says(&["REPLACE", "nothing", "to see"]);
     assert!(prose.said.contains("no header found"), "{}", prose.said);
