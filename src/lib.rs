@@ -18,7 +18,7 @@
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
-//! | [`program`] | programs of controllers (KRL, RAPID), read strictly and rewritten in the numbers of their targets | compensate, robot |
+//! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced | compensate, raw, robot |
 //! | [`diagnose`] | where recording and simulation differ, which cause explains it | effect, estimate, robot, spatial |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |
@@ -26,11 +26,11 @@
 //! | [`diff`] | two tables or two runs compared | raw, store |
 //! | [`table`] | one file per table: Rust values <-> checked columns | store, the numerics |
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
-//! | [`stage`] | one file per step of a pipeline | raw, report, table, numerics, twin, yaml |
+//! | [`stage`] | one file per step of a pipeline | program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
 //! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
-//! | [`init`] | what a folder of files is, and the pipeline that reads it | raw, stage, yaml |
+//! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, stage, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |

@@ -2,6 +2,10 @@
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+mod workbook;
+
+pub use workbook::{Workbook, is_workbook};
+
 use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};

@@ -17,7 +17,7 @@ pub(super) struct InitArguments {
     /// The folder for robot.yaml and pipeline.yaml
     #[arg(value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Recordings, delimited text: one file, or the controller's and the tracker's
+    /// Recordings, delimited text or workbooks (.xlsx): one file, or the controller's and the tracker's
     #[arg(long, short, value_name = "FILE", num_args = 1..=2)]
     data: Vec<PathBuf>,
     /// The robot to start from
@@ -65,7 +65,7 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
 
 fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {
     let mut text = String::new();
-    for (path, account) in arguments.data.iter().zip(&start.accounts) {
+    for (path, account) in &start.accounts {
         text.push_str(&format!("{}: {account}\n", path.display()));
     }
     let [robot, pipeline] = files.each_ref().map(|path| path.display());

@@ -42,6 +42,23 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
 }
 
+/// Takes every pose off a fit in turn; both kinds of folds are the same then. `None` where one pose less leaves too few rows.
+pub fn leave_one_out(whole: &Session) -> Option<Folds> {
+    let Session { data, rows, .. } = *whole;
+    let folds = parts(data, rows);
+    let longest = folds.iter().map(Vec::len).max().unwrap_or_default();
+    if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.candidates().len() {
+        return None;
+    }
+    let errors = gather(data, rows, &folds, &whole.without_each(&folds));
+    Some(Folds { count: folds.len(), random: errors.clone(), blocks: errors })
+}
+
+/// Poses of the rows, of which folds are made; of a moving arm stretches of rows.
+pub fn fold_poses(data: &Measurements, rows: &[usize]) -> usize {
+    parts(data, rows).len()
+}
+
 /// How rows are dealt into folds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FoldKind {

@@ -39,7 +39,7 @@ pub use covariance::Covariance;
 pub(crate) use fisher::tail;
 pub use fit::{FitOptions, Fitted, ParameterStatus, fit};
 pub(crate) use folds::{FoldKind, dealt, gather};
-pub use folds::{Folds, cross_validate};
+pub use folds::{Folds, cross_validate, fold_poses, leave_one_out};
 pub use gauge::gauge;
 pub use known::{Bounds, CONFLICT, Known, Prior, PriorCheck};
 pub use levenberg::{Iteration, Stop};

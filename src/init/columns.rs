@@ -1,13 +1,14 @@
 //! What a recording's columns seem to hold, by their names and values: a proposal that a person checks.
 
-use super::names::{LENGTHS, Name, joints};
-use super::points::{PointColumns, points};
+use super::names::{LENGTHS, Name, joints, pattern};
+use super::points::{PointColumns, Points, points};
+use super::reading::tables;
 use super::sheet::Sheet;
 use super::words;
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// No angle in rad is beyond this.
 const MOST_RADIANS: f64 = 6.5;
@@ -27,11 +28,20 @@ pub(super) struct Mapping {
 /// Lines below `columns`, and the columns that they take.
 pub(super) struct Choice {
     pub lines: Vec<String>,
+    /// A line beside `columns` instead.
+    pub beside: Option<String>,
     pub columns: Vec<usize>,
+}
+
+impl Choice {
+    fn of(lines: Vec<String>, columns: Vec<usize>) -> Self {
+        Self { lines, columns, beside: None }
+    }
 }
 
 /// A file, as far as it was understood.
 pub(super) struct ExaminedFile {
+    pub path: PathBuf,
     /// As messages name it.
     pub name: String,
     pub sheet: Sheet,
@@ -44,14 +54,19 @@ pub(super) struct ExaminedFile {
 }
 
 impl ExaminedFile {
-    pub fn read(path: &Path) -> Result<Self> {
-        let sheet = Sheet::read(path)?;
-        let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
+    /// The tables of a file, of which there is place for so many.
+    pub fn read(path: &Path, places: usize) -> Result<Vec<Self>> {
+        Ok(tables(path, places)?.into_iter().map(|sheet| Self::of(path, sheet)).collect())
+    }
+
+    fn of(path: &Path, sheet: Sheet) -> Self {
+        let own = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned());
+        let name = sheet.of_book.as_ref().map_or(own.clone(), |sheet| format!("{own} sheet `{sheet}`"));
         let mut said: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
         for (name, unit) in said.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
         }
-        let mut found = Self { name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
+        let mut found = Self { path: path.into(), name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
         if found.sheet.header && found.sheet.trouble.is_none() {
             found.joints();
             found.point();
@@ -60,7 +75,7 @@ impl ExaminedFile {
             found.time();
             found.texts();
         }
-        Ok(found)
+        found
     }
 
     pub fn get(&self, quantity: &str) -> Option<&Mapping> {
@@ -71,7 +86,8 @@ impl ExaminedFile {
     pub fn drop(&mut self, quantity: &str, why: &str) {
         if let Some(at) = self.mappings.iter().position(|mapping| mapping.quantity == quantity) {
             let dropped = self.mappings.remove(at);
-            let lines = dropped.choices.first().map(|choice| choice.lines.clone()).unwrap_or_default();
+            let lines = dropped.choices.first().map(|choice| choice.beside.iter().chain(&choice.lines).cloned().collect());
+            let lines: Vec<String> = lines.unwrap_or_default();
             self.remarks.extend(
                 lines
                     .into_iter()
@@ -118,7 +134,7 @@ impl ExaminedFile {
 
     /// Maps a quantity to single columns, best first.
     pub fn map(&mut self, quantity: &'static str, columns: &[usize], unit: Option<&'static str>, check: Option<String>) {
-        let choice = |column: &usize| Choice { lines: vec![self.line(quantity, *column, unit)], columns: vec![*column] };
+        let choice = |column: &usize| Choice::of(vec![self.line(quantity, *column, unit)], vec![*column]);
         let Some(first) = columns.first() else { return };
         let word = if quantity == "point_id" { "names" } else { quantity };
         let account = format!("{word} ({})", self.sheet.names[*first]);
@@ -146,8 +162,7 @@ impl ExaminedFile {
         let check: Vec<String> = several.into_iter().chain(why).collect();
         let account =
             format!("{} joints ({} to {})", best.len(), self.sheet.names[best[0]], self.sheet.names[best[best.len() - 1]]);
-        let choice =
-            |columns: &Vec<usize>| Choice { lines: vec![self.joints_line("q", columns, Some(unit))], columns: columns.clone() };
+        let choice = |columns: &Vec<usize>| Choice::of(vec![self.joints_line("q", columns, Some(unit))], columns.clone());
         let mapping = Mapping {
             quantity: "q",
             choices: rows.iter().map(choice).collect(),
@@ -173,6 +188,12 @@ impl ExaminedFile {
 
     fn point(&mut self) {
         let found = points(&self.said);
+        if found.targets.iter().flat_map(|(_, columns)| columns).all(|column| self.sheet.holds_numbers(*column))
+            && let Some(mapping) = self.targets(&found)
+        {
+            self.mappings.push(mapping);
+            return;
+        }
         let numeric = |way: &PointColumns| {
             let more = way.difference.iter().flat_map(|(columns, _)| columns);
             way.columns.iter().chain(more).all(|column| self.sheet.is_numeric(*column))
@@ -211,6 +232,26 @@ impl ExaminedFile {
         self.mappings.push(mapping);
     }
 
+    /// Several targets side by side, or one of them alone.
+    fn targets(&self, found: &Points) -> Option<Mapping> {
+        let unit = self.length_unit(&found.targets.first()?.1).0;
+        let one = |(name, columns): &(String, [usize; 3])| {
+            format!("{name}: [{}]", columns.each_ref().map(|column| self.reference(*column)).join(", "))
+        };
+        let all: Vec<String> = found.targets.iter().map(one).collect();
+        let columns = found.targets.iter().flat_map(|(_, columns)| *columns).collect();
+        let beside = Some(format!("targets: {{unit: {unit}, columns: {{{}}}}}", all.join(", ")));
+        let choices =
+            [Choice { lines: Vec::new(), columns, beside }].into_iter().chain(found.ways.iter().map(|way| self.way(way)));
+        let names: Vec<&str> = found.targets.iter().map(|(name, _)| name.as_str()).collect();
+        Some(Mapping {
+            quantity: "x",
+            choices: choices.collect(),
+            check: Some("are these several reflectors, each measured in every pose, and is the unit right?".into()),
+            account: format!("the points of {} targets ({})", names.len(), names.join(", ")),
+        })
+    }
+
     fn way(&self, way: &PointColumns) -> Choice {
         let unit = self.length_unit(&way.columns).0;
         let mut columns = way.columns.to_vec();
@@ -226,7 +267,7 @@ impl ExaminedFile {
         });
         let lines = lines.collect();
         columns.extend(way.difference.iter().flat_map(|(columns, _)| columns));
-        Choice { lines, columns }
+        Choice::of(lines, columns)
     }
 
     /// The unit of coordinates, and whether their size alone says so.
@@ -249,7 +290,7 @@ impl ExaminedFile {
             if columns.len() == count {
                 let lines = vec![self.joints_line(quantity, &columns, unit)];
                 let account = format!("{quantity} ({pattern})");
-                self.mappings.push(Mapping { quantity, choices: vec![Choice { lines, columns }], check: None, account });
+                self.mappings.push(Mapping { quantity, choices: vec![Choice::of(lines, columns)], check: None, account });
             }
         }
     }
@@ -348,12 +389,4 @@ impl ExaminedFile {
         columns.retain(|column| Some(rank(*column)) == best);
         columns
     }
-}
-
-/// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
-fn pattern(names: &[&str]) -> Option<String> {
-    let first = names.first()?;
-    let ones = first.match_indices('1').map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
-    let fits = |pattern: &String| names.iter().enumerate().all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name);
-    ones.into_iter().find(fits)
 }

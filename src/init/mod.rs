@@ -6,6 +6,7 @@ mod marks;
 mod names;
 mod pipeline;
 mod points;
+mod reading;
 mod robots;
 mod sheet;
 mod together;
@@ -35,15 +36,18 @@ pub struct InitRequest<'a> {
 pub struct StarterFiles {
     pub robot: String,
     pub pipeline: String,
-    /// What was found in each recording.
-    pub accounts: Vec<String>,
+    /// What was found in each recording, and which.
+    pub accounts: Vec<(PathBuf, String)>,
     /// What no recording has.
     pub missing: Vec<&'static str>,
 }
 
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
-    let mut found = request.data.iter().map(|path| ExaminedFile::read(path)).collect::<Result<Vec<ExaminedFile>>>()?;
+    // Joints and points may stand in two sheets of one workbook.
+    let places = if request.data.len() == 1 { 2 } else { 1 };
+    let tables = request.data.iter().map(|path| ExaminedFile::read(path, places)).collect::<Result<Vec<_>>>()?;
+    let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
     let robot = match request.urdf {
         Some(_) => robots::of_urdf(request.tip),
@@ -62,7 +66,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     Ok(StarterFiles {
         robot,
         pipeline,
-        accounts: found.iter().map(ExaminedFile::account).collect(),
+        accounts: found.iter().map(|file| (file.path.clone(), file.account())).collect(),
         missing: if found.is_empty() {
             Vec::new()
         } else {

@@ -151,6 +151,14 @@ fn usual_name(key: &str) -> Option<usize> {
     })
 }
 
+/// The names of all joints in one: the 1 that becomes a 2 in the next name, and so on, is the joint's number.
+pub(super) fn pattern(names: &[&str]) -> Option<String> {
+    let first = names.first()?;
+    let ones = first.match_indices('1').map(|(at, _)| format!("{}{{j}}{}", &first[..at], &first[at + 1..]));
+    let fits = |pattern: &String| names.iter().enumerate().all(|(k, name)| pattern.replace("{j}", &(k + 1).to_string()) == *name);
+    ones.into_iter().find(fits)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

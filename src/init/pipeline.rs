@@ -33,8 +33,8 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
         out.push_str(EMPTY);
     }
     let missing = missing(found);
-    for (k, (path, file)) in request.data.iter().zip(found).enumerate() {
-        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, path)));
+    for (k, file) in found.iter().enumerate() {
+        out.push_str(&format!("        - file: {}\n", from_folder(request.folder, &file.path)));
         // Joints come first, in the controller's file; the tracker's is the last.
         let lacks =
             Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints() };
@@ -78,6 +78,9 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     if let Some(trouble) = &sheet.trouble {
         put(&format!("# REPLACE what follows by the file's own columns: {}", one_line(trouble)));
     }
+    if let Some(name) = &sheet.of_book {
+        put(&format!("sheet: {}", quoted(name)));
+    }
     match sheet.delimiter {
         ',' => {}
         ' ' => put("delimiter: whitespace"),
@@ -101,6 +104,11 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     }
     if sheet.header_in_comment {
         put("header_in_comment: true");
+    }
+    for mapping in &file.mappings {
+        if let Some(line) = mapping.choices.first().and_then(|choice| choice.beside.as_ref()) {
+            put(&format!("{line}   # CHECK: {}", one_line(mapping.check.as_deref().unwrap_or("is it so?"))));
+        }
     }
     put("columns:");
     for quantity in ORDER {

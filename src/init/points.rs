@@ -36,6 +36,8 @@ pub(super) struct Points {
     pub question: Option<String>,
     /// Whether the name of the best one says that it was measured.
     pub said: bool,
+    /// Points of several targets side by side, by the targets' names; none where the names do not say so.
+    pub targets: Vec<(String, [usize; 3])>,
     /// A point that is wanted only.
     pub wanted: Option<[usize; 3]>,
     pub sigma: Option<[usize; 3]>,
@@ -109,6 +111,7 @@ pub(super) fn points(names: &[Name]) -> Points {
     let candidates = if measured.is_empty() { &plain } else { &measured };
     found.ways = candidates.iter().map(direct).collect();
     if candidates.len() > 1 {
+        found.targets = targets(candidates);
         found.question = Some("several points fit; which one was measured?".into());
     } else if measured.is_empty() && !plain.is_empty() {
         if let (Some(difference), true) = (differences.first(), wanted.is_empty()) {
@@ -125,6 +128,27 @@ pub(super) fn points(names: &[Name]) -> Points {
         found.ways.extend(differences.iter().skip(1).map(|difference| by(target, difference)));
     }
     found
+}
+
+/// Several points whose names differ in a number, or in a letter behind a word, alone: `X1` and `X2`, `SMR1_x` and `SMR2_x`.
+fn targets(candidates: &[Family]) -> Vec<(String, [usize; 3])> {
+    let mut named = Vec::new();
+    let mut stems = Vec::new();
+    for family in candidates {
+        // In the order of the name: the words of a family are sorted, and numbers come first.
+        let mut words: Vec<&str> = family.words.iter().map(String::as_str).collect();
+        words.sort_by_key(|word| word.bytes().all(|byte| byte.is_ascii_digit()));
+        let name = words.concat();
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let letter = name.strip_suffix(|c: char| c.is_ascii_alphabetic()).filter(|stem| stem.len() > 1);
+        let stem = if stem.len() < name.len() { Some(stem) } else { letter };
+        let Some(stem) = stem.map(String::from) else { return Vec::new() };
+        named.push((if stem.is_empty() { format!("target_{name}") } else { name }, family.columns));
+        stems.push(stem);
+    }
+    let is_one = |(k, (name, _)): (usize, &(String, [usize; 3]))| named[..k].iter().all(|(other, _)| other != name);
+    let alike = stems.windows(2).all(|pair| pair[0] == pair[1]) && named.iter().enumerate().all(is_one);
+    if alike { named } else { Vec::new() }
 }
 
 #[cfg(test)]
@@ -160,6 +184,12 @@ mod tests {
     fn points_that_fit_alike_are_asked_about() {
         let two = found(&["smrA_x", "smrA_y", "smrA_z", "smrB_x", "smrB_y", "smrB_z"]);
         assert_eq!((two.ways.len(), two.question.is_some()), (2, true));
+        assert_eq!(two.targets, [("smra".to_string(), [0, 1, 2]), ("smrb".to_string(), [3, 4, 5])]);
+        let numbered = found(&["X1", "Y1", "Z1", "X2", "Y2", "Z2"]).targets;
+        assert_eq!(numbered, [("target_1".to_string(), [0, 1, 2]), ("target_2".to_string(), [3, 4, 5])]);
+        let apart = found(&["SMR 1 x", "SMR 1 y", "SMR 1 z", "SMR 2 x", "SMR 2 y", "SMR 2 z"]).targets;
+        assert_eq!(apart.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["smr1", "smr2"]);
+        assert_eq!(found(&["x_before", "y_before", "z_before", "x_after", "y_after", "z_after"]).targets, []);
         let twice = found(&["X", "Y", "Z", "X", "Y", "Z"]);
         assert_eq!((twice.ways[1].columns, twice.question.is_some()), ([3, 4, 5], true));
         let beside = found(&["X", "Y", "Z", "dX", "dY", "dZ"]);

@@ -1,15 +1,7 @@
 //! A delimited text as a table of cells, as far as it can be understood without being told.
 
-use crate::error::{Error, Result};
-use crate::raw;
-use crate::stage::ingest::encoding;
+use crate::stage::ingest::ListedTable;
 use crate::units::{Unit, written};
-use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
-
-/// Bytes and lines that are looked at.
-const LOOKED: u64 = 16 << 20;
-const LINES: usize = 20_000;
 
 /// So many lines say what separates fields.
 const ENOUGH: usize = 500;
@@ -22,6 +14,8 @@ const NARROWEST: usize = 3;
 
 #[derive(Default)]
 pub(super) struct Sheet {
+    /// Its name in its workbook, where it is of one.
+    pub of_book: Option<String>,
     pub delimiter: char,
     /// Decimal comma.
     pub comma: bool,
@@ -84,30 +78,42 @@ fn filled(mut cells: Vec<String>) -> Vec<String> {
 }
 
 impl Sheet {
-    pub fn read(path: &Path) -> Result<Self> {
-        let place = path.display().to_string();
-        let file = raw::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
-        let mut lines: Vec<String> = Vec::new();
-        let mut reader = BufReader::new(file.take(LOOKED));
-        let head = reader.fill_buf().map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
-        if let Some(kind) = no_text(head) {
-            return Ok(Self { trouble: Some(kind.into()), delimiter: ',', header: true, ..Self::default() });
-        }
-        for line in reader.split(b'\n').take(LINES) {
-            let line = line.map_err(|error| Error::store(&place, format!("cannot be read: {error}")))?;
-            lines.push(encoding::shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
-        }
-        Ok(Self::of(&lines))
+    /// What nothing can be said of, and why.
+    pub fn not_understood(trouble: String) -> Self {
+        Self { trouble: Some(trouble), delimiter: ',', header: true, ..Self::default() }
     }
 
-    fn of(lines: &[String]) -> Self {
+    pub fn of(lines: &[String]) -> Self {
+        Self::delimited(lines, None)
+    }
+
+    /// A sheet of a workbook, with tabs between its cells.
+    pub fn of_workbook(name: &str, lines: &[String]) -> Self {
+        // What separates cells is the workbook's own.
+        Self { of_book: Some(name.into()), delimiter: ',', ..Self::delimited(lines, Some('\t')) }
+    }
+
+    /// Joints that a program lists, in deg.
+    pub fn of_program(table: ListedTable) -> Self {
+        let units = (0..table.names.len()).map(|column| (1..=6).contains(&column).then_some("deg"));
+        Self {
+            delimiter: ',',
+            header: true,
+            units: units.collect(),
+            names: table.names.into_iter().map(String::from).collect(),
+            rows: table.rows.into_iter().map(|(_, cells)| cells).collect(),
+            ..Self::default()
+        }
+    }
+
+    fn delimited(lines: &[String], given: Option<char>) -> Self {
         let comment = comment(lines);
         let is_comment = |line: &str| comment.is_some_and(|mark| line.starts_with(mark));
         let content: Vec<Content> = (lines.iter().enumerate())
             .filter(|(_, line)| !line.trim().is_empty() && !is_comment(line))
             .map(|(at, text)| Content { at, text })
             .collect();
-        let delimiter = delimiter(&content);
+        let delimiter = given.unwrap_or_else(|| delimiter(&content));
         let mut sheet = Self { delimiter, comment, header: true, ..Self::default() };
         let table: Vec<Vec<String>> = content.iter().map(|line| cells(line.text, delimiter)).collect();
         let begins = if let Some(k) = plain_header(&table) {
@@ -161,6 +167,12 @@ impl Sheet {
         !self.rows.is_empty() && 10 * self.numbers(column).count() >= 9 * self.rows.len()
     }
 
+    /// Whether every cell that is not blank is a number, and some are.
+    pub fn holds_numbers(&self, column: usize) -> bool {
+        let numbers = self.numbers(column).count();
+        numbers > 0 && numbers == self.texts(column).count()
+    }
+
     /// Largest number without its sign.
     pub fn largest(&self, column: usize) -> f64 {
         self.numbers(column).map(f64::abs).fold(0.0, f64::max)
@@ -174,17 +186,6 @@ impl Sheet {
         }
         let texts: Vec<String> = self.texts(column).take(3).map(|text| text.chars().take(20).collect()).collect();
         format!("column {}: {}, ...", column + 1, texts.join(", "))
-    }
-}
-
-/// What a file is that is no delimited text.
-fn no_text(head: &[u8]) -> Option<&'static str> {
-    match head {
-        [b'P', b'K', 3, 4, ..] => Some("a workbook or archive, no delimited text; save it as CSV"),
-        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file: its columns are not looked at; name them"),
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("a text in UTF-16; save it as UTF-8"),
-        _ if head.contains(&0) => Some("no text"),
-        _ => None,
     }
 }
 

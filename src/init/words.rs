@@ -1,8 +1,23 @@
 //! The words that people use in headers, in small letters: English, German, French, Spanish, Italian.
 
 /// What the joints' columns are usually called; the number of the joint follows.
-pub(super) const JOINTS: [&str; 14] =
-    ["q", "a", "j", "joint", "axis", "theta", "achse", "gelenk", "axe", "asse", "eje", "jnt", "joint_angle", "articulaci\u{f3}n"];
+pub(super) const JOINTS: [&str; 15] = [
+    "q",
+    "a",
+    "rax",
+    "j",
+    "joint",
+    "axis",
+    "theta",
+    "achse",
+    "gelenk",
+    "axe",
+    "asse",
+    "eje",
+    "jnt",
+    "joint_angle",
+    "articulaci\u{f3}n",
+];
 
 /// Names of joints without numbers.
 pub(super) const NAMED_JOINTS: [&[&str]; 3] = [

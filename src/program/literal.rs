@@ -22,6 +22,8 @@ pub struct Literal {
     pub values: Vec<f64>,
     /// Where each value stands, sign included.
     pub spans: Vec<Range<usize>>,
+    /// External axes, deg or mm; none where one is not connected.
+    pub external: Vec<Option<f64>>,
 }
 
 impl Literal {

@@ -2,16 +2,19 @@
 //!
 //! KUKA KRL ([`krl`]) and ABB RAPID ([`rapid`]). A target is accepted where its literal is understood exactly: every field known, named
 //! once, one number each. What cannot be told to be a target or not refuses the program; nothing is guessed. A program is parsed
-//! whole before anything is solved, so that all its faults come at once.
+//! whole before anything is solved, so that all its faults come at once. Joint positions that a program declares under names are a table,
+//! too ([`joint_list`]).
 
 mod correct;
 mod krl;
+mod list;
 mod literal;
 mod pose;
 mod rapid;
 mod token;
 
 pub use correct::{ProgramFile, corrected};
+pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
 pub use literal::{Literal, TargetKind};
 pub use pose::solve;
 
@@ -95,6 +98,14 @@ struct Gathered {
     warnings: Vec<(usize, String)>,
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
+}
+
+/// What a language's reader finds declared under names: one for each literal.
+struct Declared {
+    found: Gathered,
+    names: Vec<String>,
+    /// Positions that are poses.
+    poses: usize,
 }
 
 impl Gathered {

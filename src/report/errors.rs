@@ -6,7 +6,7 @@ use super::findings::wrong_setup;
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, Withdrawn};
+use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,6 +57,8 @@ pub(super) struct ErrorsSection {
     held_out: Vec<Block>,
     training: Vec<Block>,
     folds: Vec<Fold>,
+    /// Steps whose cross-validation was dropped, and the number of poses.
+    unfolded: Vec<(String, String)>,
     references: Vec<ReferenceView>,
     pictures: Vec<Picture>,
     legend: Vec<(String, String)>,
@@ -151,11 +153,17 @@ impl ErrorsSection {
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
+            unfolded: unfolded(tables),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),
             legend: steps.names.iter().map(|(order, step)| (steps.colour(*order), steps.called(step))).collect(),
         })
     }
+}
+
+fn unfolded(tables: &Tables) -> Vec<(String, String)> {
+    let rows = tables.observability.iter().flat_map(|table| &table.0).filter(|row| row.quantity == UNFOLDED);
+    rows.map(|row| (row.step.clone(), count(row.value as i64))).collect()
 }
 
 /// Names of sets of this kind, in the order of their first row.

@@ -2,10 +2,11 @@
 
 use crate::effect::Load;
 use crate::error::counted;
-use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect, cross_validate};
+use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect};
 use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::advice::advice;
+use crate::stage::folding::FoldSetting;
 use crate::stage::{Context, computed, repeated, screened};
 use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
@@ -64,9 +65,9 @@ macro_rules! identification {
             #[serde(default)]
             pub repeatability: crate::stage::repeated::Repeatability,
             /// Cross-validation: the fit is repeated without each of so many parts of its poses, drawn at random, and again without
-            /// each contiguous stretch; 0 for none.
-            #[serde(default = "crate::stage::identified::five")]
-            pub folds: usize,
+            /// each contiguous stretch; 0 for none, `n` without each pose in turn.
+            #[serde(default)]
+            pub folds: crate::stage::folding::FoldSetting,
         }
 
         impl $name {
@@ -85,10 +86,7 @@ macro_rules! identification {
                 if self.on.is_empty() {
                     faults.push(crate::error::Fault::new("on", format!("expected at least one set, e.g. [{example}]")));
                 }
-                if self.folds == 1 || self.folds > crate::stage::identified::MOST_FOLDS {
-                    let most = crate::stage::identified::MOST_FOLDS;
-                    faults.push(crate::error::Fault::new("folds", format!("allowed: 0 for none, or 2 to {most}")));
-                }
+                faults.extend(self.folds.fault());
                 faults.extend(self.repeatability.fault());
                 faults
             }
@@ -96,13 +94,6 @@ macro_rules! identification {
     };
 }
 pub(crate) use identification;
-
-/// Beyond this, every fold is a fit for next to no news.
-pub(crate) const MOST_FOLDS: usize = 100;
-
-pub(crate) fn five() -> usize {
-    5
-}
 
 pub(crate) fn yes() -> bool {
     true
@@ -142,7 +133,7 @@ pub struct Fitting<'a> {
     /// One standard deviation of every revolute joint that rows are weighted by, rad.
     pub repeatability: Option<f64>,
     /// Parts of a cross-validation.
-    pub folds: usize,
+    pub folds: FoldSetting,
 }
 
 impl Identified {
@@ -164,8 +155,7 @@ impl Identified {
         screened::note(context, fitting.screening, fitting.recording);
         let Screening { suspects, .. } = fitting.screening;
         let aside = suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
-        let folds =
-            cross_validate(&Session { data: fitting.data, rows: fitting.rows, model, fitted }, fitting.folds, context.seed);
+        let (folds, dropped) = fitting.folds.folds(&Session { data: fitting.data, rows: fitting.rows, model, fitted }, context);
         let unseen = |(row, _): &(&usize, _)| !fitting.seen_before[**row];
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
@@ -174,6 +164,7 @@ impl Identified {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
             folds: folds.as_ref().map(|folds| folds.count),
+            unfolded: dropped,
             earlier: of_model
                 .as_ref()
                 .map_or(0, |all| all.parameters().len() - fitted.covariance.as_ref().map_or(0, |own| own.parameters().len())),

@@ -11,6 +11,7 @@ mod columns;
 pub mod encoding;
 mod layout;
 mod lines;
+mod listing;
 mod mapped;
 mod motion;
 mod noise;
@@ -18,20 +19,24 @@ mod number;
 mod pair;
 mod parquet;
 mod reading;
+mod rejections;
 mod row;
 mod scan;
 mod slots;
 mod verdict;
+mod wide;
 mod write;
 
 pub use clock::is_clock_time;
 pub use columns::Columns;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
+pub use listing::ListedTable;
 pub use mapped::{
     ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn,
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};
+pub use wide::WideTargets;
 
 use crate::error::{Error, Result, counted};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};

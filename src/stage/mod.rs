@@ -5,6 +5,7 @@ mod compare;
 mod computed;
 mod curves;
 mod diagnose;
+mod folding;
 mod identified;
 mod identify;
 pub mod ingest;
@@ -25,6 +26,7 @@ mod weightless;
 
 pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
+pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};

@@ -70,7 +70,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
-    const IMPLEMENTATION: u32 = 9;
+    const IMPLEMENTATION: u32 = 10;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 

@@ -96,7 +96,7 @@ pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
 pub use intake::{Intake, IntakeRow};
 pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
 pub use network::{Network, NetworkRow};
-pub use observability::{FitContext, Observability, ObservabilityRow};
+pub use observability::{FitContext, Observability, ObservabilityRow, UNFOLDED};
 pub use parameters::{Corrected, ParameterRow, Parameters};
 pub use prediction::{Prediction, PredictionRow};
 pub use recording::{Recording, SOURCE as SIGMA_SOURCE, columns as recording_columns, frame as recording_frame};

@@ -15,6 +15,9 @@ crate::table::rows! { "observability",
 
 use crate::estimate::{Fitted, Repeated};
 
+/// The quantity of a step whose cross-validation was dropped.
+pub const UNFOLDED: &str = "unfolded";
+
 /// What stands beside a fit in its table.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FitContext {
@@ -24,6 +27,8 @@ pub struct FitContext {
     pub repeatability: Option<f64>,
     /// Parts of the cross-validation.
     pub folds: Option<usize>,
+    /// Poses that were too few, or too many, for the cross-validation that was asked for.
+    pub unfolded: Option<usize>,
     /// Parameters of the model whose covariance is an earlier step's.
     pub earlier: usize,
 }
@@ -31,7 +36,7 @@ pub struct FitContext {
 impl Observability {
     /// What a fit could see.
     pub fn of(step: &str, fitted: &Fitted, beside: &FitContext) -> Self {
-        let FitContext { geometry, repeatability, folds, earlier } = *beside;
+        let FitContext { geometry, repeatability, folds, unfolded, earlier } = *beside;
         let mut rows = Vec::new();
         let mut push = |quantity: &str, index: usize, value: f64, meaning: &str| {
             // A null space exactly zero has no logarithm, no ratio: such figures are left out, not stored as infinite.
@@ -89,6 +94,14 @@ impl Observability {
         }
         if let Some(folds) = folds {
             push("folds", 0, folds as f64, "parts of the poses without each of which the fit was repeated");
+        }
+        if let Some(poses) = unfolded {
+            push(
+                UNFOLDED,
+                0,
+                poses as f64,
+                "poses: not of a number for the folds that were asked for, so that nothing was cross-validated",
+            );
         }
         push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
         for (name, value, meaning) in &fitted.indices {

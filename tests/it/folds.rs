@@ -4,9 +4,9 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use crate::identify::{GEOMETRY, SIGMA, model, recording};
 use crate::sr210d::{experiment, settings};
-use calib::estimate::{FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit};
+use calib::estimate::{FitOptions, Fitted, Folds, Model, Session, align, cross_validate, fit, leave_one_out};
 use calib::robot::{Measurements, RobotModel};
-use calib::stage::{Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
+use calib::stage::{FoldSetting, Identify, IdentifyReads, Labelled, Stage, Validate, ValidateReads};
 use calib::table::{Observability, Prediction, Statistics};
 
 fn identify(data: &Measurements, effects: &[&str]) -> (Model, Fitted) {
@@ -131,6 +131,65 @@ fn statistics_have_the_folds_of_fitted_rows_and_of_no_others() {
     assert!(row.fold_rms_mm.is_some_and(|found| (found / rms(&errors) - 1.0).abs() < 1e-12));
     assert!(row.fold_rms_mm > Some(row.rms_mm));
     assert!(row.fold_expected_mm.is_some_and(|expected| (1.02..1.4).contains(&(expected / row.noise_rms_mm))));
-    let wrong = Identify { folds: 1, ..stage };
-    assert!(wrong.check().iter().any(|fault| fault.to_string() == "folds: allowed: 0 for none, or 2 to 100"));
+    let wrong = Identify { folds: FoldSetting::Parts(1), ..stage };
+    let allowed = "folds: allowed: 0 for none, 2 to 100, or n to leave out one pose after the other";
+    assert!(wrong.check().iter().any(|fault| fault.to_string() == allowed));
+}
+
+#[test]
+fn with_one_fold_a_pose_each_is_predicted_by_a_fit_to_all_others() {
+    let (data, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 40, 240);
+    let one_out = |data: &Measurements| {
+        let (model, fitted) = identify(data, &GEOMETRY);
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        leave_one_out(&Session { data, rows: &rows, model: &model, fitted: &fitted })
+    };
+    let found = one_out(&data).expect("enough poses");
+    assert_eq!((found.count, &found.random), (40, &found.blocks));
+    let robot = RobotModel::new(fixture::offset_wrist());
+    for left in [0, 17, 39] {
+        let kept: Vec<usize> = (0..40).filter(|row| *row != left).collect();
+        let start = model(&robot, align(&robot, &data, &kept), &GEOMETRY);
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
+        let (model, _) = fit(&start, &data, &FitOptions { rows: &kept, candidates: &candidates });
+        let error = (data.position[left] - model.predict(&data)[left]).norm();
+        assert!((found.random[left] - error).abs() < 0.02 * SIGMA, "{left}: {:e} for {error:e}", found.random[left]);
+    }
+    let mut twice = data.clone();
+    twice.q.extend_from_within(..);
+    twice.position.extend_from_within(..);
+    twice.sigma.extend_from_within(..);
+    twice.payload.extend_from_within(..);
+    assert_eq!(one_out(&twice).expect("enough poses").count, 40, "a pose that is measured twice is one");
+    let (few, _) = recording(&fixture::offset_wrist(), &GEOMETRY, 8, 5);
+    assert_eq!(one_out(&few), None);
+}
+
+#[test]
+fn folds_are_a_number_or_n_and_a_cross_validation_that_is_dropped_is_told() {
+    let of = experiment("none", 5);
+    let yaml = |folds: &str| serde_json::from_str::<FoldSetting>(folds);
+    assert_eq!(yaml("\"n\"").expect("a setting"), FoldSetting::EachPose);
+    assert_eq!(yaml("5").expect("a setting"), FoldSetting::default());
+    let wrong = yaml("\"all\"").expect_err("no setting").to_string();
+    assert!(wrong.contains("a number of folds (0 for none), or n for one a pose"), "{wrong}");
+    let run = |folds: FoldSetting| {
+        let desk = Desk::default();
+        let stage = Identify { folds, ..settings("geometry", "none") };
+        let reads = IdentifyReads { robot: of.robot.clone(), recording: of.recording.clone(), split: of.split.clone() };
+        let tables = desk.run(&stage, reads).expect("identify runs");
+        let observability: Observability = table(&tables).remove(0);
+        let value = |quantity: &str| observability.0.iter().find(|row| row.quantity == quantity).map(|row| row.value);
+        let warned: Vec<String> =
+            desk.warnings.lock().expect("warnings").iter().filter(|line| line.contains("cross")).cloned().collect();
+        (value("folds"), value("unfolded"), warned)
+    };
+    let each = run(FoldSetting::EachPose);
+    let poses = each.0.expect("folds");
+    assert_eq!((each.1, each.2.len()), (None, 0));
+    let (folds, unfolded, warned) = run(FoldSetting::Parts(100));
+    assert_eq!((folds, unfolded), (None, Some(poses)));
+    assert!(warned[0].starts_with(&format!("not cross-validated: {poses} poses in ")), "{warned:?}");
+    assert!(warned[0].contains("allowed: two poses for each of 100 folds"), "{warned:?}");
+    assert_eq!(run(FoldSetting::Parts(0)), (None, None, Vec::new()));
 }

@@ -6,8 +6,11 @@ mod foreign;
 mod kinds;
 mod moving;
 mod noise;
+mod programs;
 mod refusals;
 mod together;
+mod wide;
+mod workbooks;
 
 use crate::desk::{Desk, shared, table};
 use calib::error::{Error, Result};

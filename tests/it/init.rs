@@ -1,5 +1,6 @@
 //! `init` writes what `check` accepts and `run` runs, and overwrites nothing; completions and manual pages are made.
 
+mod foreign;
 mod layouts;
 
 use crate::compensate::calib;

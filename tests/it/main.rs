@@ -70,3 +70,4 @@ mod transfer;
 mod twin;
 mod vouched;
 mod weights;
+mod workbook;

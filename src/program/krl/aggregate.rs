@@ -163,7 +163,9 @@ impl<'t> Aggregate<'t> {
             return;
         }
         let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
-        found.literals.push(Literal { kind: if kind.axes { TargetKind::Joints } else { TargetKind::Frame }, values, spans });
+        let external = EXTERNALS.into_iter().map(|name| given(name).map(|(_, value, _)| *value)).collect();
+        let kind = if kind.axes { TargetKind::Joints } else { TargetKind::Frame };
+        found.literals.push(Literal { kind, values, spans, external });
     }
 
     /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.

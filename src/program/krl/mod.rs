@@ -8,11 +8,13 @@
 mod aggregate;
 mod frames;
 mod line;
+mod listed;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
 use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
+pub(super) use listed::listed;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Motions, and how many positions each has.

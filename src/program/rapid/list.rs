@@ -153,6 +153,8 @@ impl<'t> List<'t> {
             let message = format!("external axis at {value}: calib assumed that external axes do not move the robot");
             found.warn(span.start, message);
         }
+        let axis = |(value, _): &(f64, _)| (*value != NOT_CONNECTED).then_some(*value);
+        let external = numbers.last().into_iter().flatten().map(axis).collect();
         let used = if want == Want::Joints { 1 } else { 2 };
         let (values, spans): (Vec<f64>, Vec<Range<usize>>) = numbers.into_iter().take(used).flatten().unzip();
         if want == Want::Pose {
@@ -163,7 +165,7 @@ impl<'t> List<'t> {
             }
         }
         let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal { kind, values, spans });
+        found.literals.push(Literal { kind, values, spans, external });
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {

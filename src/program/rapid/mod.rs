@@ -6,10 +6,12 @@
 //! correction of the unshifted one; a warning names the line.
 
 mod list;
+mod listed;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
 use list::{List, Want};
+pub(super) use listed::listed;
 use std::collections::BTreeMap;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.

@@ -5,8 +5,10 @@ use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::FileLayout;
 use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
+use super::wide::WideTargets;
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
+use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
 use std::ops::Range;
 
@@ -26,6 +28,8 @@ pub(super) struct Binding {
     pub measures: bool,
     pub sequence: Option<usize>,
     pub cells: Vec<NumberBinding>,
+    /// Of a wide row the point of each target.
+    pub points: Vec<(String, [NumberBinding; 3])>,
     /// Numbers that are the same in every row, SI.
     pub constants: Vec<(usize, f64)>,
     /// Joints (from 0) from which so many times another one is taken off.
@@ -104,6 +108,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         measures: false,
         sequence: None,
         cells: Vec::new(),
+        points: Vec::new(),
         constants: Vec::new(),
         coupled: Vec::new(),
         missing: Vec::new(),
@@ -154,9 +159,13 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     for (declared, mapped) in columns.joints() {
         binder.joints(declared, mapped, arm)?;
     }
+    if let Some(targets) = &layout.targets {
+        binder.points(targets)?;
+    }
     let cells = &binder.binding.cells;
     let measured = arm.slots.kinds.iter().flat_map(|kind| &kind.values);
-    binder.binding.measures = measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index));
+    binder.binding.measures =
+        measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index)) || layout.targets.is_some();
     if binder.faults.is_empty() {
         Ok(binder.binding)
     } else {
@@ -257,6 +266,20 @@ impl Binder<'_> {
                     let cell = self.cell(declared, false, index, column, unit);
                     self.binding.cells.push(NumberBinding { optional: mapped.optional, divisor, ..cell });
                 }
+            }
+        }
+        Ok(())
+    }
+    /// The points of a wide row.
+    fn points(&mut self, targets: &WideTargets) -> Result<()> {
+        let unit = unit(Some(&targets.unit))?;
+        let axes = ["x", "y", "z"].map(|axis| recording_columns().find(|column| column.setting == axis));
+        let [Some(x), Some(y), Some(z)] = axes else { return Err(Error::Bug("a recording without points".into())) };
+        for (target, references) in &targets.columns {
+            let found = references.each_ref().map(|reference| self.column(reference, target, false));
+            if let [Some(a), Some(b), Some(c)] = found {
+                let cells = [(x, a), (y, b), (z, c)].map(|(declared, column)| self.cell(declared, false, 0, column, unit));
+                self.binding.points.push((target.clone(), cells));
             }
         }
         Ok(())

@@ -63,7 +63,10 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         faults.push(Fault::new(format!("{place}.skip_below_header"), "there is no header; use `skip`"));
     }
     let columns = &file.columns;
-    if columns.names().is_empty() {
+    if let Some(targets) = &file.targets {
+        faults.extend(targets.faults(&columns.names(), file.header, place));
+    }
+    if file.names().is_empty() {
         faults.push(Fault::new(format!("{place}.columns"), "no quantity is mapped"));
     }
     for (declared, text) in columns.texts() {
@@ -305,8 +308,8 @@ fn together(settings: &Ingest, faults: &mut Vec<Fault>) {
         _ => None,
     };
     for (index, file) in files.iter().enumerate().skip(1) {
-        for name in file.columns.names() {
-            if files[..index].iter().any(|other| other.columns.names().contains(&name)) && Some(name) != key {
+        for name in file.names() {
+            if files[..index].iter().any(|other| other.has(name)) && Some(name) != key {
                 faults.push(Fault::new(format!("files[{index}].columns.{name}"), "mapped in two files; map it in one"));
             }
         }
@@ -360,7 +363,7 @@ fn motion_faults(settings: &Ingest, faults: &mut Vec<Fault>) {
 }
 
 fn complete(files: &[FileLayout], needed: &[&str], place: &str, faults: &mut Vec<Fault>) {
-    let mapped: Vec<&str> = files.iter().flat_map(|file| file.columns.names()).collect();
+    let mapped: Vec<&str> = files.iter().flat_map(FileLayout::names).collect();
     let missing: Vec<&str> = needed.iter().copied().filter(|name| !mapped.contains(name)).collect();
     if !missing.is_empty() {
         faults.push(Fault::new(place, format!("not mapped: {}", missing.join(", "))));

@@ -3,6 +3,7 @@
 //! Nothing is guessed: an unmapped column is ignored, a mapped one that is not there is an error unless it is `optional`.
 
 use super::columns::Columns;
+use super::wide::{HELD, WideTargets};
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,9 +12,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FileLayout {
-    /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; or a flat
-    /// Parquet file, for which only `columns` matters.
+    /// Path of the file: text in UTF-8 (with or without a byte-order mark) or Windows-1252, rows ending in LF or CRLF; a workbook
+    /// (.xlsx, .xlsm), a sheet of which is read as text is; or a flat Parquet file, for which only `columns` matters.
     pub file: RawFile,
+    /// The sheet of a workbook; without it the only visible one with rows of numbers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<String>,
     /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
     #[serde(default = "comma")]
     pub delimiter: String,
@@ -35,8 +39,22 @@ pub struct FileLayout {
     /// The header is written as a comment: it begins with the text of `comment`, which is no part of the first name.
     #[serde(default, skip_serializing_if = "is_false")]
     pub header_in_comment: bool,
+    /// Where several targets stand side by side in a row, the columns of each, instead of x, y, z and target under `columns`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub targets: Option<WideTargets>,
     /// Which column holds which quantity.
     pub columns: Columns,
+}
+
+impl FileLayout {
+    /// Names of all quantities that the file holds.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let wide = HELD.into_iter().filter(|_| self.targets.is_some());
+        self.columns.names().into_iter().chain(wide).collect()
+    }
+    pub(super) fn has(&self, setting: &str) -> bool {
+        self.names().contains(&setting)
+    }
 }
 
 fn comma() -> String {

@@ -17,7 +17,7 @@ pub(super) type Buffered = BufReader<Box<dyn Read + Send>>;
 /// Reads one file from its first line to its last.
 pub(super) struct TextReader {
     reader: Buffered,
-    label: String,
+    pub label: String,
     delimiter: Delimiter,
     comment: Option<Vec<u8>>,
     /// The next row is the header, and a comment.
@@ -258,6 +258,7 @@ mod tests {
     fn rows(text: &str, delimiter: &str, comment: Option<&str>) -> Vec<(u64, Vec<String>)> {
         let layout = FileLayout {
             file: Default::default(),
+            sheet: None,
             delimiter: delimiter.into(),
             decimal: Default::default(),
             header: true,
@@ -265,6 +266,7 @@ mod tests {
             skip_below_header: 0,
             comment: comment.map(Into::into),
             header_in_comment: false,
+            targets: None,
             columns: Default::default(),
         };
         let reader = BufReader::new(Box::new(std::io::Cursor::new(text.to_string())) as Box<dyn Read + Send>);

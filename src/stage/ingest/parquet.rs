@@ -16,7 +16,7 @@ const BATCH: usize = 1 << 10;
 /// Reads one file from its names to its last row.
 pub(super) struct ParquetReader {
     reader: ParquetFile,
-    label: String,
+    pub label: String,
     names: Option<Vec<String>>,
     batch: Option<(RecordBatch, usize)>,
     /// Rows read so far.

@@ -78,6 +78,8 @@ pub(super) struct RecordedRow {
     pub sequence: Option<i64>,
     /// SI, by the places of the arm's slots; NaN where missing.
     pub values: Vec<f64>,
+    /// Of a wide row the point of each target, SI; NaN where it was not seen.
+    pub points: Vec<[f64; 3]>,
     /// The first joint beyond its limits, from 0.
     pub beyond: Option<usize>,
     /// The first revolute joint beyond one and a half turns, from 0, and its angle, rad; also where the row is refused.
@@ -105,6 +107,7 @@ impl RowReader<'_> {
         row.beyond = None;
         row.turned = None;
         row.line = record.line;
+        row.points.clear();
         row.values.clear();
         row.values.resize(self.arm.slots.count, f64::NAN);
         if record.is_blank(0) {
@@ -128,6 +131,7 @@ impl RowReader<'_> {
             }
         }
         self.numbers(record, row)?;
+        self.points(record, row)?;
         self.conventions(row)?;
         self.measured(row)?;
         self.plausible(row)?;
@@ -181,6 +185,32 @@ impl RowReader<'_> {
         let q = row.values.get_mut(self.arm.slots.q.clone()).unwrap_or_default();
         for (joint, by, ratio) in &self.binding.coupled {
             q[*joint] -= ratio * q[*by];
+        }
+        Ok(())
+    }
+
+    /// The points of a wide row: of a target that was not seen all cells are blank, or 0.
+    fn points(&self, record: &RecordFields, row: &mut RecordedRow) -> Result<(), RowRefusal> {
+        for (target, cells) in &self.binding.points {
+            let mut point = [f64::NAN; 3];
+            for (value, cell) in point.iter_mut().zip(cells) {
+                let Some(own) = self.number(record, cell.column, &cell.name, true)? else { continue };
+                *value = cell.unit.to_si(own);
+                let [lower, upper] = cell.range;
+                if !(lower..=upper).contains(value) {
+                    let [lower, upper] = [lower, upper].map(|limit| round(cell.unit.from_si(limit)));
+                    let found = shown(record, cell.column);
+                    return refuse(
+                        Reason::OutOfRange,
+                        format!("{}: `{found}`; allowed: {lower} to {upper} {}", cell.name, cell.unit),
+                    );
+                }
+            }
+            let blank = point.iter().filter(|value| value.is_nan()).count();
+            if blank == 1 || blank == 2 {
+                return refuse(Reason::Blank, format!("the point of {target} is incomplete"));
+            }
+            row.points.push(if point == [0.0; 3] { [f64::NAN; 3] } else { point });
         }
         Ok(())
     }
@@ -247,7 +277,8 @@ impl RowReader<'_> {
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
         let kinds = &self.arm.slots.kinds;
-        if self.binding.measures && !kinds.iter().any(|kind| kind.values.iter().any(there)) {
+        let seen = row.points.iter().any(|point| !point[0].is_nan());
+        if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
         for KindSlots { kind, values, sigma } in kinds.iter().filter(|own| own.kind.about().own_sigma) {

@@ -66,11 +66,15 @@ pub(super) struct PackedRows {
     pub ids: Vec<String>,
     /// By [`Slots::texts`](super::slots::Slots::texts); none of those that the file does not have.
     pub texts: Vec<Option<Vec<String>>>,
+    /// Of wide rows the points of so many targets each.
+    pub points: Vec<[f64; 3]>,
+    pub targets: usize,
 }
 
 impl PackedRows {
     fn push(&mut self, row: &RecordedRow, named: bool) {
         self.values.extend(self.slots.iter().map(|slot| row.values.get(*slot).copied().unwrap_or(f64::NAN)));
+        self.points.extend((0..self.targets).map(|k| row.points.get(k).copied().unwrap_or([f64::NAN; 3])));
         if named {
             self.ids.push(row.id.clone());
         }
@@ -120,13 +124,18 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
     let mut reading = OpenedFile::open(source, layout, arm, settings.limits)?;
     let label = reading.label.clone();
     context.services.begin(&format!("reading {label}"), size, "bytes");
-    for missing in &reading.binding().missing {
-        context.services.note(format!("{label}: {missing}"));
+    for remark in reading.remarks() {
+        context.services.note(format!("{label}: {remark}"));
     }
     let joined = matches!(settings.join, Some(Join::Id {} | Join::Time { .. } | Join::Order {}));
     let slots = reading.binding().slots();
     let texts = || arm.slots.texts().iter().map(|name| layout.columns.has(name).then(Vec::new)).collect();
-    let packed = (joined && index > 0).then(|| PackedRows { slots: slots.clone(), texts: texts(), ..PackedRows::default() });
+    let packed = (joined && index > 0).then(|| PackedRows {
+        slots: slots.clone(),
+        texts: texts(),
+        targets: reading.binding().points.len(),
+        ..PackedRows::default()
+    });
     let mut scan = Scan {
         label,
         lines: 0,
@@ -224,7 +233,7 @@ fn key(row: &RecordedRow, file: usize, label: &str) -> Result<IdFingerprint> {
 /// Hash of the numbers and texts of a row.
 fn content(row: &RecordedRow) -> u64 {
     let mut hasher = blake3::Hasher::new();
-    for value in &row.values {
+    for value in row.values.iter().chain(row.points.iter().flatten()) {
         hasher.update(&value.to_bits().to_le_bytes());
     }
     for text in &row.texts {

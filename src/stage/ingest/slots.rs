@@ -57,6 +57,10 @@ impl Slots {
         let found = self.columns.iter().find(|(column, _)| column.setting == setting);
         found.map_or(0..0, |(_, places)| places.clone())
     }
+    /// The places of a measured point.
+    pub(super) fn point(&self) -> Range<usize> {
+        self.of("x").start..self.of("z").end
+    }
     /// All columns with numbers, and their places.
     pub(super) fn numbers(&self) -> impl Iterator<Item = &(&'static DeclaredColumn, Range<usize>)> {
         self.columns.iter().filter(|(_, places)| !places.is_empty())

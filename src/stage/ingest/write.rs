@@ -5,6 +5,7 @@ use super::layout::{FileLayout, Join};
 use super::noise::NoiseSlots;
 use super::pair::{FileDecision, NONE};
 use super::reading::{OpenedFile, ProgressCounter};
+use super::rejections::Rejections;
 use super::row::{Reason, RecordedRow, RowRefusal};
 use super::scan::Scan;
 use super::{Ingest, verdict};
@@ -17,8 +18,6 @@ use crate::units::Unit;
 
 /// Rows of the recording in memory at once.
 const CHUNK: usize = 1 << 16;
-/// Rejected rows in memory at once, where they come in order.
-const REJECTED_CHUNK: usize = 1 << 12;
 
 /// What all files give and decide together.
 pub(super) struct JoinDecisions<'a> {
@@ -134,9 +133,24 @@ impl JoinDecisions<'_> {
     fn later(&self, moving: usize, row: &RecordedRow, fate: &FileDecision) -> Option<f64> {
         let values = || KINDS.iter().flat_map(|kind| kind.columns(Part::Value));
         let files = &self.settings.files;
-        let point = files.iter().position(|file| values().any(|column| file.columns.has(column.setting)))?;
+        let point = files.iter().position(|file| values().any(|column| file.has(column.setting)))?;
         let later = self.moment(point, row, fate)? - self.moment(moving, row, fate)?;
         Some(later).filter(|later| later.is_finite())
+    }
+    /// Of a wide row of file `index`, or of its partner, the targets that were seen: which, from 1, by name, where. None of other rows.
+    fn points(&self, index: usize, row: &RecordedRow, fate: &FileDecision) -> Option<Vec<(i64, &String, [f64; 3])>> {
+        let files = &self.settings.files;
+        let wide = |file: &usize| files.get(*file).is_some_and(|layout| layout.targets.is_some());
+        let file = if fate.partners.is_empty() { Some(index).filter(wide) } else { (0..files.len()).find(wide) }?;
+        let names = files.get(file)?.targets.as_ref()?.columns.keys();
+        let points = if file == index {
+            row.points.as_slice()
+        } else {
+            let at = (self.number(file, index, row, fate)? as usize - 1) * names.len();
+            self.scans.get(file)?.packed.as_ref()?.points.get(at..at + names.len())?
+        };
+        let seen = names.zip(points).zip(1..).filter(|((_, point), _)| !point[0].is_nan());
+        Some(seen.map(|((name, point), at)| (at, name, *point)).collect())
     }
     fn name(&self, index: usize) -> &str {
         self.names.get(index).map_or("", String::as_str)
@@ -186,6 +200,8 @@ struct Chunks<'a> {
     written: u64,
     /// Data rows of the files before this one.
     before: u64,
+    /// The most targets of a wide row; 1 where there is none.
+    widest: i64,
 }
 
 impl<'a> Chunks<'a> {
@@ -203,14 +219,14 @@ impl<'a> Chunks<'a> {
         let noise = NoiseSlots::new(slots, decided.settings.instrument);
         let files = &decided.settings.files;
         let points = || KINDS[..1].iter().flat_map(|kind| kind.columns(Part::Value));
-        let measured = files.iter().any(|file| points().any(|column| file.columns.has(column.setting)));
+        let measured = files.iter().any(|file| points().any(|column| file.has(column.setting)));
         if measured {
             noise.sigma().into_iter().for_each(|place| has[place] = true);
         }
         // Every recording has points and the names of its rows.
         let always: Vec<&str> = points().map(|column| column.setting).collect();
         let text = |name: &&'static str| {
-            let named = *name == "usage" || files.iter().any(|file| file.columns.has(name));
+            let named = *name == "usage" || files.iter().any(|file| file.has(name));
             (*name, named.then(Vec::new))
         };
         let mut numbers = Vec::new();
@@ -236,6 +252,12 @@ impl<'a> Chunks<'a> {
             last_sequence: None,
             written: 0,
             before: 0,
+            widest: files
+                .iter()
+                .filter_map(|file| file.targets.as_ref())
+                .map(|targets| targets.columns.len() as i64)
+                .max()
+                .unwrap_or(1),
         })
     }
     fn push(&mut self, row: &RecordedRow, index: usize, fate: &FileDecision, decided: &JoinDecisions) -> Result<()> {
@@ -259,11 +281,6 @@ impl<'a> Chunks<'a> {
             }
         }
         self.carry(decided, index, row, fate);
-        let source = self.noise.fill(&mut self.merged);
-        if let Some(sources) = &mut self.sources {
-            self.inferred += u64::from(source == SigmaSource::Inferred);
-            sources.push(source);
-        }
         let number = self.before + row.number;
         let sequence = row.sequence.unwrap_or(number as i64);
         if let Some(last) = self.last_sequence.replace(sequence)
@@ -273,10 +290,32 @@ impl<'a> Chunks<'a> {
             let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
             return Err(Error::data(format!("{label}:{}", row.line), message));
         }
+        let id = if id.is_empty() { format!("row {number}") } else { id.clone() };
+        let Some(points) = decided.points(index, row, fate) else { return self.one(sequence, id, &texts) };
+        // Numbered through: the targets of a row follow each other.
+        let first = sequence.saturating_sub(1).saturating_mul(self.widest);
+        let (merged, of_target) = (self.merged.clone(), self.texts.iter().position(|(name, _)| *name == "target"));
+        for (at, target, point) in points {
+            self.merged.clone_from(&merged);
+            self.merged[decided.arm.slots.point()].copy_from_slice(&point);
+            if let Some(text) = of_target.and_then(|place| texts.get_mut(place)) {
+                *text = target;
+            }
+            self.one(first.saturating_add(at), id.clone(), &texts)?;
+        }
+        Ok(())
+    }
+    /// A row of the recording: the merged numbers and these texts.
+    fn one(&mut self, sequence: i64, id: String, texts: &[&String]) -> Result<()> {
+        let source = self.noise.fill(&mut self.merged);
+        if let Some(sources) = &mut self.sources {
+            self.inferred += u64::from(source == SigmaSource::Inferred);
+            sources.push(source);
+        }
         self.sequence.push(sequence);
-        self.ids.push(if id.is_empty() { format!("row {number}") } else { id.clone() });
+        self.ids.push(id);
         for ((_, into), text) in self.texts.iter_mut().zip(texts) {
-            into.iter_mut().for_each(|texts| texts.push((!text.is_empty()).then(|| text.clone())));
+            into.iter_mut().for_each(|texts| texts.push((!text.is_empty()).then(|| text.to_string())));
         }
         self.numbers.iter_mut().for_each(|stored| stored.values.push(self.merged[stored.place]));
         self.written += 1;
@@ -339,33 +378,6 @@ impl<'a> Chunks<'a> {
                 least.constant_um, least.per_metre_um, least.coverage
             ));
         }
-        Ok(StreamedTable::new(self.sink.finish()?))
-    }
-}
-
-/// The rejected rows, in the order of the table's key.
-struct Rejections<'a> {
-    sink: Box<dyn Sink + 'a>,
-    rows: Vec<RejectedRow>,
-    /// The files are read in the order of their names.
-    ordered: bool,
-}
-
-impl<'a> Rejections<'a> {
-    fn new(names: &[String], context: &Context<'a>) -> Result<Self> {
-        Ok(Self { sink: context.services.sink(Rejected::KIND)?, rows: Vec::new(), ordered: names.is_sorted() })
-    }
-    fn push(&mut self, row: RejectedRow) -> Result<()> {
-        self.rows.push(row);
-        if self.ordered && self.rows.len() >= REJECTED_CHUNK { self.flush() } else { Ok(()) }
-    }
-    fn flush(&mut self) -> Result<()> {
-        self.rows.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
-        self.sink.push(Rejected(std::mem::take(&mut self.rows)).to_frame()?)
-    }
-    fn finish(mut self) -> Result<StreamedTable<Rejected>> {
-        // Also where nothing was rejected: a table without rows has its columns.
-        self.flush()?;
         Ok(StreamedTable::new(self.sink.finish()?))
     }
 }

@@ -15,20 +15,20 @@ fn coordinate(row: usize, axis: usize) -> f64 {
 }
 
 /// So many cells of a row, joined by `delimiter`.
-fn cells(count: usize, delimiter: &str, cell: impl Fn(usize) -> String) -> String {
+pub(super) fn cells(count: usize, delimiter: &str, cell: impl Fn(usize) -> String) -> String {
     (0..count).map(cell).collect::<Vec<_>>().join(delimiter)
 }
 
-fn joints(row: usize, delimiter: &str) -> String {
+pub(super) fn joints(row: usize, delimiter: &str) -> String {
     cells(6, delimiter, |joint| format!("{:.4}", angle(row, joint)))
 }
 
-fn point(row: usize, delimiter: &str) -> String {
+pub(super) fn point(row: usize, delimiter: &str) -> String {
     cells(3, delimiter, |axis| format!("{:.4}", coordinate(row, axis)))
 }
 
 /// A header and thirty rows.
-fn table(header: &str, row: impl Fn(usize) -> String) -> String {
+pub(super) fn table(header: &str, row: impl Fn(usize) -> String) -> String {
     let mut text = format!("{header}\n");
     (0..30).for_each(|k| writeln!(text, "{}", row(k)).expect("text"));
     text
@@ -44,13 +44,13 @@ fn latin(text: &str) -> Vec<u8> {
 }
 
 /// What `init` made of files.
-struct Made {
-    folder: TempDir,
-    pipeline: String,
-    said: String,
+pub(super) struct Made {
+    pub folder: TempDir,
+    pub pipeline: String,
+    pub said: String,
 }
 
-fn made(files: &[(&str, Vec<u8>)]) -> Made {
+pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, content) in files {
         std::fs::write(folder.path().join(name), content).expect("a file");
@@ -72,11 +72,11 @@ fn two(controller: impl Into<Vec<u8>>, tracker: impl Into<Vec<u8>>) -> Made {
 }
 
 impl Made {
-    fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         self.folder.path()
     }
     /// The pipeline holds these, and each in a line that counts.
-    fn has(&self, parts: &[&str]) -> &Self {
+    pub fn has(&self, parts: &[&str]) -> &Self {
         for part in parts {
             let there = self.pipeline.lines().any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
             assert!(there, "{part} in\n{}", self.pipeline);
@@ -84,21 +84,21 @@ impl Made {
         self
     }
     /// No line that counts holds one of these.
-    fn lacks(&self, parts: &[&str]) -> &Self {
+    pub fn lacks(&self, parts: &[&str]) -> &Self {
         for part in parts {
             let there = self.pipeline.lines().any(|line| line.contains(part) && !line.trim_start().starts_with('#'));
             assert!(!there, "{part} in\n{}", self.pipeline);
         }
         self
     }
-    fn says(&self, parts: &[&str]) -> &Self {
+    pub fn says(&self, parts: &[&str]) -> &Self {
         for part in parts {
             assert!(self.pipeline.contains(part), "{part} in\n{}", self.pipeline);
         }
         self
     }
     /// `check` finds nothing wrong, and the recording has so many rows.
-    fn runs(&self, rows: usize) -> &Self {
+    pub fn runs(&self, rows: usize) -> &Self {
         let check = calib(self.path(), &["check", "pipeline.yaml"], "");
         let told = String::from_utf8_lossy(&check.stderr).into_owned();
         assert!(check.status.success(), "{told}\n{}", self.pipeline);
@@ -283,10 +283,19 @@ fn nominal_and_actual_points_are_told_apart_in_every_order() {
 
 #[test]
 fn of_two_points_that_fit_alike_both_are_listed() {
-    let made = one(table("A1,A2,A3,A4,A5,A6,smrA_x,smrA_y,smrA_z,smrB_x,smrB_y,smrB_z", |k| {
-        format!("{},{},{}", joints(k, ","), point(k, ","), point(k + 3, ","))
-    }));
-    made.has(&["x: {column: \"smrA_x\", unit: mm}   # CHECK"]).says(&["# x: {column: \"smrB_x\", unit: mm}   # CHECK"]).runs(30);
+    let two = |header: &str| {
+        let row = |k: usize| format!("{},{},{}", joints(k, ","), point(k, ","), point(k + 3, ","));
+        one(table(&format!("A1,A2,A3,A4,A5,A6,{header}"), row))
+    };
+    let made = two("before_x,before_y,before_z,after_x,after_y,after_z");
+    made.has(&["x: {column: \"before_x\", unit: mm}   # CHECK"])
+        .says(&["# x: {column: \"after_x\", unit: mm}   # CHECK"])
+        .runs(30);
+    let made = two("smrA_x,smrA_y,smrA_z,smrB_x,smrB_y,smrB_z");
+    let both = "{smra: [\"smrA_x\", \"smrA_y\", \"smrA_z\"], smrb: [\"smrB_x\", \"smrB_y\", \"smrB_z\"]}}   # CHECK";
+    made.has(&[&format!("targets: {{unit: mm, columns: {both}")])
+        .says(&["# x: {column: \"smrB_x\", unit: mm}   # CHECK"])
+        .runs(60);
 }
 
 #[test]
@@ -306,7 +315,7 @@ fn a_file_without_a_header_gets_both_files_with_what_was_seen() {
     made.has(&["header: false", "q: {columns: [1, 2, 3, 4, 5, 6], unit: deg}   # REPLACE"]);
     made.says(&["column 7: ", " to "]);
     let sheet = one(&b"PK\x03\x04\x14\x00\x06\x00binary"[..]);
-    sheet.says(&["REPLACE", "save it as CSV"]);
+    sheet.says(&["REPLACE", "saved as CSV"]);
     let prose = one("nothing\nto see\n");
     prose.says(&["REPLACE", "nothing", "to see"]);
     assert!(prose.said.contains("no header found"), "{}", prose.said);

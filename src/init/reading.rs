@@ -1,0 +1,60 @@
+//! A file of any kind as the tables that are in it.
+
+use super::sheet::Sheet;
+use crate::error::{Error, Result};
+use crate::program::listing;
+use crate::raw::{self, Workbook, is_workbook};
+use crate::stage::ingest::{ListedTable, encoding};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// Bytes and lines that are looked at.
+const LOOKED: u64 = 16 << 20;
+const LINES: usize = 20_000;
+
+/// The table of a file; of a workbook its sheets with rows of numbers, where there are so many places for them.
+pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
+    let place = path.display().to_string();
+    let file = raw::open(path).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+    let failed = |error: std::io::Error| Error::store(&place, format!("cannot be read: {error}"));
+    let mut reader = BufReader::new(file);
+    let head = reader.fill_buf().map_err(failed)?;
+    if is_workbook(head) {
+        return Ok(sheets(reader, places).unwrap_or_else(|trouble| vec![Sheet::not_understood(trouble)]));
+    }
+    if let Some(language) = listing(&raw::ending(path), head) {
+        let table = ListedTable::read(reader, &place, language);
+        return Ok(vec![table.map_or_else(|error| Sheet::not_understood(error.to_string()), Sheet::of_program)]);
+    }
+    if let Some(kind) = no_text(head) {
+        return Ok(vec![Sheet::not_understood(kind.into())]);
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for line in reader.take(LOOKED).split(b'\n').take(LINES) {
+        let line = line.map_err(failed)?;
+        lines.push(encoding::shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
+    }
+    Ok(vec![Sheet::of(&lines)])
+}
+
+fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
+    let mut book = Workbook::read(source)?;
+    let tables = book.tables()?;
+    let one = [if (1..=places).contains(&tables.len()) { String::new() } else { book.sheet(None)? }];
+    let names = if one[0].is_empty() { &tables[..] } else { &one };
+    let sheet = |name: &String| {
+        let lines: Vec<String> = book.lines(name, '.')?.lines().take(LINES).map(String::from).collect();
+        Ok(Sheet::of_workbook(name, &lines))
+    };
+    names.iter().map(sheet).collect()
+}
+
+/// What a file is that is no delimited text.
+fn no_text(head: &[u8]) -> Option<&'static str> {
+    match head {
+        [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file: its columns are not looked at; name them"),
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("a text in UTF-16; save it as UTF-8"),
+        _ if head.contains(&0) => Some("no text"),
+        _ => None,
+    }
+}
