@@ -9,6 +9,8 @@ use crate::units::Unit;
 
 pub struct Backlash;
 
+/// -2 ln of the odds that lost motion grows with time, or that a joint yields otherwise from either side.
+const RARER: f64 = 4.0;
 /// Widths of the blur as shares of the threshold.
 const BLURS: [f64; 2] = [0.0, 0.5];
 /// Smallest and largest threshold and blur, as shares of the joint's largest load: there the load or the approach decides alone.
@@ -62,14 +64,37 @@ impl Cause for Backlash {
                 }
             }
             if both {
-                out.push(Hypothesis::new(form(Law::of(Variable::Approach { joint })), 1));
+                let side = Law::of(Variable::Approach { joint });
+                out.push(Hypothesis::new(form(side), 1));
+                let [start, end] = survey.time;
+                if end > start {
+                    let growing = side.times(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
+                    out.push(Hypothesis::new(form(growing), 2).penalised(RARER));
+                }
+                if survey.is_loaded(joint) {
+                    let yielding = side.times(Variable::Load { joint }, Basis::PROPORTIONAL);
+                    out.push(Hypothesis::new(form(yielding), 2).penalised(RARER));
+                }
             }
         }
         out
     }
 
-    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        vec![("half_gap".into(), Unit::Radian, 0.01)]
+    fn numbers(&self, term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        match term.law().times.map(|factor| factor.of) {
+            Some(Variable::Load { .. }) => vec![("half_gap_per_load".into(), Unit::RadianPerNewtonMetre, 1e-4)],
+            Some(_) => vec![("half_gap_in_the_end".into(), Unit::Radian, 0.01)],
+            None => vec![("half_gap".into(), Unit::Radian, 0.01)],
+        }
+    }
+
+    fn variant(&self, term: &Term) -> String {
+        match term.law().times.map(|factor| factor.of) {
+            Some(Variable::Load { .. }) => "by_load",
+            Some(_) => "growing",
+            None => "",
+        }
+        .into()
     }
 
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
@@ -86,6 +111,14 @@ impl Cause for Backlash {
 
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
+        let times = |term: &Term| term.law().times.map(|factor| factor.of);
+        match summary.terms(Self::NAME).next().and_then(times) {
+            Some(Variable::Load { .. }) => {
+                return format!("{place} yields otherwise from either side: half the difference is {}", summary.value());
+            }
+            Some(_) => return format!("the lost motion of {place} grows, to half a gap of {} in the end", summary.size()),
+            None => {}
+        }
         let by = match summary.terms(Self::NAME).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {

@@ -14,6 +14,8 @@ pub enum Direction {
     Torque(usize, f64),
     /// Of the row's anchor, tracker frame, m per unit.
     Anchor(Vector3<f64>),
+    /// Of the point as the instrument reads it, tracker frame, m per unit.
+    Instrument(Vector3<f64>),
 }
 
 /// Sums of all motions of a row. Twists at a station are added before the exponential, so the order of effects is irrelevant.
@@ -25,6 +27,8 @@ pub struct Deflection {
     pub station: Vec<Twist>,
     /// How far the row's anchor is from where it was believed, tracker frame, m.
     pub anchor: Vector3<f64>,
+    /// How far the point is read from where it is, tracker frame, m.
+    pub reading: Vector3<f64>,
     /// How far each joint yields to a torque more, rad/Nm.
     pub compliance: Vec<f64>,
     /// (parameter of the stack, direction); a parameter may appear several times.
@@ -48,6 +52,7 @@ impl Deflection {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
         Self {
             anchor: Vector3::zeros(),
+            reading: Vector3::zeros(),
             compliance: joint.clone(),
             joint,
             station,
@@ -62,6 +67,7 @@ impl Deflection {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
         self.anchor = Vector3::zeros();
+        self.reading = Vector3::zeros();
         self.compliance.fill(0.0);
         self.partials.clear();
     }
@@ -113,6 +119,12 @@ impl Deflection {
     pub fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
         self.anchor += rate * p[parameter];
         self.partial(parameter, Direction::Anchor(rate));
+    }
+
+    /// Moves what the instrument reads by `p[parameter] * rate` (m per unit).
+    pub fn misread(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
+        self.reading += rate * p[parameter];
+        self.partial(parameter, Direction::Instrument(rate));
     }
 
     /// What each parameter loads each joint with, Nm per unit: (parameter, joint, rate).

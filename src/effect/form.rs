@@ -105,7 +105,8 @@ impl Form {
     /// make up for it.
     pub fn is_of_the_measurement(&self) -> bool {
         let passing = || self.place() == Place::Base && self.variables() == [Variable::Time];
-        self.cause().is_of_the_measurement() || (self.cause().is_nameless() && passing())
+        let instrument = || self.place() == Place::Tracker;
+        self.cause().is_of_the_measurement() || (self.cause().is_nameless() && (passing() || instrument()))
     }
 }
 
@@ -136,6 +137,9 @@ impl Effect for Form {
     }
     fn needs_torque(&self) -> bool {
         self.inner.needs_torque()
+    }
+    fn needs_sight(&self) -> bool {
+        self.inner.needs_sight()
     }
     fn load_correction(&self, q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
         self.inner.load_correction(q, payload, p, out);

@@ -55,6 +55,11 @@ impl Law {
         Self { first: Factor { basis, ..self.first }, ..self }
     }
 
+    /// With another first variable.
+    pub fn by(self, of: Variable) -> Self {
+        Self { first: Factor { of, ..self.first }, ..self }
+    }
+
     /// How many functions it has.
     pub fn count(&self) -> usize {
         self.factors().map(Factor::count).product()

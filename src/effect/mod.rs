@@ -19,12 +19,14 @@ mod deflection;
 mod form;
 mod gear_cyclic;
 mod gear_flank;
+mod gear_load;
 mod gear_motor_cyclic;
 mod joint_compliance;
 mod joint_hardening;
 mod joint_log_lag;
 mod joint_offset;
 mod joint_table;
+mod joint_warming;
 mod law;
 mod link_compliance;
 mod link_geometry;
@@ -33,7 +35,9 @@ mod motion;
 mod payload_error;
 mod place;
 mod placed_row;
+mod presliding;
 mod reduction_ratio;
+mod sight;
 mod skeleton;
 mod spring;
 mod stack;
@@ -43,7 +47,11 @@ mod term;
 mod thermal_growth;
 mod tool_offset;
 mod tool_shift;
+mod tracker_circle;
 mod tracker_drift;
+mod tracker_elevation;
+mod tracker_offset;
+mod tracker_refraction;
 mod tracker_scale;
 mod unknown;
 mod unweighed_windup;
@@ -75,6 +83,7 @@ pub use motion::{Axes, Motion};
 pub use place::Place;
 pub use placed_row::{PlacedRow, PlacementBuffers};
 pub use reduction_ratio::ReductionRatio;
+pub use sight::{Polar, Sight};
 pub use stack::{EffectStack, PointMotion};
 pub use summary::{ParameterEstimate, Summary, people};
 pub use survey::{Hypothesis, Survey};
@@ -87,9 +96,10 @@ pub use viscous_windup::ViscousWindup;
 pub use words::{Clock, figure};
 pub use zero_shift::ZeroShift;
 
-use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel};
+use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// A parameter of an effect: its name, its unit and how large it may plausibly be.
@@ -117,11 +127,23 @@ pub struct ArmState<'a> {
     pub q: &'a [f64],
     /// Where the arm really hangs and what it carries; at rest at the zero pose unless an effect of the stack asks for it.
     pub posture: &'a Posture,
+    /// Where the target is, tracker frame, m; the origin unless the effect asks for it.
+    point: Vector3<f64>,
 }
 
 impl<'a> ArmState<'a> {
-    pub(crate) fn new(data: &'a Measurements, row: usize, posture: &'a Posture) -> Self {
-        Self { data, row, q: data.q(row), posture }
+    pub(crate) fn new(data: &'a Measurements, row: usize, posture: &'a Posture, point: Vector3<f64>) -> Self {
+        Self { data, row, q: data.q(row), posture, point }
+    }
+
+    /// The target as the instrument sees it.
+    pub fn sight(&self) -> Sight {
+        Sight::of(&self.point)
+    }
+
+    /// What of the rows before this one remembers.
+    pub fn memory(&self, memory: Memory) -> f64 {
+        self.data.memory(memory, self.row)
     }
 
     /// Load torque about each joint, Nm.
@@ -191,6 +213,10 @@ pub trait Effect: Send + Sync {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection);
     /// True if the effect reads [`ArmState::posture`].
     fn needs_torque(&self) -> bool {
+        false
+    }
+    /// True if the effect reads [`ArmState::sight`]; such a one reads no posture.
+    fn needs_sight(&self) -> bool {
         false
     }
     /// True if its motions are the same at every row, whatever the joints, the load and the time.

@@ -1,6 +1,6 @@
 //! Where a small motion enters the chain, and along which directions: the generators of laws.
 
-use super::{Deflection, NumberSpec, Place};
+use super::{ArmState, Deflection, NumberSpec, Place, Polar};
 use crate::robot::RobotModel;
 use crate::spatial::{Twist, screw};
 use crate::units::Unit;
@@ -26,6 +26,8 @@ pub enum Motion {
     Tracker { axes: Axes },
     /// The tool, axes of the base at the zero pose.
     Tool { axes: Axes },
+    /// What the instrument reads.
+    Instrument { of: Polar },
 }
 
 /// Directions of a frame's motion.
@@ -72,7 +74,7 @@ impl Motion {
             Self::Coupled { by, moved } => Place::Coupled(by, moved),
             Self::Links { first, last } => Place::Links(first, last),
             Self::Base { .. } => Place::Base,
-            Self::Tracker { .. } => Place::Tracker,
+            Self::Tracker { .. } | Self::Instrument { .. } => Place::Tracker,
             Self::Tool { .. } => Place::Tool,
         }
     }
@@ -81,7 +83,7 @@ impl Motion {
     pub(super) fn unit(&self, robot: &RobotModel) -> Unit {
         match *self {
             Self::Joint { joint } | Self::Coupled { moved: joint, .. } if robot.is_revolute(joint) => Unit::Radian,
-            Self::Axis { .. } => Unit::Radian,
+            Self::Axis { .. } | Self::Instrument { of: Polar::Azimuth | Polar::Elevation } => Unit::Radian,
             _ => Unit::Millimetre,
         }
     }
@@ -97,7 +99,15 @@ impl Motion {
     }
 
     /// Moves by function number `k` of `count`, which has `value`.
-    pub(super) fn add(&self, robot: &RobotModel, (k, count): (usize, usize), value: f64, p: &[f64], out: &mut Deflection) {
+    pub(super) fn add(
+        &self,
+        robot: &RobotModel,
+        state: &ArmState,
+        (k, count): (usize, usize),
+        value: f64,
+        p: &[f64],
+        out: &mut Deflection,
+    ) {
         match *self {
             Self::Joint { joint } | Self::Coupled { moved: joint, .. } => out.turn(k, p, joint, value),
             Self::Axis { joint, about, turning } => {
@@ -116,6 +126,7 @@ impl Motion {
             }
             Self::Base { axes } | Self::Tracker { axes } => shift(0, axes, k, value, p, out),
             Self::Tool { axes } => shift(robot.joints(), axes, k, value, p, out),
+            Self::Instrument { of } => out.misread(k, p, state.sight().moved(of) * value),
         }
     }
 }

@@ -128,7 +128,7 @@ impl PlacedRow<'_> {
                 Direction::Joint(k, rate) => joint(*k) * *rate,
                 Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
                 Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
-                Direction::Anchor(_) => continue,
+                Direction::Anchor(_) | Direction::Instrument(_) => continue,
             };
             emit(*parameter, rotation);
         }
@@ -178,5 +178,6 @@ pub(super) fn along(
         Direction::Station(station, rate) => by_station[*station] * rate,
         Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
         Direction::Anchor(_) => Vector3::zeros(),
+        Direction::Instrument(rate) => *rate,
     }
 }

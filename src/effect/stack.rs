@@ -15,6 +15,7 @@ pub struct EffectStack {
     specs: Vec<ParameterSpec>,
     base: Pose,
     needs_torque: bool,
+    needs_sight: bool,
 }
 
 impl EffectStack {
@@ -28,7 +29,8 @@ impl EffectStack {
             specs.extend(own);
         }
         let needs_torque = numbered.iter().any(|(effect, _)| effect.needs_torque());
-        Self { effects: numbered, specs, base, needs_torque }
+        let needs_sight = numbered.iter().any(|(effect, _)| effect.needs_sight());
+        Self { effects: numbered, specs, base, needs_torque, needs_sight }
     }
 
     /// All parameters in the order of `x`.
@@ -60,7 +62,7 @@ impl EffectStack {
         scratch.deflection.clear();
         scratch.deflection.bare = true;
         scratch.constant = None;
-        let state = ArmState::new(data, 0, &scratch.posture);
+        let state = ArmState::new(data, 0, &scratch.posture, Vector3::zeros());
         for (effect, range) in self.effects.iter().filter(|(effect, _)| effect.is_constant()) {
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
         }
@@ -88,7 +90,7 @@ impl EffectStack {
             scratch.deflection.station.copy_from_slice(station);
         }
         scratch.target = robot.setup().target(data.target(row));
-        self.deflect(Needs::Nothing, robot, data, row, x, scratch);
+        self.deflect(Needs::Nothing, robot, (data, row), x, scratch);
         let mut point = self.chain(robot, scratch);
         if self.needs_torque {
             scratch.deflection.keep();
@@ -99,9 +101,13 @@ impl EffectStack {
             for _ in 0..2 {
                 scratch.posture.gravity_torques(robot, data.payload[row], &scratch.load_correction);
                 scratch.deflection.restore();
-                self.deflect(Needs::Torque, robot, data, row, x, scratch);
+                self.deflect(Needs::Torque, robot, (data, row), x, scratch);
                 point = self.chain(robot, scratch);
             }
+        }
+        if self.needs_sight {
+            self.deflect(Needs::Sight(point), robot, (data, row), x, scratch);
+            point += scratch.deflection.reading;
         }
         PlacedRow { robot, scratch, point }
     }
@@ -162,14 +168,18 @@ impl EffectStack {
         &self,
         needs: Needs,
         robot: &RobotModel,
-        data: &Measurements,
-        row: usize,
+        (data, row): (&Measurements, usize),
         x: &[f64],
         scratch: &mut PlacementBuffers,
     ) {
-        let state = ArmState::new(data, row, &scratch.posture);
+        let point = if let Needs::Sight(point) = needs { point } else { Vector3::zeros() };
+        let state = ArmState::new(data, row, &scratch.posture, point);
         let summed = scratch.constant.is_some();
-        let due = |effect: &dyn Effect| effect.needs_torque() == (needs == Needs::Torque) && !(summed && effect.is_constant());
+        let due = |effect: &dyn Effect| match needs {
+            Needs::Nothing => !effect.needs_torque() && !effect.needs_sight() && !(summed && effect.is_constant()),
+            Needs::Torque => effect.needs_torque(),
+            Needs::Sight(_) => effect.needs_sight(),
+        };
         for (effect, range) in self.effects.iter().filter(|(effect, _)| due(effect.as_ref())) {
             scratch.deflection.start(range.start);
             effect.deflect(robot, &state, &x[range.clone()], &mut scratch.deflection);
@@ -224,7 +234,7 @@ impl PointMotion {
     ) {
         buffer.clear();
         buffer.start(0);
-        effect.deflect(robot, &ArmState::new(data, self.row, &self.posture), zeros, buffer);
+        effect.deflect(robot, &ArmState::new(data, self.row, &self.posture, self.point), zeros, buffer);
         for (parameter, direction) in &buffer.partials {
             emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.compliance));
         }
@@ -237,4 +247,6 @@ enum Needs {
     Nothing,
     /// Gravity torque, known only once the arm stands somewhere.
     Torque,
+    /// The target's point, tracker frame, m, known only once the arm stands as all else makes it.
+    Sight(Vector3<f64>),
 }

@@ -1,7 +1,8 @@
 //! What a recording offers to hypotheses: ranges, loads, times, and which columns it has.
 
-use super::Form;
+use super::{Form, Sight};
 use crate::robot::{Measurements, RobotModel};
+use nalgebra::Vector3;
 
 /// The fitted rows of a recording as seen from the present model.
 pub struct Survey<'a> {
@@ -101,6 +102,23 @@ impl<'a> Survey<'a> {
         let at = self.boundaries.partition_point(|other| *other < time);
         let reach = self.boundaries.len().div_ceil(40).max(1) + 1;
         self.boundaries[at.saturating_sub(reach)..(at + reach).min(self.boundaries.len())].to_vec()
+    }
+
+    /// Whether an instrument at the recording's origin sees the points from outside: then they are nowhere as far apart as it is away.
+    pub fn seen_from_outside(&self) -> bool {
+        let points = || self.rows.iter().filter(|row| self.data.whole(**row)).map(|row| self.data.position[*row]);
+        let count = points().count();
+        let middle = points().sum::<Vector3<f64>>() / count.max(1) as f64;
+        count > 0 && points().all(|point| (point - middle).norm() < middle.norm())
+    }
+
+    /// Lowest and highest elevation (rad) and range (m) of the points.
+    pub fn seen(&self) -> [[f64; 2]; 2] {
+        let points = self.rows.iter().filter(|row| self.data.whole(**row)).map(|row| Sight::of(&self.data.position[*row]));
+        points.fold([[f64::INFINITY, f64::NEG_INFINITY]; 2], |[elevations, ranges], sight| {
+            let wider = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+            [wider(elevations, sight.elevation), wider(ranges, sight.range)]
+        })
     }
 
     /// Whether some but not all rows carry (more than half of the largest) payload.

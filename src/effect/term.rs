@@ -95,11 +95,15 @@ impl Effect for Term {
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let count = self.law.count();
-        self.law.values(robot, state, &mut |k, value| self.motion.add(robot, (k, count), value, p, out));
+        self.law.values(robot, state, &mut |k, value| self.motion.add(robot, state, (k, count), value, p, out));
     }
 
     fn needs_torque(&self) -> bool {
         self.law.factors().any(|factor| factor.of.needs_torque())
+    }
+
+    fn needs_sight(&self) -> bool {
+        matches!(self.motion, Motion::Instrument { .. })
     }
 
     fn missing(&self, _robot: &RobotModel, data: &Measurements) -> Option<String> {

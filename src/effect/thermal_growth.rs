@@ -1,7 +1,9 @@
 //! `thermal_growth`: neighbouring links grow with temperature, or with time since the start where none was recorded.
 
 use super::motion::{SHORT, extent};
-use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, figure, warmth};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, warmth,
+};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -54,7 +56,7 @@ impl Cause for ThermalGrowth {
     }
 
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
-        term.with_bases(warmth::near(term.basis(), survey, level))
+        warmth::near(term, survey, level)
     }
 
     fn sentence(&self, summary: &Summary) -> String {
@@ -65,7 +67,13 @@ impl Cause for ThermalGrowth {
                 figure(n.value * 1e6, 0),
                 summary.clock.span(constant)
             ),
-            (Some(_), Some(n)) => format!("{place} grows by {} um/m for each kelvin", figure(n.value * 1e6, 1)),
+            (Some(_), Some(n)) => {
+                let lag = summary.terms(self.name()).find_map(|term| match term.law().first.of {
+                    Variable::Lagging { lag } => Some(format!(", {} behind", summary.clock.span(lag))),
+                    _ => None,
+                });
+                format!("{place} grows by {} um/m for each kelvin{}", figure(n.value * 1e6, 1), lag.unwrap_or_default())
+            }
             _ => format!("{place} grows with warmth"),
         }
     }

@@ -59,7 +59,7 @@ impl Cause for TrackerDrift {
                 let exponents = around(exponent, 1.5, 0.7, level, POWERS);
                 term.with_bases(exponents.map(|exponent| Basis::Power { start, end, exponent }))
             }
-            basis => term.with_bases(warmth::near(basis, survey, level)),
+            _ => warmth::near(term, survey, level),
         }
     }
 

@@ -2,18 +2,22 @@
 
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
+use super::motion::{SHORT, extent};
 use super::unweighed_windup::is_unweighed;
 use super::{
-    Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Summary, Survey, Term,
+    Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
     Variable, warmth,
 };
 use crate::robot::RobotModel;
+use crate::units::Unit;
 
 pub struct Unknown;
 
 /// Cosines of a smooth function of one variable, of a frame in time, and of each of two.
 const CURVE: usize = 8;
 const EACH: usize = 3;
+/// Cosines of what an instrument errs by.
+const SEEN: usize = 5;
 /// Rows within a bump's width: fewer make a bump of any single wrong point.
 const SUPPORT: usize = 5;
 /// The widest bump or step as a share of the joint's travel.
@@ -90,7 +94,6 @@ impl Unknown {
             add(Law::new(Variable::Time, Basis::Cosines { low: start, high: end, count: CURVE }), 1, 0.0);
             add(Law::new(Variable::Time, Basis::Creep { start, end, exponent: 1.0 }), 1, 4.0);
         }
-        warmth::all(survey).into_iter().for_each(|(law, tried)| add(law, tried, 4.0));
         out
     }
 }
@@ -99,8 +102,8 @@ impl Cause for Unknown {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
             name: Self::NAME,
-            place: "joint, base or tool",
-            formula: "a form-free function of joints, time or payload",
+            place: "joint, link, base, tool or tracker",
+            formula: "a form-free function of joints, time, payload or sight",
             size: "any",
             confounded: "whatever is in no list",
             needs: "-",
@@ -127,6 +130,19 @@ impl Cause for Unknown {
         // A seat with play: other on either side of an axis. A mounting that yields: by the direction of gravity.
         (0..3).for_each(|axis| add(tool, Law::new(Variable::Gravity { axis: Some(axis) }, Basis::Sign), 3, 0.0));
         add(tool, Law::of(Variable::Gravity { axis: None }), 1, 0.0);
+        for (law, tried) in warmth::all(survey) {
+            // A link that grows askew: by another direction as the next joint turns.
+            for link in 0..survey.joints().saturating_sub(1) {
+                let bent = law.times(Variable::Angle { joint: link + 1 }, Basis::Wave { order: 1, overtone: false });
+                let long = extent(survey.robot, link).norm() > SHORT;
+                if long {
+                    add(Motion::Links { first: link, last: link }, bent, tried, 6.0)
+                }
+            }
+        }
+        for (of, law, tried) in at_instrument(survey) {
+            add(Motion::Instrument { of }, law, tried, 4.0);
+        }
         if survey.payload_changes() {
             let loaded = Law::new(Variable::Payload, Basis::After { at: survey.heavy_payload() });
             add(tool, loaded, 1, 6.0);
@@ -142,6 +158,11 @@ impl Cause for Unknown {
                 let sigma = if term.is_own_curve() { PLAUSIBLE } else { WIDE };
                 counted.map(|k| (format!("c{k}"), term.motion().unit(robot), sigma)).collect()
             }
+            Motion::Instrument { of } => {
+                let unit = if of == Polar::Range { Unit::Millimetre } else { Unit::Radian };
+                counted.map(|k| (format!("c{k}"), unit, if of == Polar::Range { 1e-3 } else { 1e-4 })).collect()
+            }
+            Motion::Links { .. } => counted.map(|k| (format!("c{k}"), Unit::One, WIDE)).collect(),
             motion => {
                 let numbers = counted.flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
                 numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
@@ -180,12 +201,15 @@ impl Cause for Unknown {
                 let exponents = around(exponent, 1.5, 0.7, level, POWERS);
                 term.with_bases(exponents.map(|exponent| Basis::Creep { start, end, exponent }))
             }
-            basis => term.with_bases(warmth::near(basis, survey, level)),
+            _ => warmth::near(term, survey, level),
         }
     }
 
     fn variant(&self, term: &Term) -> String {
         let names: Vec<String> = term.law().variables().iter().map(Variable::to_string).collect();
+        if let Motion::Instrument { of } = term.motion() {
+            return format!("{of:?}_{}", names.join("_")).to_lowercase();
+        }
         let frame = !matches!(term.motion(), Motion::Joint { .. });
         match (term.basis(), term.law().first.of) {
             (Basis::Hinge { .. }, _) => "hinge".into(),
@@ -244,6 +268,29 @@ pub(super) fn is_hose(term: &Term) -> bool {
     term.two_angles().is_some_and(|[a, b]| (a == joint || b == joint) && a.abs_diff(b) == 1)
 }
 
+/// What an instrument may err by, beyond its own effects of the list.
+fn at_instrument(survey: &Survey) -> Vec<(Polar, Law, usize)> {
+    if !survey.seen_from_outside() {
+        return Vec::new();
+    }
+    let curve = |of, [low, high]: [f64; 2]| Law::new(of, Basis::Cosines { low, high, count: SEEN });
+    let [elevations, ranges] = survey.seen();
+    let periodic = |order| Law::new(Variable::Azimuth, Basis::Wave { order, overtone: false });
+    vec![
+        (Polar::Range, curve(Variable::Range, ranges), 1),
+        (Polar::Range, curve(Variable::Elevation, elevations), 1),
+        (Polar::Range, periodic(1), 2),
+        (Polar::Range, periodic(2), 2),
+        (Polar::Elevation, curve(Variable::Elevation, elevations), 1),
+        (Polar::Elevation, curve(Variable::Range, ranges), 1),
+        (Polar::Elevation, periodic(2), 1),
+        (Polar::Azimuth, curve(Variable::Elevation, elevations), 1),
+        (Polar::Azimuth, curve(Variable::Range, ranges), 1),
+        (Polar::Azimuth, periodic(3), 2),
+        (Polar::Azimuth, periodic(4), 2),
+    ]
+}
+
 /// Whether a bump or step is local, and enough rows lie within it: a wide one stands in for any law of the angle.
 fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
     let [low, high] = survey.range[joint];
@@ -258,6 +305,16 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
 pub(super) fn described(term: &Term, clock: Clock) -> String {
     let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
     let of = variables.join(" and ");
+    if let Motion::Instrument { of: read } = term.motion() {
+        return format!(
+            "{} err with the {of}",
+            match read {
+                Polar::Azimuth => "azimuths",
+                Polar::Elevation => "elevations",
+                Polar::Range => "ranges",
+            }
+        );
+    }
     let over = if clock == Clock::Rows { "over the recording's rows" } else { "with time" };
     match (term.basis(), term.law().first.of) {
         (Basis::Bump { centre, width }, _) => {
@@ -285,7 +342,10 @@ pub(super) fn described(term: &Term, clock: Clock) -> String {
             format!("other on either side of its {name}: which one hangs down decides, as where a seat has play")
         }
         (_, Variable::Gravity { .. }) => "depends on the direction in which it hangs, as where a mounting yields".into(),
-        (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "depends on the warm-up".into(),
+        (Basis::Settling { .. }, _) | (_, Variable::Temperature | Variable::Lagging { .. }) => match term.law().times {
+            Some(times) => format!("depends on the warm-up and on {}", clock.named(times.of)),
+            None => "depends on the warm-up".into(),
+        },
         (_, Variable::Payload) => "differs with the payload".into(),
         _ => format!("function of {of}"),
     }

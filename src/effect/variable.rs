@@ -1,7 +1,7 @@
 //! What a row of a recording offers that an error may depend on.
 
 use super::ArmState;
-use crate::robot::RobotModel;
+use crate::robot::{Memory, RobotModel};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -35,6 +35,18 @@ pub enum Variable {
     LastMove,
     /// Velocities of all joints together.
     Speed,
+    /// Azimuth about the instrument's standing axis, rad.
+    Azimuth,
+    /// Elevation above the instrument's horizon, rad.
+    Elevation,
+    /// Distance from the instrument, m.
+    Range,
+    /// Side to which pre-sliding friction has brought a joint that fades in over a travel (rad or m) after each reversal, -1 to 1.
+    Slip { joint: usize, travel: f64 },
+    /// How fast a joint has moved of late (rad/s or m/s), forgotten with a cooling time (s).
+    Work { joint: usize, cooling: f64 },
+    /// The recorded temperature as something feels it that follows it with a time constant (s), C.
+    Lagging { lag: f64 },
 }
 
 impl Variable {
@@ -56,6 +68,12 @@ impl Variable {
             Self::Gravity { axis } => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(component)]),
             Self::Temperature => state.temperature(),
             Self::Time => Some(state.time()),
+            Self::Azimuth => Some(state.sight().azimuth),
+            Self::Elevation => Some(state.sight().elevation),
+            Self::Range => Some(state.sight().range),
+            Self::Slip { joint, travel } => Some(state.memory(Memory::Slip { joint, travel })),
+            Self::Work { joint, cooling } => Some(state.memory(Memory::Work { joint, cooling })),
+            Self::Lagging { lag } => state.temperature().map(|_| state.memory(Memory::Temperature { lag })),
             Self::ArmLoad | Self::LastMove | Self::Speed => None,
         }
     }
@@ -67,7 +85,7 @@ impl Variable {
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.
     pub fn follows_the_way(self) -> bool {
-        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::LastMove)
+        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::LastMove | Self::Slip { .. })
     }
 }
 
@@ -86,6 +104,12 @@ impl fmt::Display for Variable {
             Self::ArmLoad => f.write_str("load of the arm"),
             Self::LastMove => f.write_str("last move"),
             Self::Speed => f.write_str("speed"),
+            Self::Azimuth => f.write_str("azimuth"),
+            Self::Elevation => f.write_str("elevation"),
+            Self::Range => f.write_str("range"),
+            Self::Slip { joint, .. } => write!(f, "travel of joint {} since it reversed", joint + 1),
+            Self::Work { joint, .. } => write!(f, "work of joint {}", joint + 1),
+            Self::Lagging { .. } => f.write_str("lagging temperature"),
         }
     }
 }

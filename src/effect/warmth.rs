@@ -1,30 +1,49 @@
-//! How far something has warmed up: by the measured temperature, or by time since the start.
+//! How far something has warmed up: by the measured temperature, at once or behind it, or by time since the start.
 
 use super::basis::around;
-use super::{Basis, Law, Survey, Variable};
+use super::{Basis, Law, Survey, Term, Variable};
 
 /// Time constants as shares of the recording.
 const WARM_UPS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.5];
+const LAGS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Shortest and longest time constant, in the same shares: the one is a step at the start, the other a straight line.
 const CONSTANTS: [f64; 2] = [0.02, 10.0];
+/// The same of what lags: far behind, it no longer follows.
+const BEHIND: [f64; 2] = [0.005, 2.0];
 
-/// What the recording offers, and of how many of its kind each is one: its temperature above the first one (K), and warm-ups of
-/// several time constants, since what was measured need not be the temperature of what grows.
+/// What the recording offers, and of how many of its kind each is one: its temperature above the first one (K), what follows it with a
+/// lag, and warm-ups of several time constants, since what was measured need not be the temperature of what grows.
 pub(super) fn all(survey: &Survey) -> Vec<(Law, usize)> {
     let [start, end] = survey.time;
-    let above = |reference| Law::new(Variable::Temperature, Basis::Linear { zero: reference, per: 1.0 });
-    let measured = survey.reference_c.map(above);
-    let kinds = 1 + usize::from(measured.is_some());
-    let times = WARM_UPS.iter().filter(|_| end > start);
+    let above = |of| survey.reference_c.map(|zero| Law::new(of, Basis::Linear { zero, per: 1.0 }));
+    let measured = above(Variable::Temperature);
+    let (kinds, clocked) = (1 + 2 * usize::from(measured.is_some()), end > start);
+    let lagging = LAGS.iter().filter(|_| clocked).filter_map(|share| above(Variable::Lagging { lag: share * (end - start) }));
+    let times = WARM_UPS.iter().filter(|_| clocked);
     let times = times.map(|share| Law::new(Variable::Time, Basis::Settling { start, constant: share * (end - start) }));
-    let times = times.map(|time| (time, kinds * WARM_UPS.len()));
-    measured.map(|measured| (measured, kinds)).into_iter().chain(times).collect()
+    let several = |laws: Vec<Law>, of: usize| laws.into_iter().map(move |law| (law, of));
+    let lagging = several(lagging.collect(), kinds * LAGS.len());
+    let times = several(times.collect(), kinds * WARM_UPS.len());
+    measured.map(|measured| (measured, kinds)).into_iter().chain(lagging).chain(times).collect()
 }
 
-/// Other time constants around that of a warm-up by time.
-pub(super) fn near(basis: Basis, survey: &Survey, level: i32) -> Vec<Basis> {
-    let Basis::Settling { start, constant } = basis else { return Vec::new() };
-    let bounds = CONSTANTS.map(|share| share * (survey.time[1] - survey.time[0]));
-    around(constant, 1.5, 0.5, level, bounds).map(|constant| Basis::Settling { start, constant }).collect()
+/// Other time constants around that of a term's first factor.
+pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
+    let long = survey.time[1] - survey.time[0];
+    match (term.law().first.of, term.basis()) {
+        (Variable::Lagging { lag }, _) => {
+            let lags = around(lag, 1.7, 0.5, level, BEHIND.map(|share| share * long));
+            lags.map(|lag| term.with(term.law().by(Variable::Lagging { lag }))).collect()
+        }
+        (Variable::Work { joint, cooling }, _) => {
+            let coolings = around(cooling, 1.5, 0.5, level, CONSTANTS.map(|share| share * long));
+            coolings.map(|cooling| term.with(term.law().by(Variable::Work { joint, cooling }))).collect()
+        }
+        (_, Basis::Settling { start, constant }) => {
+            let constants = around(constant, 1.5, 0.5, level, CONSTANTS.map(|share| share * long));
+            term.with_bases(constants.map(|constant| Basis::Settling { start, constant }))
+        }
+        _ => Vec::new(),
+    }
 }

@@ -1,6 +1,7 @@
 //! Measurements as the numerics see them: joint positions, measured points, and the circumstances of each.
 
 use crate::robot::instrument::NoiseBasis;
+use crate::robot::memories::Memories;
 use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::robot::readings::{Named, Reading, Readings};
 use crate::robot::sequence::Sequence;
@@ -38,6 +39,8 @@ pub struct Measurements {
     pub readings: Vec<Readings>,
     /// The order in which the rows were measured, where it is another one than theirs.
     pub sequence: Option<Sequence>,
+    /// What was asked of what rows remember.
+    pub memories: Memories,
 }
 
 impl Measurements {
@@ -122,12 +125,17 @@ impl Measurements {
 
     /// Direction (+1 or -1) from which joint `joint` came to rest, as recorded or by the order of measurement; 0 if it never moved.
     pub fn direction(&self, row: usize, joint: usize) -> f64 {
-        let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
-        if let Some(direction) = recorded.filter(|value| value.is_finite() && *value != 0.0) {
-            return direction.signum();
+        if let Some(direction) = self.recorded_direction(row, joint) {
+            return direction;
         }
         let moves = (0..=self.place(row)).rev().map(|place| self.last_move(self.at_place(place), joint));
         moves.map(|moved| if moved == 0.0 { 0.0 } else { moved.signum() }).find(|sign| *sign != 0.0).unwrap_or(0.0)
+    }
+
+    /// Direction (+1 or -1) that the recording gives a joint, if it gives one.
+    pub fn recorded_direction(&self, row: usize, joint: usize) -> Option<f64> {
+        let recorded = self.direction.as_ref().map(|all| all[row * self.joints + joint]);
+        recorded.filter(|value| value.is_finite() && *value != 0.0).map(f64::signum)
     }
 
     /// Velocity of a joint, rad/s or m/s; 0 where none was recorded.

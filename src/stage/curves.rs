@@ -130,7 +130,7 @@ fn abscissa(
     let own = joint.map(|joint| Variable::Angle { joint });
     match own.filter(|own| variables.contains(own)).or(variables.first().copied()).or(own) {
         Some(Variable::Time) => time(),
-        Some(Variable::Temperature) => match data.temperature(row) {
+        Some(Variable::Temperature | Variable::Lagging { .. }) => match data.temperature(row) {
             Some(now) => with("temperature".into(), Unit::Celsius, now),
             None => time(),
         },
@@ -141,7 +141,9 @@ fn abscissa(
             | Variable::Motor { joint }
             | Variable::Approach { joint }
             | Variable::Push { joint, .. }
-            | Variable::Velocity { joint },
+            | Variable::Velocity { joint }
+            | Variable::Slip { joint, .. }
+            | Variable::Work { joint, .. },
         ) => angle(joint),
         // Links and the base bend with the load of the shoulder.
         _ if torque.len() > 1 => load(1),

@@ -6,7 +6,7 @@ pub use columns::columns;
 
 use crate::error::Result;
 use crate::observation::{DeclaredColumn, KINDS};
-use crate::robot::{Measurements, Named, NoiseBasis, START, Sequence, SigmaSource};
+use crate::robot::{Measurements, Memories, Named, NoiseBasis, START, Sequence, SigmaSource};
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use crate::table::Table;
 use crate::units::Unit;
@@ -110,6 +110,7 @@ impl Recording {
                 })
                 .collect(),
             sequence: None,
+            memories: Memories::default(),
         };
         data.sequence = data.time.as_ref().and_then(|time| Sequence::by_time(time, |a, b| data.near_pose(a, b)));
         data

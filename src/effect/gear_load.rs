@@ -1,0 +1,69 @@
+//! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
+
+use super::summary::amplitude;
+use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+
+pub struct GearLoad;
+
+/// Orders per joint turn that are tried.
+const ORDERS: u32 = 24;
+/// An order needs this much of its phase (rad) within the joint's travel to be more than a compliance and its slope.
+const PHASE: f64 = 2.2;
+/// -2 ln of the odds that a gear errs with its load alone.
+const RARER: f64 = 4.0;
+
+impl GearLoad {
+    fn term(joint: usize, order: u32) -> Term {
+        let wave = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
+        Term::new(&Self, Motion::Joint { joint }, wave.times(Variable::Load { joint }, Basis::PROPORTIONAL))
+    }
+}
+
+impl Cause for GearLoad {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
+            name: "gear_load",
+            place: "joint",
+            formula: "d = t (a sin(n q) + b cos(n q)), n = 1 .. 24",
+            size: "2 to 40 arcsec under full load",
+            confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
+            needs: "link masses, loads that change at the same angle",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
+        let terms = joints.flat_map(|joint| {
+            let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
+            orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(RARER))
+        });
+        terms.collect()
+    }
+
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        ["sin", "cos"].map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-4)).into()
+    }
+
+    fn variant(&self, term: &Term) -> String {
+        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+    }
+
+    fn sentence(&self, summary: &Summary) -> String {
+        let orders = summary.estimates(self.name()).filter_map(|(term, numbers)| match term.basis() {
+            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude(&numbers))),
+            _ => None,
+        });
+        let orders: Vec<String> = orders.collect();
+        format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders.join(", "))
+    }
+
+    fn finer(&self) -> &'static [&'static str] {
+        &["gear_cyclic", "joint_compliance", "unknown"]
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(Measure { rank: 5, advice: "repeat poses with and without a payload over the whole range of the joint" })
+    }
+}

@@ -1,0 +1,64 @@
+//! `tracker_elevation`: the head of the instrument errs with the elevation: it sags, its vertical circle sits off its axis, its transit axis
+//! is not level, or the beam leaves it askew.
+
+use super::summary::amplitude;
+use super::tracker_circle::{MEASURE, RARER};
+use super::{
+    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable,
+};
+use crate::robot::RobotModel;
+use crate::units::Unit;
+
+pub struct TrackerElevation;
+
+/// Of the elevation, once and twice a turn; of the azimuth, once: a transit axis that is not level turns it by the tangent of the elevation.
+const WAYS: [(Polar, u32); 3] = [(Polar::Elevation, 1), (Polar::Elevation, 2), (Polar::Azimuth, 1)];
+
+impl Cause for TrackerElevation {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
+            name: "tracker_elevation",
+            place: "tracker",
+            formula: "elevation or azimuth errs by a sin(n el) + b cos(n el), n = 1, 2",
+            size: "0.5 to 5 arcsec",
+            confounded: "base_frame and link_geometry where the elevation changes little",
+            needs: "points measured from outside the arm's reach, the instrument at the recording's origin, its z upright",
+        }
+    }
+
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        let ways = WAYS.into_iter().filter(|_| survey.seen_from_outside());
+        let law = |order| Law::new(Variable::Elevation, Basis::Wave { order, overtone: false });
+        let terms = ways.map(|(of, order)| Term::new(&Self, Motion::Instrument { of }, law(order)));
+        terms.map(|term| Hypothesis::new(term, WAYS.len()).penalised(RARER)).collect()
+    }
+
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 1e-3)).into()
+    }
+
+    fn variant(&self, term: &Term) -> String {
+        match (term.motion(), term.basis()) {
+            (Motion::Instrument { of: Polar::Azimuth }, _) => "transit".into(),
+            (_, Basis::Wave { order, .. }) => format!("order{order}"),
+            _ => String::new(),
+        }
+    }
+
+    fn sentence(&self, summary: &Summary) -> String {
+        let ways = summary.estimates(self.name()).map(|(term, numbers)| {
+            let azimuth = term.motion() == Motion::Instrument { of: Polar::Azimuth };
+            format!("{} by {}", if azimuth { "azimuths" } else { "elevations" }, amplitude(&numbers))
+        });
+        let ways: Vec<String> = ways.collect();
+        format!("the tracker's head errs with the elevation: {}", ways.join(", "))
+    }
+
+    fn is_of_the_measurement(&self) -> bool {
+        true
+    }
+
+    fn measure(&self) -> Option<Measure> {
+        Some(MEASURE)
+    }
+}

@@ -1,0 +1,118 @@
+//! What a row remembers of the rows before it: states that follow the order of measurement. Ways between stops are straight.
+
+use super::measurements::Measurements;
+use super::memories::Key;
+use std::sync::Arc;
+
+/// A state that follows the rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Memory {
+    /// Side to which pre-sliding friction has brought a joint: it fades in over a travel (rad or m) after each reversal, -1 to 1 (Dahl).
+    Slip { joint: usize, travel: f64 },
+    /// Speed of a joint of late (rad/s or m/s), forgotten with a cooling time (s).
+    Work { joint: usize, cooling: f64 },
+    /// The recorded temperature (C) behind a time constant (s).
+    Temperature { lag: f64 },
+}
+
+impl Memory {
+    fn key(self) -> Key {
+        match self {
+            Self::Slip { joint, travel } => (0, joint, travel.to_bits()),
+            Self::Work { joint, cooling } => (1, joint, cooling.to_bits()),
+            Self::Temperature { lag } => (2, 0, lag.to_bits()),
+        }
+    }
+
+    /// The state at every row.
+    fn along(self, data: &Measurements) -> Arc<[f64]> {
+        let mut states = vec![0.0; data.rows()];
+        let mut state = match self {
+            Self::Temperature { .. } if data.rows() > 0 => data.temperature(data.at_place(0)).unwrap_or(0.0),
+            _ => 0.0,
+        };
+        for place in 0..data.rows() {
+            let row = data.at_place(place);
+            if place > 0 {
+                state = self.next(data, state, [data.at_place(place - 1), row]);
+            }
+            states[row] = state;
+        }
+        states.into()
+    }
+
+    /// The state after the way from one row to the next.
+    fn next(self, data: &Measurements, state: f64, [from, to]: [usize; 2]) -> f64 {
+        let moved = |joint: usize| data.q(to)[joint] - data.q(from)[joint];
+        let time = (data.time(to) - data.time(from)).max(0.0);
+        match self {
+            Self::Slip { joint, travel } => {
+                let (moved, recorded) = (moved(joint), data.recorded_direction(to, joint));
+                match recorded {
+                    // It came from elsewhere than the row before: nobody knows how far.
+                    Some(side) if side * moved < 0.0 => side,
+                    _ if moved == 0.0 => state,
+                    _ => moved.signum() + (state - moved.signum()) * libm::exp(-moved.abs() / travel),
+                }
+            }
+            Self::Work { .. } | Self::Temperature { .. } if time == 0.0 => state,
+            Self::Work { joint, cooling } => {
+                let left = libm::exp(-time / cooling);
+                state * left + moved(joint).abs() / time * (1.0 - left)
+            }
+            Self::Temperature { lag } => {
+                let [before, now] = [from, to].map(|row| data.temperature(row).unwrap_or(state));
+                // Behind a steady rise by rate times lag, in the end.
+                let behind = (now - before) / time * lag;
+                now - behind + (state - before + behind) * libm::exp(-time / lag)
+            }
+        }
+    }
+}
+
+impl Measurements {
+    /// A state at a row.
+    pub fn memory(&self, memory: Memory, row: usize) -> f64 {
+        self.memories.of(memory.key(), row, || memory.along(self))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recording(q: &[f64], time: &[f64], temperature: &[f64]) -> Measurements {
+        let (q, time, temperature) = (q.to_vec(), Some(time.to_vec()), Some(temperature.to_vec()));
+        let position = vec![nalgebra::Vector3::zeros(); q.len()];
+        Measurements { joints: 1, q, time, temperature, position, ..Measurements::default() }
+    }
+
+    #[test]
+    fn friction_before_sliding_fades_in_over_a_travel_after_each_reversal() {
+        let data = recording(&[0.0, 10.0, 9.9, 9.9, 9.7], &[0.0, 1.0, 2.0, 3.0, 4.0], &[20.0; 5]);
+        let slip = |row| data.memory(Memory::Slip { joint: 0, travel: 0.2 }, row);
+        let after = |travelled: f64| -1.0 + 2.0 * (-travelled / 0.2).exp();
+        for (row, expected) in [0.0, 1.0, after(0.1), after(0.1), after(0.3)].into_iter().enumerate() {
+            assert!((slip(row) - expected).abs() < 1e-9, "{row}: {} {expected}", slip(row));
+        }
+    }
+
+    #[test]
+    fn a_lagging_temperature_is_behind_a_steady_rise_by_its_time_constant() {
+        let time: Vec<f64> = (0..200).map(f64::from).collect();
+        let rising: Vec<f64> = time.iter().map(|time| 20.0 + 0.1 * time).collect();
+        let data = recording(&[0.0; 200], &time, &rising);
+        let late = data.memory(Memory::Temperature { lag: 10.0 }, 199);
+        assert!((late - (rising[199] - 1.0)).abs() < 1e-6, "{late}");
+    }
+
+    #[test]
+    fn work_is_the_speed_of_late() {
+        let time: Vec<f64> = (0..100).map(|k| 2.0 * f64::from(k)).collect();
+        let there_and_back: Vec<f64> = (0..100).map(|k| f64::from(k % 2)).collect();
+        let data = recording(&there_and_back, &time, &[20.0; 100]);
+        let work = |row: usize| data.memory(Memory::Work { joint: 0, cooling: 20.0 }, row);
+        let expected = |row: f64| 0.5 * (1.0 - (-row / 10.0).exp());
+        assert!([0, 5, 99].into_iter().all(|row| (work(row) - expected(row as f64)).abs() < 1e-9));
+    }
+}
