@@ -4,7 +4,7 @@ use super::solve::Chain;
 use crate::effect::{Form, LONG_AFTER, PlacementBuffers};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
-use crate::robot::Measurements;
+use crate::robot::{Measurements, Memories};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 
@@ -110,6 +110,7 @@ impl Reach<'_> {
         clock.push(*time);
         self.data.direction.get_or_insert_default().clone_from(direction);
         self.data.current.clone_from(current);
+        self.data.memories = Memories::default();
         // What is computed for one target must not depend on the one before.
         self.scratch.near(false);
     }

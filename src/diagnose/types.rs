@@ -17,6 +17,8 @@ pub struct Question<'a> {
     pub set: &'a [usize],
     /// By what the penalties of rare causes (-2 ln of their odds) are multiplied: 1 as the library believes.
     pub prior_weight: f64,
+    /// Names of causes that are not tried.
+    pub without: &'a [String],
     pub seed: u64,
 }
 

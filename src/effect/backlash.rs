@@ -68,7 +68,7 @@ impl Cause for Backlash {
                 out.push(Hypothesis::new(form(side), 1));
                 let [start, end] = survey.time;
                 if end > start {
-                    let growing = side.times(Variable::Time, Basis::Power { start, end, exponent: 1.0 });
+                    let growing = side.times(Variable::Time, Basis::Creep { start, end, exponent: 1.0 });
                     out.push(Hypothesis::new(form(growing), 2).penalised(RARER));
                 }
                 if survey.is_loaded(joint) {
@@ -132,7 +132,7 @@ impl Cause for Backlash {
     }
 
     fn finer(&self) -> &'static [&'static str] {
-        &["joint_hardening", "joint_compliance", "unknown"]
+        &["joint_hardening", "joint_compliance", "presliding", "unknown"]
     }
 
     fn measure(&self) -> Option<Measure> {

@@ -8,6 +8,8 @@ use std::f64::consts::{PI, TAU};
 pub enum Basis {
     /// (u - zero) / per.
     Linear { zero: f64, per: f64 },
+    /// 1, and (u - zero) / per.
+    Straight { zero: f64, per: f64 },
     /// sin(order u) and cos(order u), and with an overtone those of twice the order.
     Wave { order: u32, overtone: bool },
     /// Sine and cosine of a period.
@@ -72,6 +74,7 @@ impl Basis {
     /// How many functions it has.
     pub fn count(&self) -> usize {
         match self {
+            Self::Straight { .. } => 2,
             Self::Wave { overtone, .. } => 2 + 2 * usize::from(*overtone),
             Self::Sway { .. } => 2,
             Self::Cosines { count, .. } | Self::Fading { count, .. } => *count,
@@ -88,6 +91,10 @@ impl Basis {
     pub(super) fn values(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
         match *self {
             Self::Linear { zero, per } => each(0, (u - zero) / per),
+            Self::Straight { zero, per } => {
+                each(0, 1.0);
+                each(1, (u - zero) / per);
+            }
             Self::Wave { order, overtone } => {
                 for k in 0..=usize::from(overtone) {
                     let (sine, cosine) = libm::sincos((k + 1) as f64 * f64::from(order) * u);

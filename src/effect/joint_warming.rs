@@ -95,7 +95,7 @@ impl Cause for JointWarming {
             let size = |scale: f64, decimals| numbers.first().map_or_else(String::new, |n| figure(scale * n.value, decimals));
             let what = match term.law().times.map(|factor| factor.of) {
                 None => format!("its zero by {} arcsec", size(1.0, 0)),
-                Some(Variable::Angle { .. }) => format!("its ratio by {} um/m", size(1e6, 0)),
+                Some(Variable::Angle { .. }) => format!("its ratio by {} ppm", size(1e6, 0)),
                 Some(_) => format!("its compliance by {} urad/Nm", size(1e6, 2)),
             };
             match (term.law().first.of, term.basis()) {

@@ -1,8 +1,10 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
 use super::basis::around;
+use super::interactions;
 use super::joint_table::PLAUSIBLE;
 use super::motion::{SHORT, extent};
+use super::sighted;
 use super::unweighed_windup::is_unweighed;
 use super::{
     Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
@@ -16,8 +18,6 @@ pub struct Unknown;
 /// Cosines of a smooth function of one variable, of a frame in time, and of each of two.
 const CURVE: usize = 8;
 const EACH: usize = 3;
-/// Cosines of what an instrument errs by.
-const SEEN: usize = 5;
 /// Rows within a bump's width: fewer make a bump of any single wrong point.
 const SUPPORT: usize = 5;
 /// The widest bump or step as a share of the joint's travel.
@@ -39,8 +39,11 @@ const WOBBLE: f64 = 12.0;
 const WEIGHT: f64 = 12.0;
 /// -2 ln of the odds of things outside the library.
 const OPEN: f64 = 8.0;
+/// The same beyond that of products: they are many.
+const PRODUCT: f64 = 2.0;
 /// One sigma of what is known of a coefficient before any measurement, SI.
 const WIDE: f64 = 0.01;
+const PER_LOAD: f64 = 1e-4;
 
 impl Unknown {
     pub const NAME: &'static str = "unknown";
@@ -73,6 +76,7 @@ impl Unknown {
                 add(own(Basis::Hinge { from: low + share * (high - low), upwards }), places, 0.0);
             }
         }
+        interactions::at_joint(survey, joint).into_iter().for_each(|(law, tried)| add(law, tried, PRODUCT));
         for by in 0..survey.joints() {
             let cosines = |joint: usize, count| {
                 let [low, high] = survey.range[joint];
@@ -133,6 +137,11 @@ impl Cause for Unknown {
         for (law, tried) in warmth::all(survey) {
             // A link that grows askew: by another direction as the next joint turns.
             for link in 0..survey.joints().saturating_sub(1) {
+                let law = match law.first.basis {
+                    // Nobody knows at which temperature it is straight.
+                    Basis::Linear { zero, per } => law.with(Basis::Straight { zero, per }),
+                    _ => law,
+                };
                 let bent = law.times(Variable::Angle { joint: link + 1 }, Basis::Wave { order: 1, overtone: false });
                 let long = extent(survey.robot, link).norm() > SHORT;
                 if long {
@@ -140,8 +149,8 @@ impl Cause for Unknown {
                 }
             }
         }
-        for (of, law, tried) in at_instrument(survey) {
-            add(Motion::Instrument { of }, law, tried, 4.0);
+        for (of, law, tried, penalty) in sighted::laws(survey, &SWAYS) {
+            add(Motion::Instrument { of }, law, tried, penalty);
         }
         if survey.payload_changes() {
             let loaded = Law::new(Variable::Payload, Basis::After { at: survey.heavy_payload() });
@@ -155,8 +164,12 @@ impl Cause for Unknown {
         let counted = 1..=term.law().count();
         match term.motion() {
             Motion::Joint { .. } => {
-                let sigma = if term.is_own_curve() { PLAUSIBLE } else { WIDE };
-                counted.map(|k| (format!("c{k}"), term.motion().unit(robot), sigma)).collect()
+                let loaded = term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. }));
+                let (unit, sigma) = match loaded {
+                    true => (Unit::RadianPerNewtonMetre, PER_LOAD),
+                    false => (term.motion().unit(robot), if term.is_own_curve() { PLAUSIBLE } else { WIDE }),
+                };
+                counted.map(|k| (format!("c{k}"), unit, sigma)).collect()
             }
             Motion::Instrument { of } => {
                 let unit = if of == Polar::Range { Unit::Millimetre } else { Unit::Radian };
@@ -206,7 +219,7 @@ impl Cause for Unknown {
     }
 
     fn variant(&self, term: &Term) -> String {
-        let names: Vec<String> = term.law().variables().iter().map(Variable::to_string).collect();
+        let names: Vec<String> = term.law().variables().iter().map(|of| of.to_string().replace(' ', "_")).collect();
         if let Motion::Instrument { of } = term.motion() {
             return format!("{of:?}_{}", names.join("_")).to_lowercase();
         }
@@ -221,7 +234,7 @@ impl Cause for Unknown {
             (Basis::Creep { .. }, _) => "creep".into(),
             (Basis::Sign, Variable::Gravity { .. }) => "side".into(),
             (_, Variable::Gravity { .. }) => "sag".into(),
-            (Basis::Cosines { .. }, Variable::Time) => "time".into(),
+            (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
             (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "warm".into(),
             (_, Variable::Payload) => "payload".into(),
             _ if frame => String::new(),
@@ -268,29 +281,6 @@ pub(super) fn is_hose(term: &Term) -> bool {
     term.two_angles().is_some_and(|[a, b]| (a == joint || b == joint) && a.abs_diff(b) == 1)
 }
 
-/// What an instrument may err by, beyond its own effects of the list.
-fn at_instrument(survey: &Survey) -> Vec<(Polar, Law, usize)> {
-    if !survey.seen_from_outside() {
-        return Vec::new();
-    }
-    let curve = |of, [low, high]: [f64; 2]| Law::new(of, Basis::Cosines { low, high, count: SEEN });
-    let [elevations, ranges] = survey.seen();
-    let periodic = |order| Law::new(Variable::Azimuth, Basis::Wave { order, overtone: false });
-    vec![
-        (Polar::Range, curve(Variable::Range, ranges), 1),
-        (Polar::Range, curve(Variable::Elevation, elevations), 1),
-        (Polar::Range, periodic(1), 2),
-        (Polar::Range, periodic(2), 2),
-        (Polar::Elevation, curve(Variable::Elevation, elevations), 1),
-        (Polar::Elevation, curve(Variable::Range, ranges), 1),
-        (Polar::Elevation, periodic(2), 1),
-        (Polar::Azimuth, curve(Variable::Elevation, elevations), 1),
-        (Polar::Azimuth, curve(Variable::Range, ranges), 1),
-        (Polar::Azimuth, periodic(3), 2),
-        (Polar::Azimuth, periodic(4), 2),
-    ]
-}
-
 /// Whether a bump or step is local, and enough rows lie within it: a wide one stands in for any law of the angle.
 fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
     let [low, high] = survey.range[joint];
@@ -306,14 +296,15 @@ pub(super) fn described(term: &Term, clock: Clock) -> String {
     let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
     let of = variables.join(" and ");
     if let Motion::Instrument { of: read } = term.motion() {
-        return format!(
-            "{} err with the {of}",
-            match read {
-                Polar::Azimuth => "azimuths",
-                Polar::Elevation => "elevations",
-                Polar::Range => "ranges",
-            }
-        );
+        let read = match read {
+            Polar::Azimuth => "azimuths",
+            Polar::Elevation => "elevations",
+            Polar::Range => "ranges",
+        };
+        return match term.basis() {
+            Basis::Sway { period } => format!("its {read} swing slowly with a period of {}", clock.span(period)),
+            _ => format!("its {read} err with the {of}"),
+        };
     }
     let over = if clock == Clock::Rows { "over the recording's rows" } else { "with time" };
     match (term.basis(), term.law().first.of) {

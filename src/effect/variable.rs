@@ -19,6 +19,8 @@ pub enum Variable {
     Push { joint: usize, friction_nm: f64 },
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
     Approach { joint: usize },
+    /// What a joint moved from the stop before, rad or m.
+    Move { joint: usize },
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
     Velocity { joint: usize },
     /// Declared payload, kg.
@@ -63,6 +65,7 @@ impl Variable {
             Self::Load { joint } => Some(state.torque()[joint]),
             Self::Push { joint, friction_nm } => Some(state.torque()[joint] + friction_nm * state.direction(joint)),
             Self::Approach { joint } => Some(state.direction(joint)),
+            Self::Move { joint } => Some(state.last_move(joint)),
             Self::Velocity { joint } => Some(state.velocity(joint)),
             Self::Payload => Some(state.payload()),
             Self::Gravity { axis } => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(component)]),
@@ -85,7 +88,7 @@ impl Variable {
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.
     pub fn follows_the_way(self) -> bool {
-        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::LastMove | Self::Slip { .. })
+        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove | Self::Slip { .. })
     }
 }
 
@@ -96,6 +99,7 @@ impl fmt::Display for Variable {
             Self::Motor { joint } => write!(f, "motor {}", joint + 1),
             Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
             Self::Push { joint, .. } | Self::Approach { joint } => write!(f, "approach of joint {}", joint + 1),
+            Self::Move { joint } => write!(f, "last move of joint {}", joint + 1),
             Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
             Self::Payload => f.write_str("payload"),
             Self::Gravity { .. } => f.write_str("direction of gravity"),

@@ -28,8 +28,10 @@ impl Memory {
     fn along(self, data: &Measurements) -> Arc<[f64]> {
         let mut states = vec![0.0; data.rows()];
         let mut state = match self {
-            Self::Temperature { .. } if data.rows() > 0 => data.temperature(data.at_place(0)).unwrap_or(0.0),
-            _ => 0.0,
+            _ if data.rows() == 0 => 0.0,
+            Self::Temperature { .. } => data.temperature(data.at_place(0)).unwrap_or(0.0),
+            Self::Slip { joint, .. } => data.recorded_direction(data.at_place(0), joint).unwrap_or(0.0),
+            Self::Work { .. } => 0.0,
         };
         for place in 0..data.rows() {
             let row = data.at_place(place);

@@ -140,6 +140,7 @@ fn abscissa(
             Variable::Angle { joint }
             | Variable::Motor { joint }
             | Variable::Approach { joint }
+            | Variable::Move { joint }
             | Variable::Push { joint, .. }
             | Variable::Velocity { joint }
             | Variable::Slip { joint, .. }

@@ -1,6 +1,7 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
+use crate::effect::CAUSES;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
@@ -24,6 +25,9 @@ pub struct Diagnose {
     /// By what the penalties of rare causes are multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
     pub prior_weight: f64,
+    /// Causes that are not tried, by their names: what a cell cannot have, or what a test of the library leaves out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
 }
 
 fn as_believed() -> f64 {
@@ -80,6 +84,11 @@ impl Stage for Diagnose {
         if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
             faults.push(Fault::new("prior_weight", format!("expected a number from 0 to {HEAVIEST}")));
         }
+        let tried = || CAUSES.iter().filter(|cause| !cause.is_nameless()).map(|cause| cause.name());
+        for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
+            let allowed = tried().collect::<Vec<_>>().join(", ");
+            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause; allowed: {allowed}")));
+        }
         faults
     }
 
@@ -117,6 +126,7 @@ impl Stage for Diagnose {
             validate: &validate,
             set: &set,
             prior_weight: self.prior_weight,
+            without: &self.without,
             seed: context.seed,
         };
         // Points beside an outside simulation are moved by it: what moves them says nothing of this robot file.

@@ -55,8 +55,9 @@ impl Stage for Transfer {
         if left > 0 {
             context.services.note(format!("left behind, being of the first measurement alone: {}", counted(left, "parameter")));
         }
-        // Another recording has another clock: steps have happened, and the arm is warm.
-        data.time = Some(vec![LONG_AFTER; data.rows()]);
+        // Another recording has another clock: steps have happened, and the arm is warm. What lags follows the time between rows.
+        let start = (0..data.rows()).map(|row| data.time(row)).fold(f64::INFINITY, f64::min);
+        data.time = Some((0..data.rows()).map(|row| LONG_AFTER + data.time(row) - start).collect());
         let robot = RobotModel::new(reads.robot.to_description()?);
         let there = earlier.model(robot.clone(), &[], self.load.into())?;
         let predicted = there.predict(&data);

@@ -20,10 +20,11 @@ const COMPLIANCE: f64 = 2e-7;
 fn data(robot: &RobotModel, moving: bool) -> Measurements {
     let n = robot.joints();
     let spread = |salt: usize, count: usize| (0..count).map(move |k| fixture::spread(k, salt) - 0.5);
+    let q = fixture::poses(robot.description(), ROWS);
     Measurements {
         joints: n,
-        q: fixture::poses(robot.description(), ROWS),
-        position: vec![Vector3::zeros(); ROWS],
+        q: q.clone(),
+        position: q.chunks(n).map(|q| setting().base.point(&robot.forward(q).translation)).collect(),
         sigma: vec![Vector3::repeat(1e-5); ROWS],
         payload: (0..ROWS).map(|row| [0.0, 4.0, 10.0][row % 3]).collect(),
         current: Some(spread(3, ROWS * n).map(|value| 5.0 * value).collect()),
@@ -59,7 +60,7 @@ fn torques(robot: &RobotModel, data: &Measurements) -> Vec<f64> {
 }
 
 fn setting() -> EffectContext {
-    EffectContext { base: Pose::exp(&Twist::new(3.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
+    EffectContext { base: Pose::exp(&Twist::new(9.0, -1.0, 0.5, 0.1, -0.2, 2.0)), load: Load::GravityTorque }
 }
 
 /// Runs `law` on every hypothesis of every fixture arm; returns how many there were.

@@ -21,7 +21,16 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
     cell.disturb(&mut data);
     let all: Vec<usize> = (0..ROWS).collect();
     let (robot, _) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
-    let question = Question { robot: &robot, data: &data, fit: &all, validate: &[], set: &[0; ROWS], prior_weight: 1.0, seed: 1 };
+    let question = Question {
+        robot: &robot,
+        data: &data,
+        fit: &all,
+        validate: &[],
+        set: &[0; ROWS],
+        prior_weight: 1.0,
+        without: &[],
+        seed: 1,
+    };
     diagnose(&question, |_| ())
 }
 

@@ -36,8 +36,16 @@ fn lagging(poses: usize, rest: impl Fn(f64, f64) -> f64) -> (Cell, Measurements)
 fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
     let all: Vec<usize> = (0..data.rows()).collect();
     let (robot, _) = gauge(RobotModel::new(cell.description.clone()), data, &all, &BTreeMap::new()).expect("a robot");
-    let question =
-        Question { robot: &robot, data, fit: &all, validate: &[], set: &vec![0; all.len()], prior_weight: 1.0, seed: 1 };
+    let question = Question {
+        robot: &robot,
+        data,
+        fit: &all,
+        validate: &[],
+        set: &vec![0; all.len()],
+        prior_weight: 1.0,
+        without: &[],
+        seed: 1,
+    };
     diagnose(&question, |_| ())
 }
 

@@ -56,8 +56,16 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
     let (cell, data) = stops(40, 2, 6.0 * ARCSEC, 0.0);
     let all = rows(&data);
     let (robot, _) = gauge(RobotModel::new(cell.description.clone()), &data, &all, &BTreeMap::new()).expect("a robot");
-    let question =
-        Question { robot: &robot, data: &data, fit: &all, validate: &[], set: &vec![0; all.len()], prior_weight: 1.0, seed: 1 };
+    let question = Question {
+        robot: &robot,
+        data: &data,
+        fit: &all,
+        validate: &[],
+        set: &vec![0; all.len()],
+        prior_weight: 1.0,
+        without: &[],
+        seed: 1,
+    };
     let found = diagnose(&question, |_| ());
     assert_eq!((found.repeatability.repeats, found.noise_basis), (120, NoiseBasis::Repeats));
     let ratio = found.repeatability.sigma / (6.0 * ARCSEC);
@@ -165,8 +173,16 @@ fn near_repeats_count_less_the_known_motion() {
     let question_rows = rows(&data);
     let robot = RobotModel::new(cell.description.clone());
     let set = vec![0; data.rows()];
-    let question =
-        Question { robot: &robot, data: &data, fit: &question_rows, validate: &[], set: &set, prior_weight: 1.0, seed: 1 };
+    let question = Question {
+        robot: &robot,
+        data: &data,
+        fit: &question_rows,
+        validate: &[],
+        set: &set,
+        prior_weight: 1.0,
+        without: &[],
+        seed: 1,
+    };
     let said = diagnose(&question, |_| ());
     assert!(said.repeatability.repeats >= 30 && said.noise_basis == NoiseBasis::Repeats, "{:?}", said.repeatability);
     let ratio = said.repeatability.sigma / (5.0 * ARCSEC);
