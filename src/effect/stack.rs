@@ -176,7 +176,7 @@ impl EffectStack {
         let state = ArmState::new(data, row, &scratch.posture, point);
         let summed = scratch.constant.is_some();
         let due = |effect: &dyn Effect| match needs {
-            Needs::Nothing => !effect.needs_torque() && !effect.needs_sight() && !(summed && effect.is_constant()),
+            Needs::Nothing => !(effect.needs_torque() || effect.needs_sight() || summed && effect.is_constant()),
             Needs::Torque => effect.needs_torque(),
             Needs::Sight(_) => effect.needs_sight(),
         };
