@@ -32,6 +32,10 @@ pub trait Placed: Effect + Any {
     fn called(&self, _p: &[f64], _survey: &Survey) -> &'static str {
         self.name()
     }
+    /// Which of its parameters are the numbers of a free curve.
+    fn free_curve(&self) -> std::ops::Range<usize> {
+        0..0
+    }
     /// The law, where it is one at a place.
     fn term(&self) -> Option<&Term> {
         None

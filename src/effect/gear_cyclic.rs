@@ -5,7 +5,7 @@ use super::summary::amplitude;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable, figure,
+    Variable, figure, orders,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -14,8 +14,6 @@ pub struct GearCyclic;
 
 /// Orders per joint turn that are tried: strain wave gears and absolute encoders show some twenty, worm wheels more.
 const ORDERS: u32 = 48;
-/// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
-const PHASE: f64 = 2.2;
 /// Eccentricity makes the lowest orders on any joint; they are tried as a few, all others as many.
 const LOW: u32 = 4;
 /// A wheel far off its centre is rarer than one slightly off: -2 ln of the odds.
@@ -45,8 +43,7 @@ impl Cause for GearCyclic {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute();
         let forms = joints.flat_map(|joint| {
-            let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
-            orders.flat_map(move |order| {
+            orders::within_travel(survey, joint, ORDERS).flat_map(move |order| {
                 let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
                 let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).penalised(OVERTONE));
                 [Some(pure), wheel].into_iter().flatten()
@@ -63,8 +60,7 @@ impl Cause for GearCyclic {
     fn variant(&self, term: &Term) -> String {
         match term.basis() {
             Basis::Wave { order, overtone: true } => format!("order{order}_{}", 2 * order),
-            Basis::Wave { order, .. } => format!("order{order}"),
-            _ => String::new(),
+            _ => orders::variant(term),
         }
     }
 

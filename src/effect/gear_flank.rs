@@ -1,7 +1,6 @@
 //! `gear_flank`: the two flanks of a wheel's teeth have run-outs of their own; half their difference changes sign with the approach.
 
-use super::summary::amplitude;
-use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -9,13 +8,11 @@ pub struct GearFlank;
 
 /// Orders per joint turn that are tried: grinding errors are of few periods a turn.
 const ORDERS: u32 = 24;
-/// An order needs this much of its phase (rad) within the joint's travel to be more than lost motion and its slope.
-const PHASE: f64 = 2.2;
 
 impl GearFlank {
     fn term(joint: usize, order: u32) -> Term {
-        let wave = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
-        Term::new(&Self, Motion::Joint { joint }, wave.times(Variable::Approach { joint }, Basis::PROPORTIONAL))
+        let law = orders::wave(Variable::Angle { joint }, order).times(Variable::Approach { joint }, Basis::PROPORTIONAL);
+        Term::new(&Self, Motion::Joint { joint }, law)
     }
 }
 
@@ -34,27 +31,23 @@ impl Cause for GearFlank {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.both_directions(*joint));
         let terms = joints.flat_map(|joint| {
-            let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
+            let orders = orders::within_travel(survey, joint, ORDERS);
             orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize))
         });
         terms.collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 0.01)).into()
+        orders::numbers(Unit::Radian, 0.01)
     }
 
     fn variant(&self, term: &Term) -> String {
-        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let orders = summary.estimates(self.name()).filter_map(|(term, numbers)| match term.basis() {
-            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude(&numbers))),
-            _ => None,
-        });
-        let orders: Vec<String> = orders.collect();
-        format!("the two flanks of the teeth of {} err differently: {} to either side", summary.place, orders.join(", "))
+        let orders = orders::in_words(summary, self.name());
+        format!("the two flanks of the teeth of {} err differently: {} to either side", summary.place, orders)
     }
 
     fn finer(&self) -> &'static [&'static str] {

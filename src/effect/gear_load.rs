@@ -1,7 +1,6 @@
 //! `gear_load`: a periodic gear error whose size follows the load: an eccentric wheel or a bearing that yields, felt under torque.
 
-use super::summary::amplitude;
-use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -9,15 +8,13 @@ pub struct GearLoad;
 
 /// Orders per joint turn that are tried.
 const ORDERS: u32 = 24;
-/// An order needs this much of its phase (rad) within the joint's travel to be more than a compliance and its slope.
-const PHASE: f64 = 2.2;
 /// -2 ln of the odds that a gear errs with its load alone.
 const RARER: f64 = 4.0;
 
 impl GearLoad {
     fn term(joint: usize, order: u32) -> Term {
-        let wave = Law::new(Variable::Angle { joint }, Basis::Wave { order, overtone: false });
-        Term::new(&Self, Motion::Joint { joint }, wave.times(Variable::Load { joint }, Basis::PROPORTIONAL))
+        let law = orders::wave(Variable::Angle { joint }, order).times(Variable::Load { joint }, Basis::PROPORTIONAL);
+        Term::new(&Self, Motion::Joint { joint }, law)
     }
 }
 
@@ -36,27 +33,23 @@ impl Cause for GearLoad {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let joints = survey.revolute().filter(|joint| survey.is_loaded(*joint));
         let terms = joints.flat_map(|joint| {
-            let orders = (1..=ORDERS).filter(move |order| f64::from(*order) * survey.travel(joint) > PHASE);
+            let orders = orders::within_travel(survey, joint, ORDERS);
             orders.map(move |order| Hypothesis::new(Self::term(joint, order), 2 * ORDERS as usize).penalised(RARER))
         });
         terms.collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["sin", "cos"].map(|name| (name.to_string(), Unit::RadianPerNewtonMetre, 1e-4)).into()
+        orders::numbers(Unit::RadianPerNewtonMetre, 1e-4)
     }
 
     fn variant(&self, term: &Term) -> String {
-        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let orders = summary.estimates(self.name()).filter_map(|(term, numbers)| match term.basis() {
-            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude(&numbers))),
-            _ => None,
-        });
-        let orders: Vec<String> = orders.collect();
-        format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders.join(", "))
+        let orders = orders::in_words(summary, self.name());
+        format!("the gear of {} errs periodically, in proportion to its load: {}", summary.place, orders)
     }
 
     fn finer(&self) -> &'static [&'static str] {

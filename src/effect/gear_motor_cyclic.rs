@@ -1,7 +1,7 @@
 //! `gear_motor_cyclic`: error periodic in the motor angle (joint angle times reduction ratio), e.g. of the input stage.
 
 use super::summary::amplitude;
-use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use super::{Cause, CauseDescription, Hypothesis, Motion, NumberSpec, Summary, Survey, Term, Variable, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -25,17 +25,17 @@ impl Cause for GearMotorCyclic {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let known = |joint: &usize| survey.robot.description().joints[*joint].reduction_ratio.is_some();
         let pairs = survey.revolute().filter(known).flat_map(|joint| (1..=ORDERS).map(move |order| (joint, order)));
-        let law = |joint, order| Law::new(Variable::Motor { joint }, Basis::Wave { order, overtone: false });
+        let law = |joint, order| orders::wave(Variable::Motor { joint }, order);
         let terms = pairs.map(|(joint, order)| Term::new(&Self, Motion::Joint { joint }, law(joint, order)));
         terms.map(|term| Hypothesis::new(term, ORDERS as usize)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 0.01)).to_vec()
+        orders::numbers(Unit::Radian, 0.01)
     }
 
     fn variant(&self, term: &Term) -> String {
-        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -31,15 +31,20 @@ pub(super) fn at_joint(survey: &Survey, joint: usize) -> Vec<(Law, usize)> {
 
 /// Slow curves of time and of the recorded temperature.
 pub(super) fn slowly(survey: &Survey) -> Vec<(Variable, Basis)> {
-    let temperatures = survey.rows.iter().filter_map(|row| survey.data.temperature(*row));
-    let warm = temperatures.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], now| [low.min(now), high.max(now)]);
-    let ranges = [(Variable::Time, survey.time), (Variable::Temperature, warm)].into_iter();
-    let ranges = ranges.filter(|(_, [low, high])| high > low);
+    let ranges = slow(survey).into_iter();
     ranges.map(|(of, [low, high])| (of, Basis::Cosines { low, high, count: SLOW })).collect()
 }
 
+/// Time and the recorded temperature with their ranges, where they change.
+pub(super) fn slow(survey: &Survey) -> Vec<(Variable, [f64; 2])> {
+    let temperatures = survey.rows.iter().filter_map(|row| survey.data.temperature(*row));
+    let warm = temperatures.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], now| [low.min(now), high.max(now)]);
+    let ranges = [(Variable::Time, survey.time), (Variable::Temperature, warm)].into_iter();
+    ranges.filter(|(_, [low, high])| high > low).collect()
+}
+
 /// A quantile of how far a joint moved from stop to stop, where it did.
-fn move_of(survey: &Survey, joint: usize, share: f64) -> f64 {
+pub(super) fn move_of(survey: &Survey, joint: usize, share: f64) -> f64 {
     let moves = survey.rows.iter().map(|row| survey.data.last_move(*row, joint).abs()).filter(|moved| *moved > 0.0);
     let mut moves: Vec<f64> = moves.collect();
     moves.sort_by(f64::total_cmp);

@@ -1,7 +1,7 @@
 //! `joint_hardening`: wind-up that is not proportional to the load; d = a tau + b f(tau), f of slope 1 at no load or a free curve.
 
-use super::basis::cosines;
 use super::form::parameters;
+use super::joint_table::PLAUSIBLE;
 use super::{
     ArmState, Backlash, Cause, CauseDescription, Deflection, Effect, Form, Hypothesis, Measure, ParameterSpec, Place, Placed,
     Summary, Survey, Variable, figure,
@@ -9,6 +9,7 @@ use super::{
 use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
 
 pub struct JointHardening;
 
@@ -28,8 +29,8 @@ pub enum HardeningLaw {
     Knee { at_nm: f64 },
     /// at (|tau| / at)^exponent with the sign of tau.
     Power { exponent: f64, at_nm: f64 },
-    /// A curve over the torques seen.
-    Curve { low_nm: f64, high_nm: f64 },
+    /// sin((2k - 1) pi / 2 tau / most), k = 1..=6: a curve through no load, odd as a wind-up is, held beyond the largest torque.
+    Curve { most_nm: f64 },
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,11 +39,13 @@ pub struct BentWindup {
     law: HardeningLaw,
 }
 
-/// Cosines of a free curve.
+/// Sines of a free curve.
 const CURVE: usize = 6;
 /// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
-/// largest a knee is never seen and what saturates there is a straight line.
+/// largest a knee is never seen and what saturates there is a straight line. See also [`least_bend`].
 const BENDS: [f64; 2] = [0.01, 10.0];
+/// Share of the rows that has to lie on the other side of a bend.
+const BEYOND: f64 = 0.05;
 const LAST_KNEE: f64 = 0.98;
 /// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
 const SHARP: f64 = 0.15;
@@ -65,13 +68,16 @@ impl Cause for JointHardening {
         let mut out = Vec::new();
         for joint in survey.revolute().filter(|joint| survey.is_loaded(*joint)) {
             let most = survey.load(joint);
-            let (low, high) = survey.torques(joint).fold((0.0_f64, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
-            let laws = [0.05, 0.15, 0.5, 1.5].map(|share| HardeningLaw::Saturating { at_nm: share * most }).into_iter();
-            let laws = laws.chain([HardeningLaw::SoftZone { at_nm: 0.2 * most }]);
-            let laws = laws.chain([0.1, 0.3, 0.6].map(|share| HardeningLaw::Knee { at_nm: share * most }));
+            let least = least_bend(survey, joint);
+            let seen = move |share: &f64| share * most >= least;
+            let shares = [0.05, 0.15, 0.5, 1.5].into_iter().filter(seen);
+            let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
+            let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
+            let laws =
+                laws.chain([0.1, 0.3, 0.6].into_iter().filter(seen).map(|share| HardeningLaw::Knee { at_nm: share * most }));
             let laws = laws.chain([2.0, 3.0].map(|exponent| HardeningLaw::Power { exponent, at_nm: most }));
             out.extend(laws.map(|law| Hypothesis::new(BentWindup { joint, law }, 10).penalised(4.0)));
-            let curve = BentWindup { joint, law: HardeningLaw::Curve { low_nm: low, high_nm: high } };
+            let curve = BentWindup { joint, law: HardeningLaw::Curve { most_nm: most } };
             out.push(Hypothesis::new(curve, 1).penalised(4.0));
         }
         out
@@ -109,6 +115,21 @@ impl Cause for JointHardening {
     fn yields_to_torque(&self) -> bool {
         true
     }
+}
+
+/// Smallest torque of a bend that the loads of a joint show, Nm. Where they pull to both sides, any that is more than a step;
+/// where they pull to one side, the smaller loads have to lie below it: else the joint's zero explains it as well, and where the
+/// load changes its side the two differ by twice the step.
+fn least_bend(survey: &Survey, joint: usize) -> f64 {
+    let mut torques: Vec<f64> = survey.torques(joint).collect();
+    let few = (BEYOND * torques.len() as f64) as usize;
+    let against = torques.iter().filter(|torque| **torque < 0.0).count();
+    let step = BENDS[0] * survey.load(joint);
+    if against.min(torques.len() - against) > few || torques.is_empty() {
+        return step;
+    }
+    torques.iter_mut().for_each(|torque| *torque = torque.abs());
+    step.max(*torques.select_nth_unstable_by(few, f64::total_cmp).1)
 }
 
 impl BentWindup {
@@ -154,8 +175,8 @@ impl Effect for BentWindup {
         let linear = ("linear", Unit::RadianPerNewtonMetre, 1e-3);
         match self.law {
             HardeningLaw::Curve { .. } => {
-                let names: Vec<String> = (1..=CURVE).map(|k| format!("cos{k}")).collect();
-                let curve = names.iter().map(|name| (name.as_str(), Unit::Radian, 0.01));
+                let names: Vec<String> = (1..=CURVE).map(|k| format!("sin{k}")).collect();
+                let curve = names.iter().map(|name| (name.as_str(), Unit::Radian, PLAUSIBLE));
                 parameters(self, std::iter::once(linear).chain(curve))
             }
             _ => parameters(self, [linear, ("bend", Unit::RadianPerNewtonMetre, 1e-3)]),
@@ -165,9 +186,10 @@ impl Effect for BentWindup {
     fn deflect(&self, _robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
         let torque = state.torque()[self.joint];
         out.turn(0, p, self.joint, torque);
-        if let HardeningLaw::Curve { low_nm, high_nm } = self.law {
-            for (k, value) in cosines(torque, [low_nm, high_nm], CURVE).enumerate() {
-                out.turn(k + 1, p, self.joint, value);
+        if let HardeningLaw::Curve { most_nm } = self.law {
+            let quarter = FRAC_PI_2 * (torque / most_nm).clamp(-1.0, 1.0);
+            for k in 0..CURVE {
+                out.turn(k + 1, p, self.joint, libm::sin((2 * k + 1) as f64 * quarter));
             }
             out.yields(self.joint, p[0]);
         } else {
@@ -199,6 +221,10 @@ impl Placed for BentWindup {
         Some((self.joint, *p.first()?))
     }
 
+    fn free_curve(&self) -> std::ops::Range<usize> {
+        if let HardeningLaw::Curve { .. } = self.law { 1..1 + CURVE } else { 0..0 }
+    }
+
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {
         if self.is_lost_motion(p, survey.load(self.joint)) { Backlash::NAME } else { JointHardening::NAME }
     }
@@ -210,7 +236,8 @@ impl Placed for BentWindup {
     fn near(&self, survey: &Survey, level: i32) -> Vec<Form> {
         let step = libm::pow(1.5, libm::exp2(-0.5 * f64::from(level)));
         let most = survey.load(self.joint);
-        let within = |at_nm: f64, largest: f64| at_nm.clamp(BENDS[0] * most, largest * most);
+        let least = least_bend(survey, self.joint);
+        let within = |at_nm: f64, largest: f64| at_nm.clamp(least.min(largest * most), largest * most);
         let scaled = |factor: f64| match self.law {
             HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
             HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),

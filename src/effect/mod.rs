@@ -21,6 +21,7 @@ mod gear_cyclic;
 mod gear_flank;
 mod gear_load;
 mod gear_motor_cyclic;
+mod heredity;
 mod interactions;
 mod joint_compliance;
 mod joint_hardening;
@@ -33,6 +34,7 @@ mod link_compliance;
 mod link_geometry;
 mod link_mass;
 mod motion;
+mod orders;
 mod payload_error;
 mod place;
 mod placed_row;
@@ -74,6 +76,7 @@ pub use cause::{CAUSES, Cause, CauseDescription, Measure, NumberSpec, cause, hyp
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
+pub use heredity::{follows, products};
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::JointHardening;
 

@@ -146,11 +146,20 @@ pub struct Hypothesis {
     pub positive: bool,
     /// The largest coefficient that makes sense, SI.
     pub largest: f64,
+    /// A product of a named law, which stands only beside that law.
+    pub inherits: bool,
 }
 
 impl Hypothesis {
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
-        Self { form: form.into(), tried: tried.max(1) as f64, prior_penalty: 0.0, positive: false, largest: f64::INFINITY }
+        Self {
+            form: form.into(),
+            tried: tried.max(1) as f64,
+            prior_penalty: 0.0,
+            positive: false,
+            largest: f64::INFINITY,
+            inherits: false,
+        }
     }
 
     pub fn positive(self) -> Self {
@@ -159,6 +168,10 @@ impl Hypothesis {
 
     pub fn within(self, largest: f64) -> Self {
         Self { largest, ..self }
+    }
+
+    pub fn inheriting(self) -> Self {
+        Self { inherits: true, ..self }
     }
 
     pub fn penalised(self, prior_penalty: f64) -> Self {

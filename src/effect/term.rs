@@ -142,6 +142,10 @@ impl Placed for Term {
         Some(self)
     }
 
+    fn free_curve(&self) -> std::ops::Range<usize> {
+        if self.is_own_curve() { 0..self.law.count() } else { 0..0 }
+    }
+
     fn body(&self) -> serde_json::Value {
         serde_json::json!(Stored { motion: self.motion, law: self.law })
     }

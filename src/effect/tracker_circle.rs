@@ -1,9 +1,6 @@
 //! `tracker_circle`: the horizontal circle of the instrument sits off its axis, or is out of round: azimuths err once or twice a turn.
 
-use super::summary::amplitude;
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable,
-};
+use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -31,26 +28,22 @@ impl Cause for TrackerCircle {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let orders = (1..=ORDERS).filter(|_| survey.seen_from_outside());
-        let law = |order| Law::new(Variable::Azimuth, Basis::Wave { order, overtone: false });
-        let term = |order| Term::new(&Self, Motion::Instrument { of: Polar::Azimuth }, law(order));
+        let motion = Motion::Instrument { of: Polar::Azimuth };
+        let term = |order| Term::new(&Self, motion, orders::wave(Variable::Azimuth, order));
         orders.map(|order| Hypothesis::new(term(order), ORDERS as usize).penalised(RARER)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 1e-3)).into()
+        orders::numbers(Unit::Radian, 1e-3)
     }
 
     fn variant(&self, term: &Term) -> String {
-        if let Basis::Wave { order, .. } = term.basis() { format!("order{order}") } else { String::new() }
+        orders::variant(term)
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let orders = summary.estimates(self.name()).filter_map(|(term, numbers)| match term.basis() {
-            Basis::Wave { order, .. } => Some(format!("{order} times a turn by {}", amplitude(&numbers))),
-            _ => None,
-        });
-        let orders: Vec<String> = orders.collect();
-        format!("the tracker's azimuths err periodically: {}", orders.join(", "))
+        let orders = orders::in_words(summary, self.name());
+        format!("the tracker's azimuths err periodically: {orders}")
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -3,9 +3,7 @@
 
 use super::summary::amplitude;
 use super::tracker_circle::{MEASURE, RARER};
-use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable,
-};
+use super::{Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, orders};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -28,20 +26,19 @@ impl Cause for TrackerElevation {
 
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let ways = WAYS.into_iter().filter(|_| survey.seen_from_outside());
-        let law = |order| Law::new(Variable::Elevation, Basis::Wave { order, overtone: false });
-        let terms = ways.map(|(of, order)| Term::new(&Self, Motion::Instrument { of }, law(order)));
+        let wave = |order| orders::wave(Variable::Elevation, order);
+        let terms = ways.map(|(of, order)| Term::new(&Self, Motion::Instrument { of }, wave(order)));
         terms.map(|term| Hypothesis::new(term, WAYS.len()).penalised(RARER)).collect()
     }
 
     fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
-        ["sin", "cos"].map(|name| (name.to_string(), Unit::Radian, 1e-3)).into()
+        orders::numbers(Unit::Radian, 1e-3)
     }
 
     fn variant(&self, term: &Term) -> String {
-        match (term.motion(), term.basis()) {
-            (Motion::Instrument { of: Polar::Azimuth }, _) => "transit".into(),
-            (_, Basis::Wave { order, .. }) => format!("order{order}"),
-            _ => String::new(),
+        match term.motion() {
+            Motion::Instrument { of: Polar::Azimuth } => "transit".into(),
+            _ => orders::variant(term),
         }
     }
 

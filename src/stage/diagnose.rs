@@ -72,7 +72,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 12;
+    const IMPLEMENTATION: u32 = 13;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 

@@ -9,6 +9,7 @@ mod check;
 mod clock;
 mod columns;
 pub mod encoding;
+mod later;
 mod layout;
 mod lines;
 mod listing;
@@ -29,6 +30,7 @@ mod write;
 
 pub use clock::is_clock_time;
 pub use columns::Columns;
+pub use later::LaterFiles;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
 pub use listing::ListedTable;
 pub use mapped::{
@@ -51,6 +53,9 @@ use std::path::Path;
 pub struct Ingest {
     /// The raw files; the first one leads: its order is that of the recording.
     pub files: Vec<FileLayout>,
+    /// Files of later measurements in the same layout, e.g. of another day: joined among themselves, then appended.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub later: Vec<LaterFiles>,
     /// How several files belong together.
     #[serde(default)]
     pub join: Option<Join>,
@@ -98,7 +103,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "raw delimited files -> recording, with every rejected row and its reason";
-    const IMPLEMENTATION: u32 = 3;
+    const IMPLEMENTATION: u32 = 4;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 
@@ -106,12 +111,17 @@ impl Stage for Ingest {
         check::faults(self)
     }
     fn files(&self) -> Vec<(String, RawFile)> {
-        self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
+        let first = self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone()));
+        let later = self.later.iter().enumerate().flat_map(|(set, later)| {
+            let files = later.files.iter().enumerate();
+            files.map(move |(index, file)| (format!("later[{set}].files[{index}]"), file.clone()))
+        });
+        first.chain(later).collect()
     }
     fn look(&self, reads: Option<IngestReads>, context: &Context) -> Result<Option<IngestWrites>> {
         let arm = reads.map(|reads| arm::RobotJoints::of(&reads.robot)).transpose()?;
         let mut faults = Vec::new();
-        for layout in &self.files {
+        for layout in self.measurements().iter().flat_map(|one| &one.files) {
             match reading::header(layout, arm.as_ref(), self.limits, context) {
                 Ok(()) => {}
                 Err(Error::Data(more)) => faults.extend(more),
@@ -126,23 +136,32 @@ impl Stage for Ingest {
             return Err(Error::Spec(faults));
         }
         let arm = arm::RobotJoints::of(&reads.robot)?;
-        let scan = |(index, layout)| scan::scan(self, index, layout, &arm, context);
-        let mut scans = self.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
-        let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
-        verdict::judge(self, &scans, &fates, &arm, context)?;
-        let names = names(&scans);
-        let decided = write::JoinDecisions { settings: self, arm: &arm, scans: &scans, fates: &fates, names: &names };
-        let (recording, rejected) = write::write(&decided, context)?;
+        let measurements = self.measurements();
+        let mut scanned = Vec::new();
+        for one in &measurements {
+            let scan = |(index, layout)| scan::scan(one, index, layout, &arm, context);
+            let mut scans = one.files.iter().enumerate().map(scan).collect::<Result<Vec<_>>>()?;
+            let fates = pair::decide(&mut scans, self.join.as_ref(), self.duplicates);
+            verdict::judge(one, &scans, &fates, &arm, context)?;
+            scanned.push((scans, fates));
+        }
+        let names = names(scanned.iter().flat_map(|(scans, _)| scans));
+        let each = measurements.iter().zip(&scanned).zip(names.chunks(self.files.len().max(1)));
+        let decided: Vec<write::JoinDecisions> = each
+            .map(|((settings, (scans, fates)), names)| write::JoinDecisions { settings, arm: &arm, scans, fates, names })
+            .collect();
+        let gaps: Vec<f64> = self.later.iter().map(|later| later.gap_s).collect();
+        let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
         Ok(IngestWrites { recording, rejected, intake: intake(&decided, context) })
     }
 }
 
 /// The files' own names, made different where two are the same: a folder is no part of a table.
-fn names(scans: &[scan::Scan]) -> Vec<String> {
+fn names<'a>(scans: impl Iterator<Item = &'a scan::Scan>) -> Vec<String> {
     let own = |scan: &scan::Scan| {
         Path::new(&scan.label).file_name().map_or_else(|| scan.label.clone(), |name| name.to_string_lossy().into_owned())
     };
-    let all: Vec<String> = scans.iter().map(own).collect();
+    let all: Vec<String> = scans.map(own).collect();
     let numbered = all.iter().enumerate().map(|(index, name)| {
         let earlier = all.iter().take(index).filter(|other| *other == name).count();
         if earlier == 0 { name.clone() } else { format!("{name} ({})", earlier + 1) }
@@ -150,9 +169,9 @@ fn names(scans: &[scan::Scan]) -> Vec<String> {
     numbered.collect()
 }
 
-fn intake(decided: &write::JoinDecisions, context: &Context) -> Intake {
+fn intake(decided: &[write::JoinDecisions], context: &Context) -> Intake {
     let mut rows: Vec<IntakeRow> = Vec::new();
-    for ((scan, fate), name) in decided.scans.iter().zip(decided.fates).zip(decided.names) {
+    for ((scan, fate), name) in decided.iter().flat_map(|one| one.scans.iter().zip(one.fates).zip(one.names)) {
         let accepted = verdict::accepted(scan, fate);
         let rejected = scan.read - accepted;
         context.services.note(format!("{name}: {} read, {accepted} used, {rejected} rejected", counted(scan.read, "row")));

@@ -1,6 +1,13 @@
 //! What effects add to the arm in one row.
 
 use super::matrix::{self, IDENTITY, Matrix, Vector};
+use super::truth::ARCSEC;
+
+/// A share of a rigid step: a shift (um) after a rotation vector (arcsec).
+pub fn step(shift_um: Vector, turn_arcsec: Vector, share: f64) -> Matrix {
+    let moved = matrix::shift(matrix::scale(shift_um, 1e-6 * share));
+    matrix::times(&moved, &matrix::turn_by(matrix::scale(turn_arcsec, ARCSEC * share)))
+}
 
 /// What effects do to the arm.
 #[derive(Debug, Clone)]

@@ -4,6 +4,7 @@ mod clocks;
 mod counting;
 mod foreign;
 mod kinds;
+mod later;
 mod moving;
 mod noise;
 mod programs;

@@ -1,9 +1,10 @@
 """Fits the numbers of src/diagnose/words/probability.rs to proofs (`calib simulate prove --out DIR ...`) by maximum likelihood.
 
-    python3 tests/reference/calibrate_probability.py DIR [DIR ...]
+    python3 tests/reference/calibrate_probability.py DIR[=CAUSE,CAUSE] [DIR ...]
 
 Every finding with evidence is one draw: it is what it is called, one of its rivals, or none of these, by the sealed truth; names that
-the truth accepts count where none is its own. Prints the numbers, the mean log likelihood and a reliability table of the statements that they make.
+the truth accepts count where none is its own. The causes after DIR are those that its pipeline left out (`diagnose: without`): they
+stand for physics that no list holds, which is `unknown` at its place. Prints the numbers, the mean log likelihood and a reliability table of the statements that they make.
 Needs nothing but Python.
 """
 import json
@@ -19,12 +20,15 @@ def atoms(effect, place):
     return {(effect, at) for at in places}
 
 
-def draws(folder):
-    """(ln loss, no law, [(delta, right) of own name and rivals], place right) of every finding with evidence."""
+def draws(argument):
+    """((ln loss, no law, ln margin), [(delta, right) of own name and rivals], place right) of every finding with evidence."""
+    folder, _, left_out = argument.partition("=")
+    folder, left_out = Path(folder), left_out.split(",") if left_out else []
     for path in sorted((folder / "verdicts").glob("*.json")):
         answer = json.loads(path.read_text())
         truth = json.loads((folder / "sealed" / path.name).read_text())
-        strict = [atoms(name["effect"], name["where"]) for name in truth["effects"] + truth["tampered"]]
+        listed = lambda effect: "unknown" if effect in left_out else effect
+        strict = [atoms(listed(name["effect"]), name["where"]) for name in truth["effects"] + truth["tampered"]]
         accepted = [atoms(name["effect"], name["where"]) for name in truth["accepted"]]
         places = {place for name in strict + accepted for _, place in name}
         for finding in answer["findings"]:
@@ -36,13 +40,15 @@ def draws(folder):
             known = strict if any(name in strict for _, name in said) else accepted
             names = [(max(delta, 0.0), name in known) for delta, name in said]
             there = any(place in places for _, place in said[0][1])
-            yield math.log(max(loss, 1.0)), finding["effect"] == "unknown", names, there
+            margin = finding["evidence"]["nameless_delta_bic"]
+            margin = math.log1p(max(margin, 0.0)) if margin is not None else 0.0
+            yield (math.log(max(loss, 1.0)), finding["effect"] == "unknown", margin), names, there
 
 
 def stated(numbers, draw):
-    constant, by_loss, no_law, temperature, identity = numbers
-    loss, unknown, names, _ = draw
-    odds = constant + by_loss * loss + no_law * unknown
+    constant, by_loss, no_law, by_margin, temperature, identity = numbers
+    (loss, unknown, margin), names, _ = draw
+    odds = constant + by_loss * loss + no_law * unknown + by_margin * margin
     none = 1.0 / (1.0 + math.exp(-odds))
     weight = lambda delta: math.exp(-(delta or identity) / (2.0 * max(temperature, 0.05)))
     weights = [1.0] + [weight(delta) for delta, _ in names[1:]]
@@ -53,9 +59,9 @@ def cost(numbers, all_draws):
     total = 0.0
     for draw in all_draws:
         none, shares = stated(numbers, draw)
-        right = [share for share, (_, true) in zip(shares, draw[2]) if true]
+        right = [share for share, (_, true) in zip(shares, draw[1]) if true]
         total -= math.log(max(sum(right) if right else none, 1e-9))
-    return total / len(all_draws) + 1e-3 * sum(value * value for value in numbers[:3])
+    return total / len(all_draws) + 1e-3 * sum(value * value for value in numbers[:4])
 
 
 def minimum(function, start):
@@ -89,18 +95,18 @@ def minimum(function, start):
 
 
 def main():
-    all_draws = [draw for folder in sys.argv[1:] for draw in draws(Path(folder))]
-    value, numbers = minimum(lambda numbers: cost(numbers, all_draws), [1.0, -1.0, 1.0, 2.0, 4.0])
+    all_draws = [draw for argument in sys.argv[1:] for draw in draws(argument)]
+    value, numbers = minimum(lambda numbers: cost(numbers, all_draws), [1.0, -1.0, 1.0, -0.5, 2.0, 4.0])
     print(f"{len(all_draws)} findings, mean -ln likelihood {value:.4f}")
-    for name, number in zip(["NONE", "BY_LOSS", "NO_LAW", "TEMPERATURE", "IDENTITY"], numbers):
+    for name, number in zip(["NONE", "BY_LOSS", "NO_LAW", "BY_MARGIN", "TEMPERATURE", "IDENTITY"], numbers):
         print(f"{name:12} {number:.3f}")
-    nowhere = [draw for draw in all_draws if not any(true for _, true in draw[2])]
+    nowhere = [draw for draw in all_draws if not any(true for _, true in draw[1])]
     if nowhere:
-        print(f"SAME_PLACE   {sum(draw[3] for draw in nowhere) / len(nowhere):.3f} of {len(nowhere)}")
+        print(f"SAME_PLACE   {sum(draw[2] for draw in nowhere) / len(nowhere):.3f} of {len(nowhere)}")
     said = []
     for draw in all_draws:
         _, shares = stated(numbers, draw)
-        said += [(share, true) for share, (_, true) in zip(shares, draw[2])]
+        said += [(share, true) for share, (_, true) in zip(shares, draw[1])]
     ends = [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0]
     for low, high in zip(ends, ends[1:]):
         own = [true for share, true in said if low <= share < high or share == high == 1.0]

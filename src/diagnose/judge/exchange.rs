@@ -5,7 +5,7 @@ use super::comparison::{ModelComparison, others};
 use super::fold_errors::{FoldErrors, FoldGain};
 use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
 use crate::diagnose::round::{EstimatedCause, FitState};
-use crate::effect::{Effect, Place, Unknown};
+use crate::effect::{Effect, Place, Unknown, follows};
 
 /// Rivals that are tried in place of a cause.
 const RIVALS: usize = 4;
@@ -94,8 +94,12 @@ struct Contested {
 
 impl Contested {
     fn of(name: (&'static str, Place), set: &[usize], pool: &CachedHypotheses) -> Self {
-        let members: Vec<usize> = (0..set.len()).filter(|i| named(pool, set[*i]) == name).collect();
-        let (own, rest): (Vec<usize>, Vec<usize>) = set.iter().copied().partition(|k| named(pool, *k) == name);
+        let form = |k: usize| &pool.hypotheses[k].form;
+        let named: Vec<usize> = set.iter().copied().filter(|k| named(pool, *k) == name).collect();
+        // A product goes with the law that it is made of.
+        let contested = |k: usize| named.contains(&k) || named.iter().any(|own| follows(form(k), form(*own)).is_some());
+        let members: Vec<usize> = (0..set.len()).filter(|i| contested(set[*i])).collect();
+        let (own, rest): (Vec<usize>, Vec<usize>) = set.iter().copied().partition(|k| contested(*k));
         let prior_penalty: f64 = own.iter().map(|k| pool.prior_penalty[*k]).sum();
         Self { effect: name.0, members, own, rest, fit: pool.bic(set) - prior_penalty, prior_penalty }
     }

@@ -133,7 +133,8 @@ impl Conditional {
     pub fn admits(&self, pool: &HypothesisSet, h: usize) -> bool {
         let rows = pool.residual_rows.saturating_sub(pool.rank() + self.rank);
         let small = ROWS_EACH * (pool.first[h + 1] - pool.first[h]) <= rows;
-        small && !self.set.iter().any(|k| pool.keys[*k] == pool.keys[h])
+        let parted = pool.hypotheses[h].inherits && !pool.has_parent(h, &self.set);
+        small && !parted && !self.set.iter().any(|k| pool.keys[*k] == pool.keys[h])
     }
 
     /// How much the criterion would fall with hypothesis `h`; minus infinity where it cannot join or is not seen.

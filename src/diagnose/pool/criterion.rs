@@ -2,7 +2,7 @@
 
 use super::hypotheses::HypothesisSet;
 use super::solve::Solution;
-use crate::effect::Hypothesis;
+use crate::effect::{Hypothesis, follows};
 
 /// Explanations whose criterion is this close fit equally well (Kass and Raftery, 1995).
 pub(crate) const EQUIVALENT: f64 = 6.0;
@@ -18,8 +18,17 @@ pub(super) fn fall(n: f64, square: f64, gain: f64, rank: usize, prior_penalty: f
 impl HypothesisSet<'_> {
     /// Whether all members of a set make sense together.
     pub(super) fn is_sound(&self, set: &[usize]) -> bool {
+        let parted = |k: &usize| self.hypotheses[*k].inherits && !self.has_parent(*k, set);
+        if set.iter().any(parted) {
+            return false;
+        }
         let yields = |k: &usize| self.hypotheses[*k].form.cause().yields_to_torque();
         !set.iter().any(|k| self.of_torque_model[*k]) || set.iter().any(yields)
+    }
+
+    /// Whether the law of which a hypothesis is a product is in a set.
+    pub(super) fn has_parent(&self, h: usize, set: &[usize]) -> bool {
+        set.iter().any(|k| follows(&self.hypotheses[h].form, &self.hypotheses[*k].form).is_some())
     }
 
     /// Bayesian information criterion of a set with the prior's penalties; implausible signs and sizes are penalised too.

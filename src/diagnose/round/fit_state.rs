@@ -4,7 +4,7 @@ use super::base_model::base_model;
 use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Term, whole};
+use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
@@ -46,15 +46,18 @@ impl EstimatedCause {
     /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or
     /// between sparse points: most of them are of one size (empirical Bayes), and none is larger than is plausible.
     pub fn shrunk(form: Form, robot: &RobotModel, coefficients: Vec<f64>) -> Self {
-        if !form.term().is_some_and(Term::is_own_curve) {
+        let curve = form.free_curve();
+        if curve.is_empty() {
             return Self { form, coefficients, priors: Vec::new() };
         }
-        let mut sizes: Vec<f64> = coefficients.iter().map(|value| value.abs()).collect();
+        let mut sizes: Vec<f64> = coefficients[curve.clone()].iter().map(|value| value.abs()).collect();
         let middle = sizes.len() / 2;
         let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        let share = |k: usize| if k < SLOW { GEOMETRY } else { 1.0 };
-        let sigma =
-            |k: usize, spec: ParameterSpec| (share(k) * spec.prior_sigma.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
+        let share = |k: usize| if k < curve.start + SLOW { GEOMETRY } else { 1.0 };
+        let of_curve = |k: usize, plausible: f64| (share(k) * plausible.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
+        let sigma = |k: usize, spec: ParameterSpec| {
+            if curve.contains(&k) { of_curve(k, spec.prior_sigma) } else { spec.prior_sigma }
+        };
         let specs = form.parameters(robot).into_iter().enumerate();
         let priors = specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect();
         Self { form, coefficients, priors }

@@ -7,7 +7,7 @@ mod refine;
 pub(crate) use gate::SIGNIFICANT;
 
 use super::pool::{CachedHypotheses, Conditional};
-use crate::effect::{Form, Hypothesis, JointCompliance, Survey};
+use crate::effect::{Form, Hypothesis, JointCompliance, Survey, follows, products};
 use gate::gate;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -44,6 +44,8 @@ pub(crate) struct CauseSearch<'a, 'b> {
     options: SearchOptions,
     /// Hypotheses whose shape cannot be improved.
     refined: BTreeSet<usize>,
+    /// Hypotheses whose products are in the pool.
+    multiplied: BTreeSet<usize>,
 }
 
 /// What a search found.
@@ -56,7 +58,7 @@ pub(crate) struct SearchResult {
 
 impl<'a, 'b> CauseSearch<'a, 'b> {
     pub fn new(pool: &'b mut CachedHypotheses<'a>, survey: &'b Survey<'a>, pose: &'b [usize], options: SearchOptions) -> Self {
-        Self { pool, survey, pose, options, refined: BTreeSet::new() }
+        Self { pool, survey, pose, options, refined: BTreeSet::new(), multiplied: BTreeSet::new() }
     }
 
     /// The probability that what a set of causes, in any order, leaves is noise.
@@ -104,6 +106,7 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
         let mut first = None;
         let mut last = 1.0;
         while best.len() < self.options.most {
+            self.multiply(&best);
             last = self.gate(&best);
             first.get_or_insert(last);
             if last > SIGNIFICANT {
@@ -126,6 +129,17 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
             last = self.gate(&best);
         }
         SearchResult { set: best, first: first.unwrap_or(last), last }
+    }
+
+    /// Puts the products of named causes into the pool.
+    fn multiply(&mut self, set: &[usize]) {
+        let new: Vec<usize> = set.iter().copied().filter(|h| self.multiplied.insert(*h)).collect();
+        let all: Vec<Hypothesis> = new.iter().flat_map(|h| products(&self.pool.hypotheses[*h].form, self.survey)).collect();
+        let fresh = |product: &Hypothesis| !self.pool.hypotheses.iter().any(|other| other.form == product.form);
+        let fresh: Vec<Hypothesis> = all.into_iter().filter(fresh).collect();
+        if !fresh.is_empty() {
+            self.pool.add(fresh);
+        }
     }
 
     /// Sets with one cause more, best first; refined shapes among them.
@@ -155,7 +169,13 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
 
     /// From causes to the best set.
     pub fn run_from<'f>(&mut self, causes: impl Iterator<Item = &'f Form>) -> SearchResult {
-        let mut start: Vec<usize> = causes.map(|form| self.position(Hypothesis::new(form.clone(), 1))).collect();
+        let causes: Vec<&Form> = causes.collect();
+        let plain = |form: &&Form| {
+            let plain = Hypothesis::new((*form).clone(), 1);
+            let product = causes.iter().any(|other| follows(form, other).is_some());
+            if product { plain.inheriting() } else { plain }
+        };
+        let mut start: Vec<usize> = causes.iter().map(|form| self.position(plain(form))).collect();
         start.sort_unstable();
         start.dedup();
         self.run(start)

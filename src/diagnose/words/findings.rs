@@ -1,16 +1,19 @@
 //! Findings: what the chosen causes are called, how large they are, what else would explain them.
 
 use super::faults::{faults, rows_apart};
-use super::groups::{FindingKey, groups};
+use super::groups::{FindingKey, REFINEMENT, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
+use super::probability::is_doubtful;
 use super::rivals::{exact, rivals};
 use super::statement::{not_so, sentence};
 use crate::diagnose::judge::FoldGain;
-use crate::diagnose::pool::{HypothesisSet, Solution};
+use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
-use crate::diagnose::types::{Evidence, Finding, Probabilities};
-use crate::effect::{Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, people};
+use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
+use crate::effect::{
+    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people,
+};
 use crate::estimate::{ParameterStatus, tail};
 
 /// The causes of the last round as findings, strongest first.
@@ -36,6 +39,9 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
 }
+
+/// What the criterion loses by a name that is not given: it fits as its forms do.
+const NEAREST: f64 = 1e-3;
 
 /// All causes together.
 struct Whole {
@@ -71,6 +77,7 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
         f_statistic,
         p_value: tail(f_statistic, rank as f64, freedom),
         delta_bic: pool.bic(&rest) - whole.bic,
+        over_nameless: over_nameless(pool, &rest, &own, whole.bic, place),
         heldout_gain: heldout_gain(&forms, place, &last.judged.gains),
         effect_rms,
         gain,
@@ -78,8 +85,15 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let parameters = parameters(state, effect, members);
     let clock = Clock::of(last.survey.data);
     let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
-    let (effect, statement) = match (impossible(last, members), turn) {
-        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, why, effect_rms)),
+    let varies = varying(&own, pool, whole, gain, clock);
+    let doubtful = effect != Unknown::NAME && is_doubtful(&evidence);
+    let unproven = doubtful.then(|| (String::from("a law without a name fits nearly as well"), NEAREST));
+    let misnamed = varies.or(unproven);
+    let why = impossible(last, members).map(String::from).or_else(|| misnamed.as_ref().map(|(why, _)| why.clone()));
+    rivals.extend(misnamed.map(|(_, loss)| RivalCause { effect, place, delta_bic: loss, probability: 0.0 }));
+    rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
+    let (effect, statement) = match (why, turn) {
+        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, effect_rms)),
         (None, Some(turn)) => (effect, turn.sentence(clock, effect_rms)),
         (None, None) => (effect, sentence(effect, &summary, effect_rms)),
     };
@@ -97,6 +111,19 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     }
 }
 
+/// By how much the best law without a name at the same place would be worse than the finding's own causes; `None` where they have none.
+fn over_nameless(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic: f64, place: Place) -> Option<f64> {
+    let nameless = |h: usize| pool.hypotheses[h].form.cause().is_nameless();
+    if own.iter().all(|k| nameless(*k)) {
+        return None;
+    }
+    let fit = bic - own.iter().map(|k| pool.prior_penalty[*k]).sum::<f64>();
+    let given = pool.given(rest);
+    let there = given.falls.iter().filter(|(_, h)| nameless(*h) && pool.hypotheses[*h].form.place() == place);
+    let best = there.map(|(fall, h)| fall + pool.prior_penalty[*h]).max_by(f64::total_cmp).unwrap_or(0.0);
+    Some(pool.bic(rest) - best.max(0.0) - fit)
+}
+
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows.
 fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
     let state = &last.judged.state;
@@ -112,6 +139,18 @@ fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
             }
         })
     })
+}
+
+/// What the size of a named cause follows although its name claims a constant, and what the criterion loses where it is one.
+fn varying(own: &[usize], pool: &CachedHypotheses, whole: &Whole, gain: f64, clock: Clock) -> Option<(String, f64)> {
+    let form = |k: usize| &pool.hypotheses[k].form;
+    let by = |k: usize| own.iter().find_map(|named| follows(form(k), form(*named)));
+    let (products, by): (Vec<usize>, Vec<Variable>) = own.iter().filter_map(|k| Some((*k, by(*k)?))).unzip();
+    let named: Vec<usize> = whole.set.iter().copied().filter(|k| !products.contains(k)).collect();
+    let lost = whole.solution.gain - pool.solve(&named).gain;
+    let by: Vec<String> = by.into_iter().map(|variable| clock.named(variable)).collect();
+    let why = || format!("its size depends on the {}", by.join(" and the "));
+    (!by.is_empty() && lost > REFINEMENT * gain).then(|| (why(), pool.bic(&named) - whole.bic))
 }
 
 /// Standard errors by which a number must be beyond what is possible.

@@ -5,7 +5,7 @@ use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::FitState;
 use crate::effect::{
     AxisWobble, Backlash, Basis, GearCyclic, JointCompliance, JointHardening, JointLogLag, Place, Survey, Term, ToolShift,
-    Unknown, Variable, ZeroShift, cause,
+    Unknown, Variable, ZeroShift, cause, follows,
 };
 use std::collections::BTreeMap;
 
@@ -23,6 +23,7 @@ pub(crate) fn groups(last: &FitState, set: &[usize], pool: &CachedHypotheses, su
         groups.entry((form.called(values, survey), form.place())).or_default().push(i);
     }
     refine(pool, &mut groups, set);
+    products(pool, &mut groups, set);
     both_angles(pool, &mut groups, set);
     wobbles(pool, &mut groups, set);
     holders(pool, &mut groups, set, survey);
@@ -61,6 +62,22 @@ fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
             let members = groups.remove(small).unwrap_or_default();
             groups.entry(*main).or_default().extend(members);
         }
+    }
+}
+
+/// A product without a name of a named law belongs to that law's finding.
+fn products(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
+    let form = |i: &usize| &pool.hypotheses[set[*i]].form;
+    let unknown: Vec<FindingKey> = groups.keys().filter(|key| key.0 == Unknown::NAME).copied().collect();
+    for key in unknown {
+        for product in groups[&key].clone() {
+            let made_of = |members: &Vec<usize>| members.iter().any(|i| follows(form(&product), form(i)).is_some());
+            let named = groups.iter().find(|(other, members)| **other != key && made_of(members)).map(|(other, _)| *other);
+            let Some(named) = named else { continue };
+            groups.entry(named).or_default().push(product);
+            groups.entry(key).and_modify(|members| members.retain(|i| *i != product));
+        }
+        groups.retain(|_, members| !members.is_empty());
     }
 }
 
@@ -129,5 +146,5 @@ fn holders(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize], s
 }
 
 /// Less than this share of a finding's gain at its own joint is its finer shape; anywhere, of a lag of all joints.
-const REFINEMENT: f64 = 0.1;
+pub(super) const REFINEMENT: f64 = 0.1;
 const TRACE: f64 = 0.05;

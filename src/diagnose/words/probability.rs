@@ -14,6 +14,8 @@ const TEMPERATURE: f64 = 1.73;
 const NONE: f64 = -0.21;
 const BY_LOSS: f64 = -0.68;
 const NO_LAW: f64 = 0.09;
+/// The same by ln of one more than what the criterion would lose by a law without a name at the place.
+const BY_MARGIN: f64 = 0.0;
 /// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
 const IDENTITY: f64 = 10.4;
 /// Of what has none of the names, the share that acts at the named place all the same.
@@ -42,8 +44,14 @@ pub(super) fn weigh(finding: &mut Finding) {
 }
 
 fn none(evidence: &Evidence, no_law: bool) -> f64 {
-    let odds = NONE + BY_LOSS * evidence.delta_bic.max(1.0).ln() + NO_LAW * f64::from(u8::from(no_law));
+    let margin = evidence.over_nameless.map_or(0.0, |margin| margin.max(0.0).ln_1p());
+    let odds = NONE + BY_LOSS * evidence.delta_bic.max(1.0).ln() + NO_LAW * f64::from(u8::from(no_law)) + BY_MARGIN * margin;
     1.0 / (1.0 + (-odds).exp())
+}
+
+/// Whether the data rather say that none of the names is right.
+pub(super) fn is_doubtful(evidence: &Evidence) -> bool {
+    none(evidence, false) > 0.5
 }
 
 #[cfg(test)]

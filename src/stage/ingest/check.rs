@@ -3,6 +3,7 @@
 use super::Ingest;
 use super::clock::CLOCK;
 use super::columns::Columns;
+use super::later;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
 use super::noise;
@@ -38,6 +39,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
     for (index, file) in settings.files.iter().enumerate() {
         file_faults(file, &format!("files[{index}]"), &mut faults);
     }
+    faults.extend(later::faults(settings));
     together(settings, &mut faults);
     motion_faults(settings, &mut faults);
     faults.extend(noise::faults(settings));

@@ -1,6 +1,7 @@
 //! Second reading: the recording in chunks, and every row that is not part of it with its reason.
 
 use super::arm::RobotJoints;
+use super::later::Continuation;
 use super::layout::{FileLayout, Join};
 use super::noise::NoiseSlots;
 use super::pair::{FileDecision, NONE};
@@ -29,16 +30,23 @@ pub(super) struct JoinDecisions<'a> {
     pub names: &'a [String],
 }
 
-/// Writes the streamed tables.
-pub(super) fn write(decided: &JoinDecisions, context: &Context) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
-    let joined = decided.fates.iter().any(|fate| !fate.partners.is_empty());
-    let leading = if joined { 1 } else { decided.scans.len() };
-    let rows = decided.scans.iter().zip(decided.fates).take(leading).map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
+/// Writes the streamed tables of all measurements, `names` being those of all their files; `gaps` come before the later ones, s.
+pub(super) fn write(
+    decided: &[JoinDecisions],
+    gaps: &[f64],
+    names: &[String],
+    context: &Context,
+) -> Result<(StreamedTable<Recording>, StreamedTable<Rejected>)> {
+    let rows = decided.iter().flat_map(|one| one.scans.iter().zip(one.fates).take(one.leading()));
+    let rows = rows.map(|(scan, fate)| verdict::accepted(scan, fate)).sum();
     context.services.begin("writing the recording", Some(rows), "rows");
     let mut recording = Chunks::new(decided, context)?;
-    let mut rejected = Rejections::new(decided.names, context)?;
-    for (index, layout) in decided.settings.files.iter().enumerate() {
-        file(decided, index, layout, (index < leading).then_some(&mut recording), &mut rejected, context)?;
+    let mut rejected = Rejections::new(names, context)?;
+    for (one, gap) in decided.iter().zip(std::iter::once(None).chain(gaps.iter().map(Some))) {
+        gap.into_iter().for_each(|gap| recording.rows.begin(*gap));
+        for (index, layout) in one.settings.files.iter().enumerate() {
+            file(one, index, layout, (index < one.leading()).then_some(&mut recording), &mut rejected, context)?;
+        }
     }
     Ok((recording.finish(context)?, rejected.finish()?))
 }
@@ -88,6 +96,11 @@ fn file(
 }
 
 impl JoinDecisions<'_> {
+    /// Files whose rows are those of the recording: of joined ones the first.
+    fn leading(&self) -> usize {
+        let joined = self.fates.iter().any(|fate| !fate.partners.is_empty());
+        if joined { 1 } else { self.scans.len() }
+    }
     /// Why a usable row is not used after all, if so.
     fn outcome(&self, index: usize, fate: &FileDecision, row: &RecordedRow) -> Result<(), RowRefusal> {
         if let Some(twin) = u32::try_from(row.number).ok().and_then(|number| fate.twins.get(&number)) {
@@ -196,7 +209,7 @@ struct Chunks<'a> {
     moving: usize,
     /// The farthest that joints were carried to the moment of their point, s.
     carried: f64,
-    last_sequence: Option<i64>,
+    rows: Continuation,
     written: u64,
     /// Data rows of the files before this one.
     before: u64,
@@ -205,10 +218,11 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
-    fn new(decided: &JoinDecisions, context: &Context<'a>) -> Result<Self> {
+    fn new(all: &[JoinDecisions], context: &Context<'a>) -> Result<Self> {
+        let [decided, ..] = all else { return Err(Error::Bug("nothing was read".into())) };
         let slots = &decided.arm.slots;
         let mut has = vec![false; slots.count];
-        for slot in decided.scans.iter().flat_map(|scan| &scan.slots) {
+        for slot in all.iter().flat_map(|one| one.scans).flat_map(|scan| &scan.slots) {
             if let Some(has) = has.get_mut(*slot) {
                 *has = true;
             }
@@ -249,7 +263,7 @@ impl<'a> Chunks<'a> {
             inferred: 0,
             moving: files.iter().position(|file| file.columns.has("q")).unwrap_or_default(),
             carried: 0.0,
-            last_sequence: None,
+            rows: Continuation::default(),
             written: 0,
             before: 0,
             widest: files
@@ -282,14 +296,13 @@ impl<'a> Chunks<'a> {
         }
         self.carry(decided, index, row, fate);
         let number = self.before + row.number;
-        let sequence = row.sequence.unwrap_or(number as i64);
-        if let Some(last) = self.last_sequence.replace(sequence)
-            && sequence <= last
-        {
+        let time = self.merged[decided.arm.slots.time];
+        let (sequence, time) = self.rows.next(row.sequence.unwrap_or(number as i64), time).map_err(|(sequence, last)| {
             // Within a file such a row is refused: this is the first row of a file that continues another.
             let message = format!("sequence {sequence} does not follow {last}, the last of the file before");
-            return Err(Error::data(format!("{label}:{}", row.line), message));
-        }
+            Error::data(format!("{label}:{}", row.line), message)
+        })?;
+        self.merged[decided.arm.slots.time] = time;
         let id = if id.is_empty() { format!("row {number}") } else { id.clone() };
         let Some(points) = decided.points(index, row, fate) else { return self.one(sequence, id, &texts) };
         // Numbered through: the targets of a row follow each other.

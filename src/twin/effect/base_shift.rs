@@ -2,7 +2,7 @@
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::matrix::{self, Vector};
-use crate::twin::truth::ARCSEC;
+use crate::twin::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +23,8 @@ pub struct BaseShift {
 impl Act for BaseShift {
     fn act(&self, state: &State, motion: &mut Motion) {
         if state.row.time_s >= self.at_s {
-            let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6));
-            let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC));
-            motion.base = matrix::times(&matrix::times(&moved, &turned), &motion.base);
+            let by = step(self.shift_um, self.turn_arcsec, 1.0);
+            motion.base = matrix::times(&by, &motion.base);
         }
     }
     fn seat(&self) -> Option<usize> {

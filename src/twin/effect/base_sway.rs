@@ -2,7 +2,7 @@
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::matrix::{self, Vector};
-use crate::twin::truth::ARCSEC;
+use crate::twin::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,9 +25,8 @@ pub struct BaseSway {
 impl Act for BaseSway {
     fn act(&self, state: &State, motion: &mut Motion) {
         let share = (std::f64::consts::TAU * state.row.time_s / self.period_s + self.phase_deg.to_radians()).sin();
-        let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
-        let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
-        motion.base = matrix::times(&matrix::times(&moved, &turned), &motion.base);
+        let by = step(self.shift_um, self.turn_arcsec, share);
+        motion.base = matrix::times(&by, &motion.base);
     }
     fn seat(&self) -> Option<usize> {
         None

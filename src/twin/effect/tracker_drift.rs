@@ -2,7 +2,7 @@
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::matrix::{self, Vector};
-use crate::twin::truth::ARCSEC;
+use crate::twin::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,9 +43,8 @@ impl Act for TrackerDrift {
             Course::Linear => u,
             Course::Root => u.max(0.0).sqrt(),
         };
-        let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
-        let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
-        motion.tracker = matrix::times(&matrix::times(&moved, &turned), &motion.tracker);
+        let by = step(self.shift_um, self.turn_arcsec, share);
+        motion.tracker = matrix::times(&by, &motion.tracker);
     }
     fn seat(&self) -> Option<usize> {
         None

@@ -2,7 +2,7 @@
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::matrix::{self, Vector};
-use crate::twin::truth::ARCSEC;
+use crate::twin::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,9 +35,8 @@ impl Act for TrackerKnock {
         let since = state.row.time_s - self.at_s;
         if since >= 0.0 {
             let share = 1.0 - self.back_share * (1.0 - (-since / self.back_s).exp());
-            let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
-            let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
-            motion.tracker = matrix::times(&matrix::times(&moved, &turned), &motion.tracker);
+            let by = step(self.shift_um, self.turn_arcsec, share);
+            motion.tracker = matrix::times(&by, &motion.tracker);
         }
     }
     fn seat(&self) -> Option<usize> {

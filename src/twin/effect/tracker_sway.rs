@@ -2,7 +2,7 @@
 
 use super::{Act, Motion, State, TrueValue, true_value};
 use crate::twin::matrix::{self, Vector};
-use crate::twin::truth::ARCSEC;
+use crate::twin::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -31,9 +31,8 @@ impl Act for TrackerSway {
         let time = state.row.time_s;
         let left = if self.fading_s > 0.0 { (-time / self.fading_s).exp() } else { 1.0 };
         let share = left * (TAU * time / self.period_s + self.phase_deg.to_radians()).sin();
-        let moved = matrix::shift(matrix::scale(self.shift_um, 1e-6 * share));
-        let turned = matrix::turn_by(matrix::scale(self.turn_arcsec, ARCSEC * share));
-        motion.tracker = matrix::times(&matrix::times(&moved, &turned), &motion.tracker);
+        let by = step(self.shift_um, self.turn_arcsec, share);
+        motion.tracker = matrix::times(&by, &motion.tracker);
     }
     fn seat(&self) -> Option<usize> {
         None

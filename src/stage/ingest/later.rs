@@ -1,0 +1,112 @@
+//! Files of later measurements: of the same layout, joined among themselves, behind all rows before.
+
+use super::Ingest;
+use super::layout::FileLayout;
+use crate::error::{Fault, counted};
+use crate::stage::RawFile;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Files of a later measurement, in the layout of `files`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LaterFiles {
+    /// A path for each of `files`, in their order.
+    pub files: Vec<RawFile>,
+    /// Where the clock of these files starts again: from the last row before to their first one, s.
+    #[serde(default = "hour")]
+    pub gap_s: f64,
+}
+
+fn hour() -> f64 {
+    3600.0
+}
+
+impl Ingest {
+    /// The settings of each measurement alone, in their order.
+    pub(super) fn measurements(&self) -> Vec<Self> {
+        let later = self.later.iter().map(|later| {
+            let layouts = self.files.iter().zip(&later.files);
+            let files = layouts.map(|(layout, file)| FileLayout { file: file.clone(), ..layout.clone() });
+            Self { files: files.collect(), later: Vec::new(), ..self.clone() }
+        });
+        std::iter::once(Self { later: Vec::new(), ..self.clone() }).chain(later).collect()
+    }
+}
+
+pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
+    settings.later.iter().enumerate().flat_map(|(index, later)| {
+        let place = format!("later[{index}]");
+        let expected = settings.files.len();
+        let files = (later.files.len() != expected).then(|| {
+            let message = format!(
+                "{} here; allowed: one for each of the {expected} under `files`",
+                counted(later.files.len() as u64, "file")
+            );
+            Fault::new(format!("{place}.files"), message)
+        });
+        let gap = !(later.gap_s >= 0.0 && later.gap_s.is_finite());
+        files.into_iter().chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
+    })
+}
+
+/// Numbers rows through and lets their time go on where files start again.
+#[derive(Debug)]
+pub(super) struct Continuation {
+    last: Option<i64>,
+    latest: f64,
+    /// Of a later measurement before its first row, what its first row comes after the last one by, s.
+    begun: Option<f64>,
+    sequence_by: i64,
+    time_by: f64,
+}
+
+impl Default for Continuation {
+    fn default() -> Self {
+        Self { last: None, latest: f64::NEG_INFINITY, begun: None, sequence_by: 0, time_by: 0.0 }
+    }
+}
+
+impl Continuation {
+    /// Before the first row of a later measurement.
+    pub fn begin(&mut self, gap_s: f64) {
+        (self.begun, self.sequence_by, self.time_by) = (Some(gap_s), 0, 0.0);
+    }
+
+    /// The place and the time of the next row in the recording, from those of its file. `Err` holds the place of the row before where
+    /// the row does not follow it.
+    pub fn next(&mut self, sequence: i64, time: f64) -> Result<(i64, f64), (i64, i64)> {
+        if let Some(gap) = self.begun.take() {
+            self.sequence_by = self.last.filter(|last| sequence <= *last).map_or(0, |last| last.saturating_sub(sequence - 1));
+            if time <= self.latest {
+                self.time_by = self.latest + gap - time;
+            }
+        }
+        let (sequence, time) = (sequence.saturating_add(self.sequence_by), time + self.time_by);
+        self.latest = self.latest.max(time);
+        match self.last.replace(sequence) {
+            Some(last) if sequence <= last => Err((sequence, last)),
+            _ => Ok((sequence, time)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_later_measurement_follows_and_its_clock_goes_on_only_where_it_starts_again() {
+        let mut rows = Continuation::default();
+        assert_eq!(rows.next(1, 10.0), Ok((1, 10.0)));
+        assert_eq!(rows.next(2, 20.0), Ok((2, 20.0)));
+        assert_eq!(rows.next(2, 30.0), Err((2, 2)));
+        rows.begin(100.0);
+        assert_eq!(rows.next(1, 5.0), Ok((3, 120.0)));
+        assert_eq!(rows.next(2, 6.0), Ok((4, 121.0)));
+        rows.begin(100.0);
+        assert_eq!(rows.next(9, 500.0), Ok((9, 500.0)));
+        rows.begin(0.0);
+        assert!(rows.next(1, f64::NAN).is_ok_and(|(sequence, time)| sequence == 10 && time.is_nan()));
+    }
+}
