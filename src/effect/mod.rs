@@ -17,6 +17,7 @@ mod counterbalance;
 mod coupling_ratio;
 mod deflection;
 mod form;
+mod frames;
 mod gear_cyclic;
 mod gear_flank;
 mod gear_load;

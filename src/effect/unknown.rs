@@ -1,7 +1,6 @@
 //! `unknown`: laws without a name, for what no cause of the list explains: placed and described, never christened.
 
 use super::basis::around;
-use super::interactions;
 use super::joint_table::PLAUSIBLE;
 use super::motion::{SHORT, extent};
 use super::sighted;
@@ -10,6 +9,7 @@ use super::{
     Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
     Variable, warmth,
 };
+use super::{frames, interactions};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
@@ -149,6 +149,9 @@ impl Cause for Unknown {
                 }
             }
         }
+        for (motion, law, tried, penalty) in frames::laws(survey) {
+            add(motion, law, tried, penalty);
+        }
         for (of, law, tried, penalty) in sighted::laws(survey, &SWAYS) {
             add(Motion::Instrument { of }, law, tried, penalty);
         }
@@ -174,6 +177,10 @@ impl Cause for Unknown {
             Motion::Instrument { of } => {
                 let unit = if of == Polar::Range { Unit::Millimetre } else { Unit::Radian };
                 counted.map(|k| (format!("c{k}"), unit, if of == Polar::Range { 1e-3 } else { 1e-4 })).collect()
+            }
+            Motion::Axis { about, .. } => {
+                let axes = ["a", "b"].into_iter().enumerate().filter(|(axis, _)| about.is_none_or(|about| about == *axis));
+                axes.flat_map(|(_, axis)| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Radian, WIDE))).collect()
             }
             Motion::Links { .. } => counted.map(|k| (format!("c{k}"), Unit::One, WIDE)).collect(),
             motion => {
@@ -237,6 +244,7 @@ impl Cause for Unknown {
             (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
             (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "warm".into(),
             (_, Variable::Payload) => "payload".into(),
+            (_, Variable::Approach { .. } | Variable::Load { .. }) => names.join("_"),
             _ if frame => String::new(),
             _ => names.join("_"),
         }
