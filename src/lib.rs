@@ -129,6 +129,7 @@
 //! | step | a stage that predicts; the one that stands is used by report, compensation and export |
 
 #![forbid(unsafe_code)]
+#![warn(missing_docs)]
 
 pub mod error;
 pub mod statistics;

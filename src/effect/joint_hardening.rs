@@ -10,9 +10,11 @@ use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
+/// Wind-up that is not in proportion to the load.
 pub struct JointHardening;
 
 impl JointHardening {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "joint_hardening";
 }
 

@@ -64,6 +64,7 @@ mod source;
 mod split;
 mod sr210d;
 mod store;
+mod strings;
 mod suspects;
 mod swarm;
 mod tables;

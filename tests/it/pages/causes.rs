@@ -12,8 +12,8 @@ pub fn text() -> String {
         text.push_str(&format!("| [`{0}`](#{0}) | {1} | {2} |\n", about.name, about.place, cell(about.formula)));
     }
     text.push_str(
-        "\nA signature is the motion of the measured point, along its main direction, while the joint of the cause sweeps from end to end, comes from \
-         below in the first half and from above in the second, and time and temperature rise. One line has its own scale.\n",
+        "\nA signature is the motion of the measured point (of joints: along the path on which the joint moves it) while the joint of the cause sweeps \
+         from end to end, comes from below in the first half and from above in the second, and time and temperature rise. Every line has its own scale.\n",
     );
     let pictures = signatures();
     for cause in CAUSES {

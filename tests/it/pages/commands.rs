@@ -4,8 +4,11 @@ use super::blocks::{fenced, root};
 use super::reference::leaves;
 use calib::cli;
 use std::fs;
+use std::sync::LazyLock;
 
-pub const GOLDEN: &str = include_str!("../../cmd/commands.trycmd");
+/// All cases of `tests/cmd/commands.trycmd`.
+pub static GOLDEN: LazyLock<String> =
+    LazyLock::new(|| fs::read_to_string(root().join("tests/cmd/commands.trycmd")).expect("golden cases"));
 
 /// The cases under a heading, as they stand there; empty where there is no such heading.
 fn section(name: &str) -> &'static str {
@@ -17,7 +20,7 @@ fn section(name: &str) -> &'static str {
 pub fn example(name: &str) -> String {
     let own = section(name);
     assert!(!own.is_empty(), "tests/cmd/commands.trycmd has no example `## {name}`");
-    own.to_string()
+    own.replace("\n\n```", "\n```").replace("\n```console\n", "\n\n```console\n").replace("\n\n\n", "\n\n")
 }
 
 #[test]

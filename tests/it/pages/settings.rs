@@ -143,13 +143,18 @@ fn simple(kind_of: &str, schema: &Value) -> String {
         "string" => "text".into(),
         "boolean" => "`true` or `false`".into(),
         "array" => match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
-            (Some(low), Some(high)) if low == high => format!("{low} times {}", kind(&schema["items"])),
-            _ => format!("list of {}", kind(&schema["items"])),
+            (Some(low), Some(high)) if low == high => format!("{low} {}", several(&kind(&schema["items"]))),
+            _ => format!("list of {}", several(&kind(&schema["items"]))),
         },
         "object" if schema["additionalProperties"].is_object() => format!("name: {}", kind(&schema["additionalProperties"])),
         "object" => keys(schema),
         other => other.into(),
     }
+}
+
+/// More than one of a kind.
+fn several(kind: &str) -> String {
+    if ["number", "integer", "text", "file"].contains(&kind) { format!("{kind}s") } else { kind.into() }
 }
 
 /// Adds the structures that a schema refers to.

@@ -85,6 +85,15 @@ pub fn signatures() -> BTreeMap<&'static str, (String, String)> {
     drawn.collect()
 }
 
+/// The direction in which the point moves as a joint does, tracker's frame.
+fn path(robot: &RobotModel, q: &[f64], joint: usize) -> Vector3<f64> {
+    const STEP: f64 = 1e-6;
+    let mut further = q.to_vec();
+    further[joint] += STEP;
+    let step = robot.forward(&further).translation - robot.forward(q).translation;
+    setting().base.rotation * step.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+}
+
 /// The motion of the point by the first number of an effect at the place, along its main direction.
 fn line(robot: &RobotModel, effect: Box<dyn Effect>, place: Place) -> Option<String> {
     let joint = match place {
@@ -112,8 +121,10 @@ fn line(robot: &RobotModel, effect: Box<dyn Effect>, place: Place) -> Option<Str
     if size < SMALL {
         return None;
     }
-    // A motion that turns with the arm keeps its length; its sign is that of the main direction.
-    let signed: Vec<f64> = moved.iter().map(|one| one.dot(&main) / size).collect();
+    // A turn of a joint moves the point along its own path, whose direction changes with the arm.
+    let turned: Vec<f64> = (0..SWEEP).map(|row| moved[row].dot(&path(robot, data.q(row), joint))).collect();
+    let along = matches!(place, Place::Joint(_)) && turned.iter().any(|part| part.abs() > 0.5 * size);
+    let signed: Vec<f64> = if along { turned } else { moved.iter().map(|one| one.dot(&main) / size).collect() };
     let low = signed.iter().copied().fold(0.0, f64::min);
     let high = signed.iter().copied().fold(0.0, f64::max);
     let block = |value: f64| BLOCKS[(((value - low) / (high - low) * 7.0).round() as usize).min(7)];
