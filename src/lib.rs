@@ -44,7 +44,7 @@
 //!    of the table `recording`; a line that cannot be used becomes a row of `rejected` with its reason.
 //! 2. [`stage::split`] deals the row out to a set: `fit` or `validate`.
 //! 3. [`table::Recording`] becomes [`robot::Measurements`], struct of arrays in SI. From here on there are no frames and no names of files.
-//! 4. [`estimate::fit`] predicts the point: [`robot::RobotModel`] is the nominal chain, and every [`effect::Effect`] of the
+//! 4. [`estimate::fit()`] predicts the point: [`robot::RobotModel`] is the nominal chain, and every [`effect::Effect`] of the
 //!    [`effect::EffectStack`] adds a small motion at its place on the chain, with its derivatives by its parameters. Levenberg-Marquardt on
 //!    QR factors moves the parameters; those that the data cannot determine are held and reported.
 //! 5. [`diagnose::diagnose`] asks of what is left which cause explains it: hypotheses of all causes are compared after geometry has
