@@ -5,11 +5,14 @@ use std::fmt;
 /// One fault with the place where it is: `stages[2].with.cycles`, `controller.csv:17`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
+    /// Where: a file with line and column, a YAML path, a table.
     pub place: String,
+    /// What is wrong there, and what is allowed.
     pub message: String,
 }
 
 impl Fault {
+    /// A fault at a place.
     pub fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
         Self { place: place.into(), message: message.into() }
     }
@@ -39,15 +42,19 @@ pub enum Error {
 }
 
 impl Error {
+    /// One fault of a specification: code 2.
     pub fn spec(place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Spec(vec![Fault::new(place, message)])
     }
+    /// One fault of the data: code 10.
     pub fn data(place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Data(vec![Fault::new(place, message)])
     }
+    /// A fault of the machine or the store: code 75.
     pub fn store(place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Store(Fault::new(place, message))
     }
+    /// The exit code of the process that fails with this error.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Spec(_) => 2,
@@ -62,6 +69,7 @@ fn join(faults: &[Fault]) -> String {
     faults.iter().map(Fault::to_string).collect::<Vec<_>>().join("\n")
 }
 
+/// A result whose error is an [`Error`] unless another one is named.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A count with its noun: `1 row`, `2 rows`, `0 copies`. Of several words the last one changes.

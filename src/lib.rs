@@ -38,6 +38,22 @@
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, pipeline, shell, stage, store, table |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
+//! # A measurement, from file to report
+//! 1. `cell7/tracker.csv`, line 17: `P0014; 1834,112; -402,871; 1290,455`. [`stage::ingest`] reads it by the columns that the YAML names
+//!    (`raw` decodes the bytes), converts millimetres into metres, joins the line of the controller with the same name, and writes a row
+//!    of the table `recording`; a line that cannot be used becomes a row of `rejected` with its reason.
+//! 2. [`stage::split`] deals the row out to a set: `fit` or `validate`.
+//! 3. [`table::Recording`] becomes [`robot::Measurements`], struct of arrays in SI. From here on there are no frames and no names of files.
+//! 4. [`estimate::fit()`] predicts the point: [`robot::RobotModel`] is the nominal chain, and every [`effect::Effect`] of the
+//!    [`effect::EffectStack`] adds a small motion at its place on the chain, with its derivatives by its parameters. Levenberg-Marquardt on
+//!    QR factors moves the parameters; those that the data cannot determine are held and reported.
+//! 5. [`diagnose::diagnose`] asks of what is left which cause explains it: hypotheses of all causes are compared after geometry has
+//!    absorbed its part, the best set is refitted, folds decide.
+//! 6. The stage turns model and residual back into rows: `parameters`, `prediction` (measured minus predicted of our row, in mm),
+//!    `findings`. [`store`] checks them against their schema, names them by the hash of their content, and commits.
+//! 7. [`stage::Validate`] states the errors of each set after every step; [`report`] writes one page from the tables; [`cli`] prints.
+//! 8. `calib lineage HEAD/validate/statistics` walks back, down to the bytes of the two files.
+//!
 //! # Invariants
 //! 1. Below `cli` nothing prints, exits, reads the environment or the clock (clippy.toml).
 //! 2. A stage never sees a path or the store.
@@ -56,9 +72,36 @@
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
-
+//!
+//! An effect step by step, with a file that a test compiles and fits: `src/effect/README.md`.
+//!
+//! House rules: one idea one file, named by its noun, 60 to 250 lines, 400 at most; no function above 80 lines; names of types once. Verbs
+//! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.
+//! Errors name the place and what is allowed, all faults at once. Joints count from 1 for people and from 0 in code. Tests are named as
+//! facts, their numbers come from elsewhere; a bug fix starts with the failing test. Pages are generated where code knows better:
+//! `CALIB_UPDATE=1 cargo test --test it pages`; golden answers of the command line: `TRYCMD=overwrite cargo test --test it cmd`.
+//!
+//! # As a library
+//! The command line is one user of this crate; a program is another. Numbers are SI, arrays are row-major, joints count from 0.
+//!
+//! Identify an arm from arrays:
+//! ```
+#![doc = include_str!("../tests/it/library/identify.rs")]
+//! ```
+//! Diagnose what a model of it leaves out:
+//! ```
+#![doc = include_str!("../tests/it/library/diagnose.rs")]
+//! ```
+//! Read the tables of a run:
+//! ```
+#![doc = include_str!("../tests/it/library/tables.rs")]
+//! ```
 //!
 //! # Glossary
+//! Terms are those of the field: the *International Vocabulary of Metrology* (VIM: repeatability, standard uncertainty, expanded uncertainty,
+//! coverage factor), Craig and Lynch & Park (chains, screws, Jacobians), Rawlings et al., *Applied Regression Analysis* (confounding, collinearity,
+//! leverage, lack of fit), ISO 9283 (pose accuracy; calib's figures are not its tests). What they leave open:
+//!
 //! | word | what it means here |
 //! |---|---|
 //! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
@@ -76,12 +119,17 @@
 //! | set-up error | what is wrong between files and robot file before any physics: a unit, sign, zero, order, frame, typed number |
 //! | suspect | a row that no smooth model can follow; it is set aside and kept |
 //! | redundant | a parameter whose effect other free parameters have too; unseen: one that the data do not show |
-//! | confounded | causes that these data cannot separate |
+//! | observable | what these data determine; unobservable: what they cannot, however good the fit |
+//! | down-weighted | a row that counts for less than its noise says, by Huber's weights |
+//! | separable | two causes whose difference these data show; confounded: causes whose difference they do not show |
+//! | depends on | the variable over which a residual has structure, whatever its cause |
+//! | twin | the simulated robot whose truth is known; it shares no code with the estimator |
 //! | compliance | turn of a joint per torque, rad/Nm |
 //! | datum freedom | a motion of everything that no measurement shows; targets and anchors are what is measured from and to |
 //! | step | a stage that predicts; the one that stands is used by report, compensation and export |
 
 #![forbid(unsafe_code)]
+#![warn(missing_docs)]
 
 pub mod error;
 pub mod statistics;

@@ -10,8 +10,10 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// How much is shown while a run works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verbosity {
+    /// Bars, notes and warnings.
     Normal,
     /// Warnings only.
     Quiet,
@@ -39,6 +41,7 @@ struct State {
 }
 
 impl Progress {
+    /// Progress on stderr; `width` is that of the longest stage id.
     pub fn new(verbosity: Verbosity, width: usize) -> Self {
         let terminal = verbosity == Verbosity::Normal && std::io::stderr().is_terminal();
         let bar = terminal.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));

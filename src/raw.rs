@@ -69,6 +69,7 @@ pub fn decoded<T>(decode: impl FnOnce() -> T) -> Result<T, String> {
 
 /// A Parquet file, batch by batch; what is wrong with it comes in words, once.
 pub struct ParquetFile {
+    /// Its columns, as the file declares them.
     pub schema: SchemaRef,
     /// Rows by its footer.
     pub rows: u64,

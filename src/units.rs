@@ -9,57 +9,102 @@ use std::fmt;
 /// A unit that a stored column, a parameter or a column of a recording may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Unit {
+    /// A plain number.
     One,
+    /// mm.
     Millimetre,
+    /// um.
     Micrometre,
+    /// m.
     Metre,
+    /// in, 25.4 mm.
     Inch,
+    /// rad.
     Radian,
+    /// deg.
     Degree,
+    /// mrad.
     Milliradian,
+    /// arcsec, 1/3600 deg.
     Arcsecond,
+    /// s.
     Second,
+    /// ms.
     Millisecond,
+    /// min.
     Minute,
+    /// h.
     Hour,
+    /// kg.
     Kilogram,
+    /// A.
     Ampere,
+    /// mA.
     Milliampere,
+    /// Nm.
     NewtonMetre,
+    /// kg m, of a first moment.
     KilogramMetre,
+    /// Degrees Celsius.
     Celsius,
+    /// K.
     Kelvin,
+    /// Nm/A, of a motor.
     NewtonMetrePerAmpere,
+    /// rad/Nm, of a joint that yields.
     RadianPerNewtonMetre,
+    /// rad/A, of a joint that yields to its motor current.
     RadianPerAmpere,
+    /// m/s2.
     MetrePerSecondSquared,
+    /// rad/s.
     RadianPerSecond,
+    /// deg/s.
     DegreePerSecond,
+    /// mm/s.
     MillimetrePerSecond,
+    /// m/s.
     MetrePerSecond,
     /// How far a joint trails behind for its speed.
     RadianPerRadianPerSecond,
+    /// arcsec per deg/s, as people read a trailing joint.
     ArcsecondPerDegreePerSecond,
 }
 
 /// What a unit measures; only units of one quantity convert into each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
+    /// Dimensionless.
     Number,
+    /// SI: m.
     Length,
+    /// SI: rad.
     Angle,
+    /// SI: s.
     Time,
+    /// SI: kg.
     Mass,
+    /// SI: A.
     Current,
+    /// SI: Nm.
     Torque,
+    /// SI: kg m.
     FirstMoment,
+    /// Stored in degrees Celsius.
     Temperature,
+    /// SI: Nm/A.
     TorqueConstant,
+    /// SI: rad/Nm.
     Compliance,
+    /// SI: rad/A.
     CurrentCompliance,
+    /// SI: m/s2.
     Acceleration,
+    /// SI: rad/s.
     AngularRate,
+    /// SI: m/s.
     LinearRate,
+    /// SI: rad per rad/s.
     Trailing,
 }
 
@@ -103,9 +148,11 @@ impl Unit {
     fn row(self) -> &'static (Unit, &'static str, Quantity, f64, f64) {
         UNITS.iter().find(|row| row.0 == self).expect("every unit has a row")
     }
+    /// As it is written in files and column names: `mm`, `Nm/A`.
     pub fn symbol(self) -> &'static str {
         self.row().1
     }
+    /// What it measures.
     pub fn quantity(self) -> Quantity {
         self.row().2
     }
@@ -119,6 +166,7 @@ impl Unit {
         let row = self.row();
         (value - row.4) / row.3
     }
+    /// The unit of a symbol; none where no unit is written so.
     pub fn parse(symbol: &str) -> Option<Unit> {
         UNITS.iter().find(|row| row.1 == symbol).map(|row| row.0)
     }

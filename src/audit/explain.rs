@@ -6,13 +6,17 @@ use crate::error::{Error, Result, nearest};
 use crate::pipeline::{KeyChange, Manifest, StageReport, changes_of};
 use crate::store::Store;
 
+/// Why a stage ran, or did not.
 #[derive(Debug, Clone, Serialize)]
 pub struct Explanation {
+    /// Its id.
     pub run: String,
+    /// What the manifest says of the stage.
     pub stage: StageReport,
     /// The run that the stage is compared with: the last one before of this pipeline that had it, of a complete run a
     /// complete one.
     pub before: Option<String>,
+    /// What differs from the run before.
     pub changes: Vec<KeyChange>,
     /// For every input that changed: the stage that wrote it.
     pub writers: Vec<(String, String)>,

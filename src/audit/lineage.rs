@@ -9,28 +9,42 @@ use crate::store::{ActionRecord, Store, TableHash};
 /// A table with the action that made it.
 #[derive(Debug, Clone, Serialize)]
 pub struct LineageNode {
+    /// Of its content.
     pub table_hash: TableHash,
     /// Nothing where the store has no record of who made it.
     pub made: Option<Provenance>,
 }
 
+/// What made a table.
 #[derive(Debug, Clone, Serialize)]
 pub struct Provenance {
+    /// Id of the stage.
     pub stage: String,
+    /// Its kind.
     pub uses: String,
+    /// Of its algorithm.
     pub implementation: u32,
+    /// On which it was written.
     pub port: String,
+    /// `name/version`.
     pub schema: String,
+    /// How many.
     pub rows: u64,
+    /// Id of the action record.
     pub action: String,
+    /// Id of the run that executed it.
     pub run: String,
+    /// RFC 3339, UTC.
     pub when: String,
+    /// With defaults filled in.
     pub settings: serde_json::Value,
+    /// Of the stage.
     pub seed: u64,
     /// Raw files: name and blake3.
     pub files: Vec<(String, String)>,
     /// Input tables by port; empty where they were told already.
     pub reads: Vec<(String, LineageNode)>,
+    /// Whether its inputs stand above in the same answer.
     pub told_before: bool,
 }
 

@@ -8,27 +8,38 @@ use crate::error::Result;
 use crate::pipeline::{KeyChange, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
 
+/// Two runs compared.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunDiff {
+    /// The earlier.
     pub a: RunSummary,
+    /// The later.
     pub b: RunSummary,
     /// What was put in: settings, files, seeds, implementations. What follows from these is no cause.
     pub causes: Vec<SettingChange>,
+    /// Tables of both, in the order of the pipeline.
     pub tables: Vec<TableChange>,
 }
 
 /// A run in a line.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunSummary {
+    /// Its id.
     pub run: String,
+    /// Its name.
     pub pipeline: String,
+    /// RFC 3339, UTC.
     pub started: String,
+    /// Of calib.
     pub version: String,
 }
 
+/// A setting that differs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SettingChange {
+    /// Id of the stage.
     pub stage: String,
+    /// Before and now.
     #[serde(flatten)]
     pub change: KeyChange,
 }
@@ -38,13 +49,16 @@ pub struct SettingChange {
 pub struct TableChange {
     /// `stage.port`.
     pub name: String,
+    /// The name of its schema.
     pub kind: String,
+    /// How it differs, in words.
     pub status: &'static str,
     /// Where both have it, their content differs, and both are still in the store.
     pub diff: Option<TableDiff>,
 }
 
 impl RunDiff {
+    /// Whether neither settings nor tables differ.
     pub fn is_same(&self) -> bool {
         self.tables.iter().all(|table| table.status == "same" || table.diff.as_ref().is_some_and(TableDiff::is_same))
     }
@@ -71,8 +85,11 @@ pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &Dif
 /// A run, or one stage of it, or one of its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunAddress {
+    /// As `calib log` names it.
     pub run: String,
+    /// Its id, if one is named.
     pub stage: Option<String>,
+    /// Its port, if one is named.
     pub port: Option<String>,
 }
 

@@ -22,7 +22,7 @@ pub(super) struct DiffArguments {
     a: String,
     /// The same, to compare with
     b: String,
-    /// Columns that tell rows apart, instead of those of the schema
+    /// Columns that identify rows, instead of those of the schema
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     key: Vec<String>,
     /// Overlooks differences up to this, in the column's unit or in one given: 0.1, x_mm=0.1, x_mm=50um

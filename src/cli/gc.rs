@@ -19,7 +19,7 @@ pub(super) struct GcArguments {
     /// Complete runs of every pipeline whose tables are kept, and as many others since; tagged ones always are
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
     keep_runs: u32,
-    /// Leaves what was written within so many hours
+    /// Keeps what was written within this many hours
     #[arg(long, value_name = "HOURS", default_value_t = 24)]
     grace_hours: u32,
     /// Says what would go, and takes nothing

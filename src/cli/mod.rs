@@ -28,7 +28,7 @@ mod tag;
 mod verify;
 
 use crate::error::{Error, Result, counted};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
 
@@ -69,6 +69,11 @@ enum Verb {
 
 const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
+
+/// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
 
 /// Runs a command line, prints what comes of it and gives the exit code.
 pub fn main(arguments: Vec<OsString>) -> u8 {

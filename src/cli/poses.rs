@@ -9,9 +9,9 @@ use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Propose poses to measure: the best for all parameters together, or for telling two effects apart.
+/// Propose poses to measure: the best for all parameters together, or for separating two effects.
 ///
-/// Random poses inside the limits, the box and above the floor are improved by exchange until no other tells more; parameters
+/// Random poses inside the limits, the box and above the floor are improved by exchange until no exchange adds information; parameters
 /// that position data cannot tell do not count. Beside the result stand 200 random sets of as many poses, and a recorded one.
 ///
 /// SELF-COLLISION IS NOT CHECKED, nor collision with the cell: drive the poses slowly first. The way between them is short but
@@ -25,7 +25,7 @@ pub(super) struct PosesArguments {
     /// The URDF that the robot file refers to
     #[arg(long, value_name = "FILE", requires = "robot")]
     urdf: Option<PathBuf>,
-    /// Takes robot, model, sizes, noise and places from this run's diagnosis: tells a finding from its rival
+    /// Takes robot, model, sizes, noise and places from this run's diagnosis: to separate a finding from its rival
     #[arg(long, value_name = "RUN", requires = "separate", conflicts_with_all = ["effects", "against"])]
     run: Option<String>,
     /// The stage of the run, where there are several `diagnose`
@@ -37,11 +37,11 @@ pub(super) struct PosesArguments {
     /// Poses to propose
     #[arg(long, short = 'n', value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=2000))]
     count: u32,
-    /// Effects to tell, by canonical name [default: all that `identify` estimates]
+    /// Effects to determine, by canonical name [default: all that `identify` estimates]
     #[arg(long, value_name = "EFFECT,..", value_delimiter = ',')]
     effects: Vec<String>,
-    /// Chooses for telling these two effects apart instead. Of a run: a finding by its number or as `joint_compliance@joint 2` [default:
-    /// the first with a rival], and what it is to be told from, as `link_compliance@link 2` [default: its closest rival]
+    /// Chooses poses that separate these two effects instead. Of a run: a finding by its number or as `joint_compliance@joint 2` [default:
+    /// the first with a rival], and the rival, as `link_compliance@link 2` [default: its closest rival]
     #[arg(long, num_args = 0..=2, value_names = ["EFFECT", "RIVAL"])]
     separate: Option<Vec<String>>,
     /// Joint ranges instead of the robot file's, deg (mm for a prismatic joint)

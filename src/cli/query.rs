@@ -14,9 +14,9 @@ use std::path::PathBuf;
 /// Ask the tables of a run in SQL; without SQL, list them with their columns.
 ///
 /// A table is called stage_port (or stage.port), and also by its kind where one stage alone writes such a table: recording. SQL is
-/// that of polars: SELECT with WHERE, GROUP BY, HAVING, JOIN, WITH, window functions, ORDER BY, LIMIT. Names are told with their case;
+/// that of polars: SELECT with WHERE, GROUP BY, HAVING, JOIN, WITH, window functions, ORDER BY, LIMIT. Names are case-sensitive;
 /// "set", "order" and other words of SQL stand in double quotes where they are columns. ORDER BY decides the order of rows; without it
-/// they come in the order of the table, groups in that of their first rows. AS names a column, which else is called as what it is made of.
+/// they come in the order of the table, groups in that of their first rows. AS names a column; without it the expression is its name.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib query HEAD

@@ -58,7 +58,7 @@ pub(super) fn main(arguments: &SchemaArguments) -> Result<()> {
 fn check(file: &Path, kind: Option<&str>) -> Result<()> {
     let kind = kind.map(find).transpose()?.map(|schema| schema.name.as_str());
     let Loose { table, vouched } = read_table(file, kind)?;
-    let hash = if vouched { "" } else { " (the file carries no content hash: whether it was changed cannot be told)" };
+    let hash = if vouched { "" } else { " (the file carries no content hash: its content cannot be verified)" };
     emit(&format!("{}: sound, {}, {}{hash}\n", table.schema().id(), counted(table.rows(), "row"), table.table_hash()))
 }
 

@@ -52,6 +52,7 @@ impl IdentifiedArm {
         Self { model, base, correction, quiet }
     }
 
+    /// Nominal arm, effects and their values.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -66,6 +67,7 @@ impl IdentifiedArm {
         &self.base
     }
 
+    /// What was learned on top, if anything.
     pub fn correction(&self) -> Option<&Correction> {
         self.correction.as_ref()
     }
@@ -101,6 +103,7 @@ pub struct Reach<'a> {
 }
 
 impl Reach<'_> {
+    /// Takes load, temperature, time and directions of a target from here on.
     pub fn under(&mut self, circumstance: &Circumstance) {
         let Circumstance { payload, temperature, time, direction, current } = circumstance;
         self.data.payload[0] = *payload;

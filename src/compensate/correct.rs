@@ -23,14 +23,21 @@ const STILL: f64 = 1e-9;
 /// A target as it was given, SI.
 #[derive(Debug, Clone, Default)]
 pub struct CommandTarget {
+    /// Joints, rad or m, of a joint target or near a Cartesian one.
     pub q: Option<Vec<f64>>,
     /// Base frame.
     pub point: Option<Vector3<f64>>,
+    /// Orientation of the tool, base frame; none where the target is a point.
     pub rotation: Option<Matrix3<f64>>,
+    /// kg, where the target says.
     pub payload: Option<f64>,
+    /// C, where the target says.
     pub temperature: Option<f64>,
+    /// s, on the clock of the recording, where the target says.
     pub time: Option<f64>,
+    /// Side from which each joint comes, +1 or -1, where the target says.
     pub direction: Option<Vec<f64>>,
+    /// Motor currents, A, where the target says.
     pub current: Option<Vec<f64>>,
 }
 
@@ -41,12 +48,17 @@ pub struct CorrectionOptions {
     pub cartesian: bool,
     /// Whether joint targets keep the nominal orientation.
     pub oriented: bool,
+    /// One step by the nominal Jacobian instead of solving.
     pub one_step: bool,
+    /// kg, where a target does not say.
     pub payload: f64,
+    /// C, where a target does not say.
     pub temperature: Option<f64>,
+    /// s, where a target does not say.
     pub time: Option<f64>,
     /// Whether the model knows times: one of a recording without a clock knows rows.
     pub clock: bool,
+    /// Side of every joint, where a target does not say; else the order of the targets tells.
     pub direction: Option<f64>,
     /// Where the first Cartesian target is searched from.
     pub start: Option<Vec<f64>>,
@@ -59,8 +71,11 @@ pub struct CorrectedCommand {
     pub q: Option<Vec<f64>>,
     /// How far the uncorrected command would be off by the model.
     pub uncorrected: f64,
+    /// Distance from the wanted point that the model leaves, m.
     pub residual: f64,
+    /// Steps of the solution.
     pub iterations: usize,
+    /// Of the point that is reached; none where the model has no covariance.
     pub uncertainty: Option<PositionUncertainty>,
     /// What is wrong with it.
     pub remarks: Vec<Remark>,
@@ -82,20 +97,28 @@ pub struct Corrector<'a> {
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
+    /// Sums over all targets so far.
     pub tally: CorrectionTotals,
 }
 
 /// Results of all targets.
 #[derive(Debug, Clone, Default)]
 pub struct CorrectionTotals {
+    /// How many targets.
     pub targets: u64,
+    /// m.
     pub uncorrected_sum: f64,
+    /// m.
     pub uncorrected_max: f64,
     /// Of those that are reached.
     pub residual_max: f64,
+    /// Targets without a solution.
     pub not_reached: u64,
+    /// Targets that are reached but for their orientation.
     pub turned: u64,
+    /// Targets beyond the limits of a joint.
     pub beyond_limits: u64,
+    /// Targets beyond what was measured.
     pub beyond_measured: u64,
 }
 
@@ -132,6 +155,7 @@ struct Job {
 }
 
 impl<'a> Corrector<'a> {
+    /// A corrector of an arm; nothing is solved yet.
     pub fn new(
         arm: &'a IdentifiedArm,
         coverage: Option<Coverage>,
@@ -142,6 +166,7 @@ impl<'a> Corrector<'a> {
         Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
     }
 
+    /// Whether targets get an uncertainty.
     pub fn has_uncertainty(&self) -> bool {
         self.uncertainty.is_some()
     }

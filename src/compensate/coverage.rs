@@ -9,6 +9,7 @@ use crate::robot::{Measurements, Unmeasured, Visited};
 pub struct Coverage(Visited);
 
 impl Coverage {
+    /// The coverage of a recording.
     pub fn of(data: &Measurements) -> Self {
         Self(Visited::of(data, &(0..data.rows()).collect::<Vec<_>>()))
     }

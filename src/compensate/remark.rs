@@ -12,6 +12,7 @@ pub enum Remark {
     Turned(f64),
     /// Joints, from 0.
     BeyondLimits(Vec<usize>),
+    /// Outside of what was measured.
     BeyondMeasured(Unmeasured),
     /// The share of the learned correction that applies.
     Faded(f64),

@@ -19,9 +19,11 @@ const RIGID: [&str; 4] = ["base_frame", "tool_offset", "link_geometry", "joint_o
 pub struct LeftOut {
     /// Canonical name of the effect.
     pub effect: String,
+    /// Where it acts.
     pub place: Place,
     /// What the point moves without it, m, rms and at most, over the poses.
     pub rms: f64,
+    /// Largest displacement over the rows, m.
     pub most: f64,
 }
 

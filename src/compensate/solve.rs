@@ -29,6 +29,7 @@ pub struct Nominal<'a> {
 }
 
 impl<'a> Nominal<'a> {
+    /// The solver of an arm.
     pub fn new(robot: &'a RobotModel) -> Self {
         let joints = robot.joints();
         Self { robot, before: vec![Pose::identity(); joints], velocities: vec![Twist::zeros(); joints] }
@@ -89,6 +90,7 @@ pub struct CommandSolution {
     pub q: Vec<f64>,
     /// What is left of the displacement, m, and of the turn, rad.
     pub residual: f64,
+    /// What is left of the turn, rad.
     pub turn: f64,
     /// How far the start was off, m.
     pub before: f64,

@@ -86,7 +86,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
         let judged = judge(next, found.set.clone(), &comparison);
-        judged.withdrawn.iter().for_each(|sentence| tell(format!("taken back: {sentence}")));
+        judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let round = LastRound { pool: search.pool, survey: &survey, judged, first, last, located };

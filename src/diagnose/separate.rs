@@ -14,7 +14,9 @@ const LEVELS: i32 = 8;
 
 /// A diagnosed model where it stands.
 pub struct DiagnosedModel<'a> {
+    /// The model with its findings.
     pub model: &'a Model,
+    /// The recording that it was diagnosed on.
     pub data: &'a Measurements,
     /// Fitted rows, ascending.
     pub rows: &'a [usize],

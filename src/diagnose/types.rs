@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 
 /// What is to be diagnosed.
 pub struct Question<'a> {
+    /// The nominal arm, with its targets.
     pub robot: &'a RobotModel,
+    /// All rows of the recording.
     pub data: &'a Measurements,
     /// Rows to fit, ascending.
     pub fit: &'a [usize],
@@ -19,12 +21,14 @@ pub struct Question<'a> {
     pub prior_weight: f64,
     /// Names of causes that are not tried.
     pub without: &'a [String],
+    /// Of the bootstrap and the folds.
     pub seed: u64,
 }
 
 /// One joint repeatability (rad) and what it rests on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRepeatability {
+    /// rad; 0 where none shows.
     pub sigma: f64,
     /// Repeats of a target in a pose that it rests on; with few it is taken from the residual.
     pub repeats: usize,
@@ -33,7 +37,9 @@ pub struct JointRepeatability {
 /// How well a finding stands.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Evidence {
+    /// Of the finding beside all others.
     pub f_statistic: f64,
+    /// Probability that noise gives as much to any hypothesis.
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
@@ -51,8 +57,11 @@ pub struct Evidence {
 /// Another explanation, which these data cannot separate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RivalCause {
+    /// Canonical name of the cause.
     pub effect: &'static str,
+    /// Where it acts.
     pub place: Place,
+    /// How much worse the criterion is with it in place of the finding.
     pub delta_bic: f64,
     /// That it is this cause and not the finding's, see [`Probabilities`].
     pub probability: f64,
@@ -72,16 +81,23 @@ pub struct Probabilities {
 /// A cause of what the base model leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
+    /// Canonical name of the cause, or [`SETUP`].
     pub effect: &'static str,
+    /// Where it acts.
     pub place: Place,
+    /// The finding in a sentence, with its size.
     pub statement: String,
+    /// Fitted numbers, in units that people read.
     pub parameters: Vec<ParameterEstimate>,
     /// None for faults of single rows.
     pub evidence: Option<Evidence>,
+    /// Explanations that these data do not exclude, the closest first.
     pub rivals: Vec<RivalCause>,
+    /// Of its name and its place.
     pub probabilities: Probabilities,
     /// Joint (from 0) and range (rad) over which it holds, for joint errors.
     pub valid: Option<(usize, [f64; 2])>,
+    /// By which the model is rebuilt.
     pub forms: Vec<Form>,
 }
 
@@ -91,6 +107,7 @@ pub const SETUP: &str = "setup";
 const FAULTS: [&str; 4] = ["outlier", "mislabelled_point", "joint_log_lag", SETUP];
 
 impl Finding {
+    /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording.
     pub fn is_physics(&self) -> bool {
         !FAULTS.contains(&self.effect)
     }
@@ -125,7 +142,9 @@ pub struct SpectrumLine {
     pub joint: usize,
     /// Whether the order is per turn of the motor.
     pub motor: bool,
+    /// Periods per turn of the joint.
     pub order: u32,
+    /// Of the squared residual.
     pub share: f64,
 }
 
@@ -141,8 +160,11 @@ pub struct Located {
 /// What the data say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VerdictKind {
+    /// The findings bring the held-out error down to the noise.
     Explained,
+    /// Only noise is left, and there is no finding.
     NothingMissing,
+    /// Something is left that no finding explains.
     Unexplained,
     /// Too few rows were fitted.
     NotAsked,
@@ -151,6 +173,7 @@ pub enum VerdictKind {
 }
 
 impl VerdictKind {
+    /// As tables and JSON hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Explained => "explained",
@@ -165,8 +188,11 @@ impl VerdictKind {
 /// Lengths of position errors, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorLengths {
+    /// m.
     pub mean: f64,
+    /// m.
     pub rms: f64,
+    /// m.
     pub max: f64,
 }
 
@@ -189,6 +215,7 @@ impl ErrorLengths {
 
 /// The outcome of a diagnosis.
 pub struct Diagnosis {
+    /// The answer in one word.
     pub verdict: VerdictKind,
     /// The verdict in a sentence, with what its noise rests on.
     pub statement: String,
@@ -198,6 +225,7 @@ pub struct Diagnosis {
     pub noise_floor: f64,
     /// Of held-out rows (of the fitted ones where none are held out), suspects apart.
     pub before: Option<ErrorLengths>,
+    /// The same with the findings.
     pub after: Option<ErrorLengths>,
     /// Whether the errors are of held-out rows.
     pub held_out: bool,
@@ -209,6 +237,7 @@ pub struct Diagnosis {
     pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.
     pub clock: bool,
+    /// Rows that no smooth model can follow.
     pub screening: Screening,
     /// What these data cannot show, a sentence each.
     pub not_observable: Vec<String>,
@@ -218,15 +247,21 @@ pub struct Diagnosis {
     pub next_measurements: Vec<String>,
     /// Rms length of what is left at fitted rows, m; reduced chi-square; probability that it is noise, where that was asked.
     pub leftover_rms: f64,
+    /// Of the fitted rows; 1 for noise alone.
     pub chi_square: f64,
+    /// Probability that the residual of the base model is noise.
     pub gate_first: Option<f64>,
+    /// The same of the residual with all findings.
     pub gate_last: Option<f64>,
+    /// Of the joints, as the recording shows it.
     pub repeatability: JointRepeatability,
     /// Where the residual sits before and after the findings.
     pub located_before: Located,
+    /// What each place and variable could still explain with the findings.
     pub located_after: Located,
     /// The corrected model and its fit.
     pub model: Model,
+    /// How the last fit went.
     pub fitted: Fitted,
     /// Rows that were fitted.
     pub kept: Vec<usize>,

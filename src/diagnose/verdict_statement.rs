@@ -67,7 +67,7 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
         VerdictKind::Unexplained => {
             format!("the findings do not explain all: {} um are left, against {}", um(ground.left), ground.of_noise())
         }
-        VerdictKind::WrongSetup => "the set-up is wrong: mend it first, no physics was asked".into(),
+        VerdictKind::WrongSetup => "the set-up is wrong: correct it first; no physical cause was tested".into(),
         VerdictKind::NotAsked => "too few rows were fitted to ask what the simulation lacks".into(),
     }
 }

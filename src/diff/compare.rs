@@ -146,7 +146,7 @@ fn key_columns(a: &TableFile, b: &TableFile, options: &DiffOptions, findings: &m
     let key = if a.key.is_empty() { &b.key } else { &a.key };
     if key.is_empty() {
         let columns: Vec<&str> = a.columns.iter().map(|column| column.name.as_str()).collect();
-        let message = format!("says not which columns tell its rows apart; name them with --key, of: {}", columns.join(", "));
+        let message = format!("does not say which columns identify its rows; name them with --key, of: {}", columns.join(", "));
         return Err(Error::spec(a.path.display().to_string(), message));
     }
     Ok(key.clone())

@@ -30,8 +30,11 @@ use crate::units::Unit;
 pub struct DiffOptions {
     /// Instead of the key that the files name.
     pub key: Vec<String>,
+    /// Absolute, in the unit of the column.
     pub atol: Tolerances,
+    /// As a share of the larger value.
     pub rtol: Tolerances,
+    /// Columns that are left out.
     pub ignore: BTreeSet<String>,
     /// Columns w, x, y, z that are one rotation together.
     pub quaternions: Vec<Vec<String>>,
@@ -48,7 +51,9 @@ pub struct DiffOptions {
 /// A tolerance for all columns, and for some.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tolerances {
+    /// Of every column.
     pub all: Option<f64>,
+    /// Of single columns, with the unit in which it was given.
     pub columns: BTreeMap<String, (f64, Option<Unit>)>,
 }
 
@@ -90,13 +95,17 @@ impl Tolerances {
 /// Two tables compared.
 #[derive(Debug, Clone, Serialize)]
 pub struct TableDiff {
+    /// The first table.
     pub a: DiffedTable,
+    /// The second table.
     pub b: DiffedTable,
+    /// Columns that identify rows.
     pub key: Vec<String>,
     /// Equal without a look at any row: by the hash of their content, or byte by byte.
     pub equal: Option<Equal>,
     /// What differs beside the values: columns, units, types, the schema's version.
     pub findings: Vec<Discrepancy>,
+    /// How many rows are what.
     pub rows: RowCounts,
     /// Compared columns, in the order of A.
     pub columns: Vec<ColumnDiff>,
@@ -119,6 +128,7 @@ pub enum Equal {
 }
 
 impl Equal {
+    /// What it means, in words.
     pub fn says(self) -> &'static str {
         match self {
             Self::Hash => "equal by the hash of their content",
@@ -128,12 +138,16 @@ impl Equal {
     }
 }
 
+/// One side of a comparison.
 #[derive(Debug, Clone, Serialize)]
 pub struct DiffedTable {
+    /// As it was given.
     pub path: String,
     /// `prediction/1.0.0`.
     pub schema: Option<String>,
+    /// Of its content, where the file carries it.
     pub table_hash: Option<String>,
+    /// How many.
     pub rows: u64,
 }
 
@@ -142,7 +156,9 @@ pub struct DiffedTable {
 pub struct Discrepancy {
     /// `column`, `unit`, `type`, `semantic`, `schema`, `key`.
     pub what: String,
+    /// Its name.
     pub column: String,
+    /// What differs, in words.
     pub says: String,
 }
 
@@ -155,31 +171,46 @@ impl Discrepancy {
 /// How many rows of each class.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RowCounts {
+    /// In every column.
     pub same: u64,
+    /// In every column, and not in all the same.
     pub within_tolerance: u64,
+    /// Beyond tolerance in some column.
     pub changed: u64,
+    /// Keys of the first table alone.
     pub only_a: u64,
+    /// Keys of the second table alone.
     pub only_b: u64,
     /// Rows whose key occurs more than once in a table.
     pub duplicate_a: u64,
+    /// The same of the second table.
     pub duplicate_b: u64,
+    /// How many keys occur more than once.
     pub duplicate_keys: u64,
 }
 
+/// A column of which values differ.
 #[derive(Debug, Clone, Serialize)]
 pub struct ColumnDiff {
+    /// Its name.
     pub name: String,
     /// Of tolerance and statistics, A's; `row` where every row has its own.
     pub unit: String,
     /// Rows with a value in both.
     pub pairs: u64,
+    /// Values that differ within tolerance.
     pub within: u64,
+    /// Values that differ beyond.
     pub changed: u64,
+    /// Absolute tolerance, in the unit of the column.
     pub atol: f64,
+    /// Relative tolerance.
     pub rtol: f64,
     /// Of B minus A over all pairs; null for texts and where rows have units of their own.
     pub statistics: Option<DifferenceStatistics>,
+    /// Largest difference in standard deviations, where the table has them.
     pub max_sigmas: Option<f64>,
+    /// The same, rms.
     pub rms_sigmas: Option<f64>,
     #[serde(skip)]
     worst_row: Option<u32>,
@@ -187,35 +218,53 @@ pub struct ColumnDiff {
     pub worst_key: Option<String>,
 }
 
+/// Differences of a column of numbers, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DifferenceStatistics {
+    /// Largest size.
     pub max: f64,
+    /// Root of the mean square.
     pub rms: f64,
+    /// Mean.
     pub bias: f64,
+    /// 95th percentile of the size.
     pub p95: f64,
 }
 
 /// A row that changed, with its cells that changed.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorstRow {
+    /// Of the row, in words.
     pub key: String,
+    /// What differs in it.
     pub cells: Vec<WorstCell>,
 }
 
+/// A value that differs.
 #[derive(Debug, Clone, Serialize)]
 pub struct WorstCell {
+    /// Its column.
     pub column: String,
+    /// In the first table.
     pub a: serde_json::Value,
+    /// In the second table.
     pub b: serde_json::Value,
+    /// Of numbers, in their unit.
     pub difference: Option<f64>,
+    /// Empty where there is none.
     pub unit: String,
+    /// The difference in standard deviations, where the table has them.
     pub sigmas: Option<f64>,
 }
 
+/// A few keys of each kind.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Examples {
+    /// Keys of the first table alone.
     pub only_a: Vec<String>,
+    /// Keys of the second table alone.
     pub only_b: Vec<String>,
+    /// Keys that occur more than once.
     pub duplicate: Vec<String>,
 }
 

@@ -12,6 +12,7 @@ pub enum Detail {
     Full,
 }
 
+/// A comparison as text.
 pub fn text(diff: &TableDiff, detail: Detail) -> String {
     let rows = &diff.rows;
     if let Some(equal) = diff.equal {

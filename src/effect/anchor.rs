@@ -5,12 +5,14 @@ use crate::robot::RobotModel;
 use crate::units::Unit;
 use nalgebra::Vector3;
 
+/// The far end of a draw-wire or ballbar.
 #[derive(Debug, Clone, Copy)]
 pub struct AnchorShift;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl AnchorShift {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "anchor";
 
     /// What the names of an anchor's parameters begin with, dot included.

@@ -5,12 +5,14 @@ use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, Nu
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// An axis that tilts with its own angle.
 pub struct AxisWobble;
 
 /// No bearing lets an axis tilt further, rad (100 arcsec).
 const LARGEST: f64 = 5e-4;
 
 impl AxisWobble {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "axis_wobble";
 }
 

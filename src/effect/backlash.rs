@@ -7,6 +7,7 @@ use super::{
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// Lost motion by the side of approach or of the load.
 pub struct Backlash;
 
 /// -2 ln of the odds that lost motion grows with time, or that a joint yields otherwise from either side.
@@ -29,6 +30,7 @@ fn mixed(joint: usize, friction_nm: f64, width: f64) -> Law {
 }
 
 impl Backlash {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "backlash";
 }
 

@@ -6,6 +6,7 @@ use crate::spatial::{Pose, Twist};
 use crate::units::Unit;
 use nalgebra::Vector3;
 
+/// Where the base stands.
 pub struct BaseFrame;
 
 /// Corrections to a starting pose: exp of the twist, given in tracker axes, applied in the base frame.
@@ -17,10 +18,12 @@ pub struct BasePlacement {
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 impl BaseFrame {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "base_frame";
 }
 
 impl BasePlacement {
+    /// Corrections from a start; all zero there.
     pub fn new(start: Pose) -> Self {
         Self { start }
     }

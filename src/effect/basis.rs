@@ -3,43 +3,110 @@
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
+/// A function of one variable, or a few.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Basis {
     /// (u - zero) / per.
-    Linear { zero: f64, per: f64 },
+    Linear {
+        /// Variable at which it is zero.
+        zero: f64,
+        /// Change of the variable that makes it one.
+        per: f64,
+    },
     /// 1, and (u - zero) / per.
-    Straight { zero: f64, per: f64 },
+    Straight {
+        /// Variable at which it is zero.
+        zero: f64,
+        /// Change of the variable that makes it one.
+        per: f64,
+    },
     /// sin(order u) and cos(order u), and with an overtone those of twice the order.
-    Wave { order: u32, overtone: bool },
+    Wave {
+        /// Periods per turn.
+        order: u32,
+        /// Whether twice the order belongs to it.
+        overtone: bool,
+    },
     /// Sine and cosine of a period.
-    Sway { period: f64 },
+    Sway {
+        /// In the unit of the variable.
+        period: f64,
+    },
     /// cos(k pi (u - low) / (high - low)), k = 1..=count, held at either end: a curve without its mean.
-    Cosines { low: f64, high: f64, count: usize },
+    Cosines {
+        /// Lower end of the support.
+        low: f64,
+        /// Upper end of the support.
+        high: f64,
+        /// How many cosines.
+        count: usize,
+    },
     /// The same, fading out beyond either end within one wave of the highest cosine, and straight across gaps.
     Fading {
+        /// Lower end of the support.
         low: f64,
+        /// Upper end of the support.
         high: f64,
+        /// How many cosines.
         count: usize,
+        /// Stretches that no row supports.
         #[serde(default, skip_serializing_if = "Gaps::are_none")]
         gaps: Gaps,
     },
     /// exp(-((u - centre) / width)^2).
-    Bump { centre: f64, width: f64 },
+    Bump {
+        /// Its middle.
+        centre: f64,
+        /// Its scale.
+        width: f64,
+    },
     /// tanh((u - centre) / width): one level below, another above.
-    Rise { centre: f64, width: f64 },
+    Rise {
+        /// Its middle.
+        centre: f64,
+        /// Its scale.
+        width: f64,
+    },
     /// Nothing on one side of `from`, in proportion to the distance on the other.
-    Hinge { from: f64, upwards: bool },
+    Hinge {
+        /// Where it begins.
+        from: f64,
+        /// Whether it grows above, or below.
+        upwards: bool,
+    },
     /// 1 above `at`, else 0.
-    After { at: f64 },
+    After {
+        /// Where it steps.
+        at: f64,
+    },
     /// -1 or 1.
     Sign,
     /// The power of the share of the way from `start` to `end`, odd about `start`.
-    Power { start: f64, end: f64, exponent: f64 },
+    Power {
+        /// Where it is zero.
+        start: f64,
+        /// Where it is one.
+        end: f64,
+        /// Of the power.
+        exponent: f64,
+    },
     /// The same from `start` on; 1 later than [`CREEPING`] times the way.
-    Creep { start: f64, end: f64, exponent: f64 },
+    Creep {
+        /// Where it is zero.
+        start: f64,
+        /// Where it is one.
+        end: f64,
+        /// Of the power.
+        exponent: f64,
+    },
     /// 1 - exp(-(u - start) / constant) from `start` on.
-    Settling { start: f64, constant: f64 },
+    Settling {
+        /// Where it is zero.
+        start: f64,
+        /// Time constant.
+        constant: f64,
+    },
 }
 
 /// Stretches of a curve's variable without support; none where both ends are one.

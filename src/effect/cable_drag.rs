@@ -5,6 +5,7 @@ use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
 use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, Unknown};
 
+/// Hoses that pull joints along.
 pub struct CableDrag;
 
 impl Cause for CableDrag {

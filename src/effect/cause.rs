@@ -22,7 +22,9 @@ pub struct CauseDescription {
 /// A measurement that is no pose and separates a cause from others; of two causes the one of lower rank says what to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Measure {
+    /// The lower, the earlier it is proposed.
     pub rank: u8,
+    /// What to measure, as an order.
     pub advice: &'static str,
 }
 
@@ -31,8 +33,10 @@ pub type NumberSpec = (String, Unit, f64);
 
 /// A cause of error.
 pub trait Cause: Sync {
+    /// What it is, in words.
     fn about(&self) -> &'static CauseDescription;
 
+    /// Its canonical name.
     fn name(&self) -> &'static str {
         self.about().name
     }

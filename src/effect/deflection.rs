@@ -48,6 +48,7 @@ struct Kept {
 }
 
 impl Deflection {
+    /// No motion of an arm with so many joints.
     pub fn new(joints: usize) -> Self {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
         Self {

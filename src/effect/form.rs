@@ -14,6 +14,7 @@ use std::sync::Arc;
 pub trait Placed: Effect + Any {
     /// The cause that proposed it.
     fn cause(&self) -> &'static dyn Cause;
+    /// Where it acts.
     fn place(&self) -> Place;
     /// What it depends on.
     fn variables(&self) -> Vec<Variable>;

@@ -10,6 +10,7 @@ use super::{
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// Transmission or encoder error periodic in the joint angle.
 pub struct GearCyclic;
 
 /// Orders per joint turn that are tried: strain wave gears and absolute encoders show some twenty, worm wheels more.
@@ -20,6 +21,7 @@ const LOW: u32 = 4;
 const OVERTONE: f64 = 2.0;
 
 impl GearCyclic {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "gear_cyclic";
 
     /// The error of one order per turn of a joint; with its overtone, twice the order, as an eccentric wheel or disc has it.

@@ -11,9 +11,11 @@ use super::{
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
 
+/// Wind-up of joints by their load.
 pub struct JointCompliance;
 
 impl JointCompliance {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "joint_compliance";
 }
 

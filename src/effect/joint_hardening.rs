@@ -11,9 +11,11 @@ use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
+/// Wind-up that is not in proportion to the load.
 pub struct JointHardening;
 
 impl JointHardening {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "joint_hardening";
 }
 

@@ -10,9 +10,11 @@ use crate::robot::RobotModel;
 use crate::units::Unit;
 use serde::{Deserialize, Serialize};
 
+/// Joints logged before or after the point was measured.
 pub struct JointLogLag;
 
 impl JointLogLag {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "joint_log_lag";
 }
 

@@ -7,6 +7,7 @@ use crate::robot::RobotModel;
 use crate::units::Unit;
 use std::f64::consts::PI;
 
+/// A free curve of a joint over its angle.
 pub struct JointTable;
 
 /// Highest orders per joint turn that a curve resolves.
@@ -25,6 +26,7 @@ pub(super) const PLAUSIBLE: f64 = 3e-4;
 const SMOOTH: usize = 4;
 
 impl JointTable {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "joint_table";
 }
 

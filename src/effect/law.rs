@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Functions of one variable.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Factor {
+    /// Of what.
     pub of: Variable,
+    /// Which functions of it.
     pub basis: Basis,
 }
 
@@ -29,13 +31,16 @@ impl Factor {
 /// Functions of one or two variables: all products of a function of the first and one of the second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Law {
+    /// The variable that the cause is about.
     #[serde(flatten)]
     pub first: Factor,
+    /// What multiplies it, if anything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<Factor>,
 }
 
 impl Law {
+    /// Functions of one variable.
     pub const fn new(of: Variable, basis: Basis) -> Self {
         Self { first: Factor { of, basis }, times: None }
     }
@@ -65,6 +70,7 @@ impl Law {
         self.factors().map(Factor::count).product()
     }
 
+    /// One or two.
     pub fn factors(&self) -> impl Iterator<Item = &Factor> {
         std::iter::once(&self.first).chain(&self.times)
     }

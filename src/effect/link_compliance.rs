@@ -12,9 +12,11 @@ use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+/// Links that bend under the moment at their far joint.
 pub struct LinkCompliance;
 
 impl LinkCompliance {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "link_compliance";
 }
 

@@ -272,5 +272,6 @@ impl Load {
 pub struct EffectContext {
     /// Where the base stands in the tracker's frame before any correction.
     pub base: Pose,
+    /// By what joints wind up.
     pub load: Load,
 }

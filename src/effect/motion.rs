@@ -12,22 +12,54 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
     /// A joint travels.
-    Joint { joint: usize },
+    Joint {
+        /// From 0.
+        joint: usize,
+    },
     /// Joint `moved` travels because of joint `by`.
-    Coupled { by: usize, moved: usize },
+    Coupled {
+        /// From 0.
+        by: usize,
+        /// From 0.
+        moved: usize,
+    },
     /// The axis of a joint tilts about the directions across it, or about one of them (0 or 1). It stands in the link before, or turns
     /// with the joint.
-    Axis { joint: usize, about: Option<usize>, turning: bool },
+    Axis {
+        /// From 0.
+        joint: usize,
+        /// Direction across the axis; none for both.
+        about: Option<usize>,
+        /// Whether it turns with the joint.
+        turning: bool,
+    },
     /// Neighbouring links grow along themselves, each in proportion to its length.
-    Links { first: usize, last: usize },
+    Links {
+        /// Link, from 0.
+        first: usize,
+        /// Link, from 0.
+        last: usize,
+    },
     /// The base.
-    Base { axes: Axes },
+    Base {
+        /// Which of its six directions.
+        axes: Axes,
+    },
     /// The measuring frame.
-    Tracker { axes: Axes },
+    Tracker {
+        /// Which of its six directions.
+        axes: Axes,
+    },
     /// The tool, axes of the base at the zero pose.
-    Tool { axes: Axes },
+    Tool {
+        /// Which of its six directions.
+        axes: Axes,
+    },
     /// What the instrument reads.
-    Instrument { of: Polar },
+    Instrument {
+        /// What is misread.
+        of: Polar,
+    },
 }
 
 /// Directions of a frame's motion.
@@ -68,6 +100,7 @@ const MOTION: [(&str, Unit, f64); 6] = [
 ];
 
 impl Motion {
+    /// Where it acts.
     pub fn place(&self) -> Place {
         match *self {
             Self::Joint { joint } | Self::Axis { joint, .. } => Place::Joint(joint),

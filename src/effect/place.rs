@@ -7,14 +7,19 @@ use std::str::FromStr;
 /// A place on the arm or around it; joints and links count from 0 here and from 1 in words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Place {
+    /// The robot's base.
     Base,
+    /// A joint, from 0.
     Joint(usize),
     /// The second joint moves with the first.
     Coupled(usize, usize),
     /// First and last of neighbouring links; link k is the body that joint k moves.
     Links(usize, usize),
+    /// The tool and the target on it.
     Tool,
+    /// The instrument and its stand.
     Tracker,
+    /// The measurement itself: rows, clocks, names.
     Recording,
     /// The far end of a draw-wire or ballbar.
     Anchor,

@@ -7,10 +7,12 @@ use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// Joints that travel more or less than reported, in proportion.
 #[derive(Debug, Clone, Copy)]
 pub struct ReductionRatio;
 
 impl ReductionRatio {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "reduction_ratio";
 }
 

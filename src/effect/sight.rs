@@ -10,8 +10,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Polar {
+    /// About the instrument's standing axis, rad.
     Azimuth,
+    /// Above its horizon, rad.
     Elevation,
+    /// m.
     Range,
 }
 

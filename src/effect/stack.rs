@@ -38,6 +38,7 @@ impl EffectStack {
         &self.specs
     }
 
+    /// Where the base stands in the tracker's frame before any correction.
     pub fn base(&self) -> &Pose {
         &self.base
     }
@@ -52,6 +53,7 @@ impl EffectStack {
         self.effects().filter(move |(effect, _)| effect.name() == name).flat_map(|(_, range)| range)
     }
 
+    /// Buffers for [`EffectStack::place`], one a thread.
     pub fn scratch(&self, robot: &RobotModel) -> PlacementBuffers {
         PlacementBuffers::new(robot.joints())
     }
@@ -212,6 +214,7 @@ pub struct PointMotion {
     row: usize,
     /// Predicted point, tracker frame, m.
     pub point: Vector3<f64>,
+    /// Joints and loads as they really are.
     pub posture: Posture,
     /// rad/Nm.
     compliance: Vec<f64>,

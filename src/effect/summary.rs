@@ -6,11 +6,15 @@ use crate::units::Unit;
 /// A coefficient of a finding in the unit in which people read it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterEstimate {
+    /// E.g. `gear_cyclic.j2.order3.sin`.
     pub name: String,
     /// Its form, by position among those of its finding.
     pub form: usize,
+    /// In `unit`.
     pub value: f64,
+    /// As people read it.
     pub unit: &'static str,
+    /// One standard deviation, where it was estimated.
     pub sigma: Option<f64>,
 }
 
@@ -32,8 +36,11 @@ fn unit(number: &ParameterEstimate) -> String {
 /// A finding: its place, its forms and their fitted numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Summary<'a> {
+    /// Where it acts.
     pub place: Place,
+    /// Places and shapes that make it up.
     pub forms: &'a [Form],
+    /// Their fitted coefficients.
     pub parameters: &'a [ParameterEstimate],
     /// What counts time in the recording.
     pub clock: Clock,

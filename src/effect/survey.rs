@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 
 /// The fitted rows of a recording as seen from the present model.
 pub struct Survey<'a> {
+    /// The present model's arm.
     pub robot: &'a RobotModel,
+    /// All rows of the recording.
     pub data: &'a Measurements,
     /// Fitted rows of the recording, ascending.
     pub rows: &'a [usize],
@@ -28,6 +30,7 @@ pub struct Survey<'a> {
 const EDGE: usize = 5;
 
 impl<'a> Survey<'a> {
+    /// Ranges and times of the fitted rows; `torque` (Nm) row-major by fitted row, `compliance` (rad/Nm) by joint.
     pub fn new(
         robot: &'a RobotModel,
         data: &'a Measurements,
@@ -51,6 +54,7 @@ impl<'a> Survey<'a> {
         Self { robot, data, rows, torque, compliance, range, boundaries, time, reference_c }
     }
 
+    /// Joints of the arm.
     pub fn joints(&self) -> usize {
         self.robot.joints()
     }
@@ -137,6 +141,7 @@ impl<'a> Survey<'a> {
 /// An effect at a place in a form, as a possible cause of what the model leaves.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
+    /// What it would add to the model.
     pub form: Form,
     /// How many forms of the kind are tried; twice its logarithm is the penalty.
     pub tried: f64,
@@ -151,6 +156,7 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// A hypothesis of `tried` like ones.
     pub fn new(form: impl Into<Form>, tried: usize) -> Self {
         Self {
             form: form.into(),
@@ -162,18 +168,22 @@ impl Hypothesis {
         }
     }
 
+    /// With coefficients that must be positive.
     pub fn positive(self) -> Self {
         Self { positive: true, ..self }
     }
 
+    /// With coefficients up to `largest`, SI.
     pub fn within(self, largest: f64) -> Self {
         Self { largest, ..self }
     }
 
+    /// A product of a named law, which stands only beside that law.
     pub fn inheriting(self) -> Self {
         Self { inherits: true, ..self }
     }
 
+    /// With more penalty, -2 ln of the odds.
     pub fn penalised(self, prior_penalty: f64) -> Self {
         Self { prior_penalty: self.prior_penalty + prior_penalty, ..self }
     }

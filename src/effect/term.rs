@@ -21,6 +21,7 @@ struct Stored {
 }
 
 impl Term {
+    /// A law of a motion, under the name of a cause.
     pub fn new(cause: &'static dyn Cause, motion: Motion, law: Law) -> Self {
         Self { cause, motion, law }
     }
@@ -31,10 +32,12 @@ impl Term {
         Ok(Self { cause, motion, law }.into())
     }
 
+    /// Where it enters the chain.
     pub fn motion(&self) -> Motion {
         self.motion
     }
 
+    /// What it depends on, and how.
     pub fn law(&self) -> &Law {
         &self.law
     }

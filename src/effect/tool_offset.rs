@@ -8,6 +8,7 @@ use crate::spatial::{Twist, screw};
 use crate::units::Unit;
 use nalgebra::Vector3;
 
+/// Where the measured point sits on the tool.
 #[derive(Debug, Clone, Copy)]
 pub struct ToolOffset;
 
@@ -19,6 +20,7 @@ fn width(target: &Target) -> usize {
 }
 
 impl ToolOffset {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "tool_offset";
 
     /// What the names of a target's parameters begin with, dot included.

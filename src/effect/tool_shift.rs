@@ -3,9 +3,11 @@
 use super::{Axes, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
+/// A target that moves at some time.
 pub struct ToolShift;
 
 impl ToolShift {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "tool_shift";
 }
 

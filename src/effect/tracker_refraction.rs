@@ -18,7 +18,7 @@ impl Cause for TrackerRefraction {
         &CauseDescription {
             name: "tracker_refraction",
             place: "tracker",
-            formula: "ranges grow by c (T - T0), or c (1 - exp(-time / tau)), of themselves",
+            formula: "ranges grow by c (T - T0), or c (1 - exp(-time / tau)), in proportion to their length",
             size: "1 um/m for each kelvin",
             confounded: "tracker_drift and thermal_growth of all links",
             needs: "temperature or time, the instrument at the recording's origin",

@@ -13,6 +13,7 @@ use super::{frames, interactions};
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// Structure of no law of the list.
 pub struct Unknown;
 
 /// Cosines of a smooth function of one variable, of a frame in time, and of each of two.
@@ -46,6 +47,7 @@ const WIDE: f64 = 0.01;
 const PER_LOAD: f64 = 1e-4;
 
 impl Unknown {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "unknown";
 
     fn at_joint(survey: &Survey, joint: usize) -> Vec<Hypothesis> {

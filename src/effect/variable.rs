@@ -10,23 +10,49 @@ use std::fmt;
 #[serde(rename_all = "snake_case")]
 pub enum Variable {
     /// Commanded position of a joint, rad or m.
-    Angle { joint: usize },
+    Angle {
+        /// From 0.
+        joint: usize,
+    },
     /// Angle of a joint's motor, rad: the joint's angle times its reduction ratio.
-    Motor { joint: usize },
+    Motor {
+        /// From 0.
+        joint: usize,
+    },
     /// Load torque about a joint, Nm.
-    Load { joint: usize },
+    Load {
+        /// From 0.
+        joint: usize,
+    },
     /// Load torque plus so much friction (Nm) to the side from which the joint came, Nm.
-    Push { joint: usize, friction_nm: f64 },
+    Push {
+        /// From 0.
+        joint: usize,
+        /// Nm.
+        friction_nm: f64,
+    },
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
-    Approach { joint: usize },
+    Approach {
+        /// From 0.
+        joint: usize,
+    },
     /// What a joint moved from the stop before, rad or m.
-    Move { joint: usize },
+    Move {
+        /// From 0.
+        joint: usize,
+    },
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
-    Velocity { joint: usize },
+    Velocity {
+        /// From 0.
+        joint: usize,
+    },
     /// Declared payload, kg.
     Payload,
     /// Direction of gravity as the tool sees it: one component (0 to 2, axes of the tool at the zero pose), or all three.
-    Gravity { axis: Option<usize> },
+    Gravity {
+        /// Component, 0 to 2; none for all.
+        axis: Option<usize>,
+    },
     /// C, where recorded.
     Temperature,
     /// s; the number of the row where the recording has no clock.
@@ -44,11 +70,24 @@ pub enum Variable {
     /// Distance from the instrument, m.
     Range,
     /// Side to which pre-sliding friction has brought a joint that fades in over a travel (rad or m) after each reversal, -1 to 1.
-    Slip { joint: usize, travel: f64 },
+    Slip {
+        /// From 0.
+        joint: usize,
+        /// rad or m.
+        travel: f64,
+    },
     /// How fast a joint has moved of late (rad/s or m/s), forgotten with a cooling time (s).
-    Work { joint: usize, cooling: f64 },
+    Work {
+        /// From 0.
+        joint: usize,
+        /// s.
+        cooling: f64,
+    },
     /// The recorded temperature as something feels it that follows it with a time constant (s), C.
-    Lagging { lag: f64 },
+    Lagging {
+        /// s.
+        lag: f64,
+    },
 }
 
 impl Variable {

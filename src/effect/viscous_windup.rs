@@ -6,12 +6,14 @@ use super::{Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec,
 use crate::robot::RobotModel;
 use crate::units::Unit;
 
+/// Joints that trail in proportion to their speed.
 pub struct ViscousWindup;
 
 /// s: a joint that trails farther is not driven.
 const LARGEST: f64 = 0.1;
 
 impl ViscousWindup {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "viscous_windup";
 }
 

@@ -28,12 +28,16 @@ const EPOCH: f64 = 3e7;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Clock {
     /// What the clock shows at the recording's first row.
-    Seconds { first: f64 },
+    Seconds {
+        /// Time of the first row, s.
+        first: f64,
+    },
     /// No time was recorded: the order of the rows stands for it.
     Rows,
 }
 
 impl Clock {
+    /// The clock of a recording.
     pub fn of(data: &Measurements) -> Self {
         let times = data.time.iter().flatten().copied().filter(|time| time.is_finite());
         times.reduce(f64::min).map_or(Self::Rows, |first| Self::Seconds { first })

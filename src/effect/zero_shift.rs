@@ -3,9 +3,11 @@
 use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Place, Summary, Survey, Term, change};
 use crate::robot::RobotModel;
 
+/// A joint zero that steps at some time.
 pub struct ZeroShift;
 
 impl ZeroShift {
+    /// Canonical name, as in tables and YAML.
     pub const NAME: &'static str = "zero_shift";
 }
 

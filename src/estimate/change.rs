@@ -15,7 +15,9 @@ use faer::Mat;
 pub struct ParameterChange {
     /// Position in the stack.
     pub parameter: usize,
+    /// From the earlier recording to this one, SI.
     pub step: f64,
+    /// One standard deviation of the step, SI.
     pub sigma: f64,
     /// Two-sided.
     pub p_value: f64,

@@ -36,14 +36,18 @@ pub enum ParameterStatus {
     Kept,
     /// As [`Visibility::Redundant`], with positions in the stack.
     Redundant(Vec<(usize, f64)>),
+    /// The data do not show it.
     Unseen,
 }
 
 /// What [`fit`] says of the model that it returns.
 #[derive(Clone)]
 pub struct Fitted {
+    /// Of every parameter of the stack.
     pub statuses: Vec<ParameterStatus>,
+    /// Step by step.
     pub course: Vec<Iteration>,
+    /// Why it ended.
     pub stop: Stop,
     /// Standard deviation per axis that the rows show beyond the instrument's, m.
     pub excess_sigma: f64,

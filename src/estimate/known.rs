@@ -3,13 +3,16 @@
 /// Beforehand about one parameter, SI.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Known {
+    /// A normal distribution, if any.
     pub prior: Option<Prior>,
+    /// A range, if any.
     pub bounds: Option<Bounds>,
 }
 
 /// A normal distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
+    /// SI.
     pub mean: f64,
     /// Above zero.
     pub sigma: f64,
@@ -18,13 +21,16 @@ pub struct Prior {
 /// Both ends belong to what is allowed; `low < high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
+    /// SI.
     pub low: f64,
+    /// SI.
     pub high: f64,
 }
 
 /// What a prior and the data say of one parameter, after a fit with both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PriorCheck {
+    /// As it was stated.
     pub prior: Prior,
     /// Estimate and standard deviation without this prior, SI; `None` where the data alone say nothing.
     pub without: Option<(f64, f64)>,

@@ -19,6 +19,7 @@ pub enum Stop {
 }
 
 impl Stop {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -40,6 +41,7 @@ pub struct Iteration {
     pub gradient: f64,
     /// Norm of the step that led here, in sigmas of prediction.
     pub step_norm: f64,
+    /// Of the step that was taken.
     pub damping: f64,
 }
 

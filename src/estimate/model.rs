@@ -12,7 +12,9 @@ use std::sync::Arc;
 /// The forward model of measured points.
 #[derive(Clone)]
 pub struct Model {
+    /// The nominal arm, with targets and anchors.
     pub robot: RobotModel,
+    /// What moves it off nominal.
     pub stack: Arc<EffectStack>,
     /// Parameter values, SI, in the order of the stack's specs.
     pub x: Vec<f64>,

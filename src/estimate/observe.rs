@@ -9,6 +9,7 @@ use super::triangle::{axpy, dot};
 /// How a candidate parameter was classed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Visibility {
+    /// The data determine it.
     Seen,
     /// Others do the same; with the names' positions and their share, strongest first.
     Redundant(Vec<(usize, f64)>),

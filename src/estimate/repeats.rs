@@ -34,6 +34,7 @@ pub struct Repeated {
 }
 
 impl Poses {
+    /// Poses of some rows of a recording.
     pub fn of(data: &Measurements, rows: &[usize]) -> Self {
         // Of a moving arm the rows beside one are always near.
         let limit = if data.in_motion(rows) { SAME } else { NEAR };
@@ -42,6 +43,7 @@ impl Poses {
         Self { all: poses, points }
     }
 
+    /// The rows of every pose.
     pub fn all(&self) -> &[Vec<usize>] {
         &self.all
     }

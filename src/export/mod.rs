@@ -18,6 +18,7 @@ pub trait Format: Sync {
     fn name(&self) -> &'static str;
     /// What it is, in one line.
     fn help(&self) -> &'static str;
+    /// The whole file. Fails where the format cannot hold this arm at all.
     fn text(&self, export: &Export) -> Result<String>;
 }
 

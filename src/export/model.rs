@@ -22,6 +22,7 @@ pub struct Export {
 }
 
 impl Export {
+    /// Splits the model into the rigid geometry that formats hold, and the rest, which is listed.
     pub fn of(identified: IdentifiedModel) -> Self {
         let recording = identified.data.as_ref().filter(|data| data.rows() > 0);
         let recorded = recording.is_some();

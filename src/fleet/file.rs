@@ -104,8 +104,10 @@ pub struct RobotSource {
 pub struct Exception {
     /// Names; `*` stands for anything.
     pub robots: Vec<String>,
+    /// Labels by which robots are grouped.
     #[serde(default)]
     pub groups: Groups,
+    /// Overrides of the pipeline.
     #[serde(default)]
     pub set: BTreeMap<String, Value>,
 }
@@ -132,6 +134,7 @@ pub struct PriorFrom {
     pub fleet: String,
     /// The stage of this pipeline that takes the priors, with a setting `prior`; its namesake there gives them.
     pub stage: String,
+    /// Whose values are taken.
     pub by: PriorBy,
     /// Effects that it speaks of, by canonical name.
     pub effects: Vec<String>,

@@ -21,6 +21,7 @@ pub const LATER: u8 = 75;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
+    /// All stages are done.
     Done,
     /// Its data are at fault: the same data will be rejected again.
     Rejected,
@@ -29,6 +30,7 @@ pub enum Ending {
 }
 
 impl Ending {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Done => "done",
@@ -41,9 +43,13 @@ impl Ending {
 /// A table of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotTable {
+    /// Id of its stage.
     pub stage: String,
+    /// On which it was written.
     pub port: String,
+    /// The name of its schema.
     pub kind: String,
+    /// Where it is.
     #[serde(flatten)]
     pub table: TableRef,
 }
@@ -51,10 +57,13 @@ pub struct RobotTable {
 /// Result of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RobotRecord {
+    /// Of this record.
     pub record_format: u32,
+    /// Its name.
     pub robot: String,
     /// Hash of the robot's name, settings and data.
     pub key: String,
+    /// How it ended.
     pub ending: Ending,
     /// As `calib run` would have ended.
     pub exit_code: u8,
@@ -67,11 +76,15 @@ pub struct RobotRecord {
     /// What the cluster's task said, among the fleet's logs.
     #[serde(default)]
     pub log: Option<String>,
+    /// RFC 3339, UTC.
     pub ended: String,
+    /// From start to end.
     pub wall_seconds: f64,
+    /// That its run wrote or took.
     pub tables: Vec<RobotTable>,
     /// Name of the robot's folder among the documents.
     pub handle: String,
+    /// Names of its documents.
     pub documents: Vec<String>,
 }
 
@@ -107,11 +120,15 @@ impl RobotRecord {
 /// One run of a fleet, as its tasks and later campaigns need it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct RunNote {
+    /// Its id.
     pub run: String,
+    /// Its name.
     pub fleet: String,
+    /// `local` or `slurm`.
     pub engine: String,
     /// Absolute, so that other hosts find it.
     pub file: PathBuf,
+    /// In the order of the roster.
     pub robots: Vec<Member>,
     /// Robots of every task of a cluster, by position.
     #[serde(default)]
@@ -124,7 +141,9 @@ pub struct RunNote {
 /// A robot of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Member {
+    /// Of the robot.
     pub name: String,
+    /// Its labels.
     #[serde(default)]
     pub groups: Groups,
     /// Of its record, once there is one.
@@ -134,7 +153,9 @@ pub struct Member {
 
 /// The records of one fleet.
 pub struct Ledger<'a> {
+    /// Where records are.
     pub store: &'a Store,
+    /// Its name.
     pub fleet: String,
 }
 
@@ -151,6 +172,7 @@ impl Drop for Claim {
 }
 
 impl<'a> Ledger<'a> {
+    /// The records of a fleet in a store.
     pub fn new(store: &'a Store, fleet: &str) -> Self {
         Self { store, fleet: fleet.into() }
     }
@@ -213,6 +235,7 @@ impl<'a> Ledger<'a> {
         }
     }
 
+    /// Keeps what a run of the fleet is about.
     pub fn put_run(&self, note: &RunNote) -> Result<()> {
         self.store.put_note(&self.runs(), &format!("{}.json", note.run), note)
     }
@@ -247,6 +270,7 @@ impl<'a> Ledger<'a> {
     pub fn cancel(&self, run: &str) -> Result<()> {
         self.store.put_note(&["fleets", &self.fleet], "cancelled.json", &serde_json::json!({ "run": run }))
     }
+    /// Whether a run was asked to stop.
     pub fn cancelled(&self, run: &str) -> bool {
         let note = self.store.note(&["fleets", &self.fleet], "cancelled.json").ok().flatten();
         note.is_some_and(|note| note["run"] == run)

@@ -14,6 +14,7 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 /// How robots are worked through.
 pub struct WorkerOptions<'a> {
+    /// Robots at once.
     pub workers: usize,
     /// Stops at the first robot that is not done.
     pub fail_fast: bool,
@@ -23,6 +24,7 @@ pub struct WorkerOptions<'a> {
 
 /// What came of it, in the order of the roster; nothing where the work was stopped before.
 pub struct FleetResults {
+    /// In the order of the roster; none where a robot was not reached.
     pub records: Vec<Option<RobotRecord>>,
     /// Robots computed now.
     pub computed: usize,

@@ -29,11 +29,13 @@ use std::path::{Path, PathBuf};
 
 /// A fleet whose file is sound and whose robots are known.
 pub struct Fleet {
+    /// As it was read.
     pub file: FleetFile,
     /// The pipeline's YAML, where it lies.
     pub pipeline: PathBuf,
     /// Its text.
     pub text: String,
+    /// Its robots.
     pub roster: Roster,
 }
 
@@ -51,6 +53,7 @@ impl Fleet {
         Ok(fleet)
     }
 
+    /// As the file states it.
     pub fn name(&self) -> &str {
         &self.file.name
     }

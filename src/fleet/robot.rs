@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 /// One robot. Its name is data from outside: never a path, never a command.
 #[derive(Debug, Clone)]
 pub struct FleetRobot {
+    /// Unique in the fleet.
     pub name: String,
+    /// Its labels.
     pub groups: Groups,
     /// Later ones win.
     pub sets: Vec<Override>,

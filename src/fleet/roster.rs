@@ -51,7 +51,7 @@ impl Roster {
             *seen.entry(&robot.name).or_default() += 1;
         }
         for (name, times) in seen.into_iter().filter(|(_, times)| *times > 1) {
-            let message = format!("{times} robots have the name {name:?}; names tell robots apart");
+            let message = format!("{times} robots have the name {name:?}; names identify robots");
             troubles.push(Trouble::new(message).at(tree.nearest_mark("robots")).below("robots"));
         }
         for (index, exception) in file.overrides.iter().enumerate() {
@@ -72,6 +72,7 @@ impl Roster {
         if troubles.is_empty() { Ok(Self(robots)) } else { Err(faulty(&path.display().to_string(), troubles)) }
     }
 
+    /// Of a robot by its name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.0.iter().position(|robot| robot.name == name)
     }

@@ -34,6 +34,7 @@ pub enum Waited {
     Complete,
     /// The scheduler has nothing left of the run, and robots are missing.
     Gone,
+    /// Somebody asked for it.
     Stopped,
 }
 

@@ -19,10 +19,13 @@ const STAGE: &str = "fleet";
 
 /// What a fleet came to.
 pub struct FleetSummary {
+    /// A row for each robot.
     pub fleet: FleetTable,
+    /// A row for each parameter that was tested.
     pub changes: FleetChanges,
     /// Where people find the tables and the page.
     pub tables: Vec<PathBuf>,
+    /// The page about the fleet.
     pub page: PathBuf,
 }
 

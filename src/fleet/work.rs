@@ -30,7 +30,9 @@ pub enum Visit {
 
 /// Where robots are computed.
 pub struct Workshop<'a> {
+    /// Which robots, which pipeline.
     pub fleet: &'a Fleet,
+    /// Where records go.
     pub ledger: Ledger<'a>,
     /// Fresh for every run.
     pub surroundings: &'a (dyn Fn() -> Surroundings + Sync),

@@ -26,9 +26,13 @@ use written::written;
 
 /// What was identified, and from what.
 pub struct IdentifiedModel {
+    /// The nominal arm.
     pub robot: RobotDescription,
+    /// The table that the model was read from.
     pub parameters: Parameters,
+    /// Nominal arm, effects and their values.
     pub model: Model,
+    /// What was learned on top, if anything.
     pub correction: Option<Correction>,
     /// Of the estimated parameters, where it is known.
     pub covariance: Option<Covariance>,
@@ -44,7 +48,9 @@ pub struct IdentifiedModel {
 
 /// A table of parameters as a file, and the robot that they are of.
 pub struct Files {
+    /// A table `parameters`, Parquet.
     pub parameters: PathBuf,
+    /// A robot file, or a table `robot`.
     pub robot: PathBuf,
     /// Takes tables that carry no content hash.
     pub unchecked: bool,
@@ -143,6 +149,7 @@ impl IdentifiedModel {
         })
     }
 
+    /// What the uncertainty of a target is made of; none where a table alone was given.
     pub fn coverage(&self) -> Option<Coverage> {
         self.data.as_ref().filter(|data| data.rows() > 0).map(Coverage::of)
     }
@@ -191,9 +198,7 @@ impl Files {
         let place = path.display().to_string();
         match (loose.vouched, self.unchecked) {
             (true, _) => {}
-            (false, true) => {
-                warnings.push(format!("{place} carries no content hash: whether its numbers were changed cannot be told"))
-            }
+            (false, true) => warnings.push(format!("{place} carries no content hash: its numbers cannot be verified")),
             (false, false) => {
                 let message = "carries no content hash, as a file has that another program wrote: whether its numbers were changed since they were \
                                identified cannot be told, and they move a robot. Take the file that calib wrote (`tables/` in the store), or say \

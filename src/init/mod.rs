@@ -26,15 +26,19 @@ pub struct InitRequest<'a> {
     pub folder: &'a Path,
     /// Recordings: one file, or the controller's and the tracker's.
     pub data: &'a [PathBuf],
+    /// The kind to start from.
     pub robot: RobotFileKind,
     /// The robot instead, and its last link.
     pub urdf: Option<&'a Path>,
+    /// Last link of the chain in the URDF.
     pub tip: &'a str,
 }
 
 /// Files to start from.
 pub struct StarterFiles {
+    /// Text of `robot.yaml`.
     pub robot: String,
+    /// Text of `pipeline.yaml`.
     pub pipeline: String,
     /// What was found in each recording, and which.
     pub accounts: Vec<(PathBuf, String)>,

@@ -2,11 +2,16 @@
 
 use crate::yaml::quoted;
 
+/// Kinds of arms that a robot file starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RobotFileKind {
+    /// Six joints, the last three axes meet in a point.
     Spherical6,
+    /// Six joints, offset wrist.
     Offset6,
+    /// Seven joints, alternating axes.
     Seven,
+    /// Six joints as a DH table.
     Dh6,
 }
 
@@ -15,6 +20,7 @@ pub const KINDS: [RobotFileKind; 4] =
     [RobotFileKind::Spherical6, RobotFileKind::Offset6, RobotFileKind::Seven, RobotFileKind::Dh6];
 
 impl RobotFileKind {
+    /// As the command line names it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spherical6 => "spherical6",
@@ -34,6 +40,7 @@ impl RobotFileKind {
         }
     }
 
+    /// How many.
     pub fn joints(self) -> usize {
         if self == Self::Seven { 7 } else { 6 }
     }

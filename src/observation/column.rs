@@ -5,9 +5,11 @@ use crate::units::{Quantity, Unit};
 /// A setting below `columns` of `ingest`, with what a recording keeps of it.
 #[derive(Debug, Clone, Copy)]
 pub struct DeclaredColumn {
+    /// Its key in the YAML of `ingest`.
     pub setting: &'static str,
     /// For the documentation of the setting.
     pub about: &'static str,
+    /// What stands in its cells.
     pub shape: ColumnShape,
     /// What its numbers are; [`Quantity::Number`] for texts, and for directions: 1, -1 or 0.
     pub quantity: Quantity,
@@ -17,12 +19,14 @@ pub struct DeclaredColumn {
     pub stored: &'static [&'static str],
     /// Settings, itself among them, of which all are mapped or none.
     pub together: &'static [&'static str],
+    /// Whether it is the measured value, its uncertainty, or a name.
     pub part: Part,
 }
 
 /// How a file writes a quantity.
 #[derive(Debug, Clone, Copy)]
 pub enum ColumnShape {
+    /// Names.
     Text,
     /// Whole numbers.
     Count,
@@ -30,13 +34,16 @@ pub enum ColumnShape {
     Number,
     /// A number for each joint; of prismatic ones it may be another quantity with a range of its own.
     Joints {
+        /// That quantity and its range, SI.
         prismatic: Option<(Quantity, [f64; 2])>,
     },
     /// Several numbers in one of several conventions.
     Conventions(&'static Conventions),
     /// One number a row: so many standard deviations, unless the file says another number, of each of these settings.
     Uncertainty {
+        /// Settings that it is the standard deviation of.
         of: &'static [&'static str],
+        /// Standard deviations that the number stands for.
         coverage: f64,
     },
 }
@@ -46,9 +53,11 @@ pub enum ColumnShape {
 pub struct Conventions {
     /// The settings' type in the pipeline's schema, and its documentation.
     pub name: &'static str,
+    /// What it holds, for the schema of the YAML.
     pub about: &'static str,
     /// Documentation of the setting `unit`.
     pub unit: &'static str,
+    /// Conventions that may be declared.
     pub all: &'static [Convention],
     /// What to say where none or several are given.
     pub allowed: &'static str,
@@ -59,7 +68,9 @@ pub struct Conventions {
 pub struct Convention {
     /// The setting, e.g. `quaternion`.
     pub name: &'static str,
+    /// What its numbers are, for the schema of the YAML.
     pub about: &'static str,
+    /// How many columns it takes.
     pub numbers: usize,
     /// Without a unit; the column's quantity otherwise.
     pub unitless: bool,
@@ -105,14 +116,17 @@ impl DeclaredColumn {
         }
     }
 
+    /// The same as another part of the measurement.
     pub const fn as_part(self, part: Part) -> Self {
         Self { part, ..self }
     }
 
+    /// The same, which must be mapped together with these settings.
     pub const fn together(self, together: &'static [&'static str]) -> Self {
         Self { together, ..self }
     }
 
+    /// Whether its cells are names.
     pub fn is_text(&self) -> bool {
         matches!(self.shape, ColumnShape::Text)
     }

@@ -8,6 +8,7 @@ use crate::units::Quantity::Length;
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::collections::BTreeMap;
 
+/// The kind `distance`.
 #[derive(Debug, Clone, Copy)]
 pub struct Distance;
 

@@ -9,6 +9,7 @@ use crate::robot::Measurements;
 use crate::units::Quantity::Angle;
 use nalgebra::{Matrix3, Vector3};
 
+/// The kind `inclination`.
 #[derive(Debug, Clone, Copy)]
 pub struct Inclination;
 

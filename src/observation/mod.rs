@@ -44,6 +44,7 @@ pub struct KindDescription {
     pub name: &'static str,
     /// What a prediction calls it that measured it.
     pub word: &'static str,
+    /// Whether it measures lengths or angles.
     pub dimension: Dimension,
     /// Values of a row.
     pub axes: usize,
@@ -51,6 +52,7 @@ pub struct KindDescription {
     pub columns: &'static [DeclaredColumn],
     /// Whether it must come with its standard deviation; else the instrument's noise is taken.
     pub own_sigma: bool,
+    /// What it adds to the rank that theory gives.
     pub rank: Rank,
     /// Whether rows that stand out by it are named and set aside; else they are only down-weighted, by Huber's loss.
     pub is_screened: bool,
@@ -69,8 +71,11 @@ pub struct Rank {
 
 /// What of a target's motion a kind sees, in standard deviations: of the point, the orientation, the vector from the anchor.
 pub enum Sensitivity {
+    /// Derivatives are those of the point.
     Point(Weight),
+    /// Derivatives are those of the rotation of the target.
     Rotation(Weight),
+    /// Derivatives are those of the point, along the line from the anchor.
     FromAnchor(Weight),
 }
 
@@ -87,6 +92,7 @@ impl Sensitivity {
 
 /// A kind of measurement.
 pub trait MeasurementKind: Sync {
+    /// What it is, in words and numbers.
     fn about(&self) -> &'static KindDescription;
 
     /// Measured - predicted (m or rad, zero on lines without a value) and the variance of each value; `None` where the row measured
@@ -116,6 +122,7 @@ pub trait MeasurementKind: Sync {
         data.readings.iter().any(|readings| readings.kind == self.about().name)
     }
 
+    /// What a row holds of it; none where nothing was measured.
     fn reading<'a>(&self, data: &'a Measurements, row: usize) -> Option<Reading<'a>> {
         data.reading(self.about().name, row)
     }

@@ -10,6 +10,7 @@ use crate::spatial::Pose;
 use crate::units::Quantity::Angle;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
+/// The kind `orientation`.
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation;
 

@@ -6,6 +6,7 @@ use crate::robot::Measurements;
 use crate::units::Quantity::Length;
 use nalgebra::Vector3;
 
+/// The kind `point`.
 #[derive(Debug, Clone, Copy)]
 pub struct PointKind;
 

@@ -15,6 +15,7 @@ pub struct ExcessSigma {
 }
 
 impl ExcessSigma {
+    /// The part of a dimension: m, or rad.
     pub fn of(&self, dimension: Dimension) -> f64 {
         match dimension {
             Dimension::Length => self.length,
@@ -26,6 +27,7 @@ impl ExcessSigma {
 /// Measured - predicted of one kind in one row.
 #[derive(Clone, Copy)]
 pub struct Residual {
+    /// What was measured.
     pub kind: &'static dyn MeasurementKind,
     /// Of the recording.
     pub row: usize,
@@ -44,6 +46,7 @@ impl Residual {
         Some(Self { kind, row, error, axes: kind.axes(data, row), variance })
     }
 
+    /// Whether it is a length or an angle.
     pub fn dimension(&self) -> Dimension {
         self.kind.about().dimension
     }

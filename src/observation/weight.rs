@@ -40,6 +40,7 @@ impl Weight {
         }
     }
 
+    /// The residual in standard deviations, axis by axis.
     pub fn apply(&self, error: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Axes(weight) => error.component_mul(weight),

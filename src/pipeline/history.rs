@@ -20,7 +20,7 @@ pub fn find_run(store: &Store, text: &str) -> Result<String> {
         return match complete(store, &runs, back)? {
             Ok(run) => Ok(run),
             Err(0) => nothing(format!(
-                "the store has no complete run of `calib run`; the last run of all is {newest}, `calib log` tells what it is"
+                "the store has no complete run of `calib run`; the last run of all is {newest}, `calib log` shows it"
             )),
             Err(count) => nothing(format!("the store has {} of `calib run`", counted(count, "complete run"))),
         };

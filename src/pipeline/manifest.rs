@@ -14,13 +14,17 @@ const MANIFEST_FORMAT: u32 = 1;
 /// What the engine cannot know by itself: who runs it, where and when.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
+    /// Which calib.
     pub tool: Tool,
+    /// Which machine.
     pub host: Host,
     /// Who ran it, where that is known and wanted.
     pub user: Option<String>,
     /// Variables that calib and its libraries look at, where they are set.
     pub environment: BTreeMap<String, String>,
+    /// As it was typed, word by word.
     pub command_line: Vec<String>,
+    /// The clock.
     pub now: fn() -> std::time::SystemTime,
     /// Bytes that this process had in use at most, where that is known.
     pub peak_memory: fn() -> Option<u64>,
@@ -28,62 +32,91 @@ pub struct Surroundings {
     pub run_id: String,
 }
 
+/// The program that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tool {
+    /// `calib`.
     pub name: String,
+    /// Of the package.
     pub version: String,
+    /// Architecture and operating system.
     pub target: String,
     /// Of the sources and of the compiler, where whoever built it said so (`CALIB_REVISION`, `CALIB_RUSTC`).
     #[serde(default)]
     pub revision: Option<String>,
+    /// Version of the compiler.
     #[serde(default)]
     pub rustc: Option<String>,
 }
 
+/// The machine that ran.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Host {
+    /// Of the machine.
     pub name: String,
+    /// Operating system.
     pub os: String,
+    /// Of the processor.
     pub architecture: String,
+    /// That the process may use.
     pub cores: usize,
 }
 
+/// The record of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Manifest {
     manifest_format: u32,
+    /// ULID: ids sort by time.
     pub run_id: String,
+    /// What the run was for.
     #[serde(default)]
     pub purpose: Purpose,
     /// The run that ended last before this one, with the seal of its manifest.
     pub previous: Option<Link>,
+    /// How it ended, or that it has not.
     pub status: RunStatus,
     /// What went wrong, where the status says so.
     pub error: Option<String>,
+    /// What was run.
     pub pipeline: PipelineRecord,
+    /// Given on the command line.
     pub overrides: Vec<Override>,
+    /// Which calib.
     pub tool: Tool,
+    /// Which machine.
     pub host: Host,
+    /// Who, where that is known.
     pub user: Option<String>,
+    /// Variables that may change speed, never results.
     pub environment: BTreeMap<String, String>,
+    /// As it was typed, word by word.
     pub command_line: Vec<String>,
+    /// Of the pipeline.
     pub seed: u64,
+    /// Worker threads.
     pub jobs: usize,
     /// RFC 3339, UTC.
     pub started: String,
+    /// RFC 3339, UTC.
     pub ended: Option<String>,
+    /// From start to end.
     pub wall_seconds: Option<f64>,
     /// Of the whole process up to the end of this run.
     #[serde(default)]
     pub peak_memory_bytes: Option<u64>,
+    /// In the order of the pipeline.
     pub stages: Vec<StageReport>,
 }
 
+/// How a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunStatus {
     /// Running, or killed.
     Running,
+    /// Every selected stage is done.
     Done,
+    /// A stage failed.
     Failed,
 }
 
@@ -98,12 +131,15 @@ pub struct PipelineRecord {
     pub resolved: serde_json::Value,
 }
 
+/// How a stage stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StageStatus {
     /// Its tables were there already.
     Cached,
+    /// Its work was done in this run.
     Executed,
+    /// Its work ended with an error.
     Failed,
     /// Outside of what was selected, or never reached.
     NotRun,
@@ -112,19 +148,29 @@ pub enum StageStatus {
 /// One stage's report: its state, keys and tables.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct StageReport {
+    /// In the pipeline.
     pub id: String,
+    /// Its kind.
     pub uses: String,
+    /// Version of its algorithm.
     pub implementation: u32,
+    /// How it stands.
     pub status: StageStatus,
     /// Why it was executed.
     pub reason: Option<String>,
+    /// The key of its record.
     pub action: Option<ActionId>,
     /// The components of `action`.
     pub key: Option<StageKey>,
+    /// Tables that it read.
     pub inputs: Vec<InputRecord>,
+    /// Raw files that it read.
     pub files: Vec<FileRecord>,
+    /// Tables that it wrote.
     pub outputs: Vec<OutputRecord>,
+    /// What it told.
     pub notes: Vec<String>,
+    /// What it warned of.
     pub warnings: Vec<String>,
     /// Of the execution, also where it was an earlier run's.
     pub wall_seconds: Option<f64>,
@@ -148,12 +194,16 @@ pub struct FileRecord {
     pub blake3: FileHash,
 }
 
+/// A table that a stage wrote.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct OutputRecord {
+    /// On which it was written.
     pub port: String,
+    /// The name of its schema.
     pub kind: String,
     /// Where people find it.
     pub path: Option<PathBuf>,
+    /// Where it is.
     #[serde(flatten)]
     pub table: TableRef,
 }
@@ -187,6 +237,7 @@ impl Manifest {
         }
     }
 
+    /// The report of a stage by its id.
     pub fn stage(&self, id: &str) -> Option<&StageReport> {
         self.stages.iter().find(|stage| stage.id == id)
     }

@@ -12,8 +12,11 @@ pub enum Purpose {
     Run,
     /// For what the verb needs of the pipeline, which may be a part.
     Compensate,
+    /// `calib diagnose`.
     Diagnose,
+    /// `calib export`.
     Export,
+    /// `calib simulate`.
     Simulate,
     /// One robot of a fleet.
     Fleet,
@@ -22,8 +25,10 @@ pub enum Purpose {
 /// How to run a plan.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
+    /// Which stages.
     pub selection: Selection,
     /// Worker threads; no result depends on it.
     pub jobs: usize,
+    /// For the log.
     pub purpose: Purpose,
 }

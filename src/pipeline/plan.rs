@@ -14,22 +14,33 @@ use std::path::{Path, PathBuf};
 pub struct Plan {
     /// The YAML file as it was named.
     pub file: PathBuf,
+    /// The YAML as it was read.
     pub text: String,
+    /// Part of the paths of its tables.
     pub name: String,
+    /// Every random number comes from it.
     pub seed: u64,
     /// In the order of the YAML; every stage comes after those it reads.
     pub stages: Vec<PlannedStage>,
     /// The YAML with variables and overrides filled in.
     pub resolved: serde_json::Value,
+    /// Given on the command line.
     pub overrides: Vec<Override>,
 }
 
+/// A stage that is checked and wired.
 pub struct PlannedStage {
+    /// In the pipeline.
     pub id: String,
+    /// Its kind.
     pub entry: &'static StageEntry,
+    /// With its settings.
     pub stage: Box<dyn ErasedStage>,
+    /// Raw files that it reads.
     pub files: Vec<InputFile>,
+    /// Where its tables come from.
     pub inputs: Vec<Input>,
+    /// Tables that it writes.
     pub outputs: Vec<Port>,
 }
 

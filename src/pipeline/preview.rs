@@ -12,26 +12,35 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "status")]
 pub enum Prospect {
+    /// Its tables are there.
     Cached,
+    /// It would run.
     Run {
+        /// Why.
         reason: String,
     },
     /// Not known before another stage has run.
     Pending {
+        /// Ids of stages.
         on: String,
     },
     /// Outside of `--only`, `--from`, `--until`, and not cached.
     NotSelected,
 }
 
+/// What a run would do with a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Forecast {
+    /// In the pipeline.
     pub id: String,
+    /// Its kind.
     pub uses: String,
+    /// Whether it would run.
     #[serde(flatten)]
     pub prospect: Prospect,
 }
 
+/// What a run would do, stage by stage. Fails where files cannot be read.
 pub fn preview(plan: &Plan, store: &Store, selection: &Selection) -> Result<Vec<Forecast>> {
     let selected = selection.of(plan)?;
     let mut state = RunState::new(plan);

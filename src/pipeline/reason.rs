@@ -50,7 +50,9 @@ pub struct KeyChange {
     pub what: &'static str,
     /// The setting, port or file.
     pub name: String,
+    /// In the earlier key.
     pub before: String,
+    /// In this key.
     pub now: String,
 }
 

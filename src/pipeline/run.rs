@@ -19,6 +19,7 @@ const GROUP: f64 = 1.0;
 
 /// A run that went through.
 pub struct CompletedRun {
+    /// As it was written.
     pub manifest: Manifest,
     /// Reports and other documents, where people find them.
     pub documents: Vec<PathBuf>,
@@ -29,6 +30,7 @@ impl CompletedRun {
     pub fn tables<'o>(&'o self, kind: &'o str) -> impl Iterator<Item = &'o OutputRecord> {
         self.manifest.stages.iter().flat_map(|stage| &stage.outputs).filter(move |output| output.kind == kind)
     }
+    /// Whether every stage was cached.
     pub fn nothing_done(&self) -> bool {
         self.manifest.stages.iter().all(|stage| stage.status == StageStatus::Cached)
     }

@@ -7,8 +7,11 @@ use std::ops::RangeInclusive;
 /// What the person asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Selection {
+    /// This stage alone.
     pub only: Option<String>,
+    /// This stage and those after it.
     pub from: Option<String>,
+    /// Up to this stage.
     pub until: Option<String>,
     /// Run again though cached: all selected stages, or those named.
     pub force: Option<Vec<String>>,

@@ -15,9 +15,11 @@ pub trait Observer: Sync {
     fn stage_ends(&self, report: &super::manifest::StageReport);
     /// Units of work: what is done, how many in all, and what a unit is called.
     fn begin(&self, id: &str, what: &str, total: Option<u64>, unit: &str);
+    /// So much of the bar of a stage is done.
     fn advance(&self, id: &str, done: u64, message: &str);
     /// Lines while the stage runs; they are in its report too.
     fn note(&self, id: &str, line: &str);
+    /// A warning of a stage.
     fn warn(&self, id: &str, line: &str);
 }
 

@@ -48,6 +48,7 @@ pub(super) struct PortSources {
 pub struct InputFile {
     /// Where it stands below `with`.
     pub place: String,
+    /// From the working directory.
     pub path: PathBuf,
 }
 

@@ -8,14 +8,18 @@ use crate::yaml::Trouble;
 /// An output port of an earlier stage, both counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Origin {
+    /// Position in the plan.
     pub stage: usize,
+    /// Position among its outputs.
     pub port: usize,
 }
 
 /// An input port with the tables that feed it, in pipeline order.
 #[derive(Debug, Clone)]
 pub struct Input {
+    /// What is read.
     pub port: Port,
+    /// Who writes it; several where every one is read.
     pub from: Vec<Origin>,
 }
 

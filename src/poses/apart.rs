@@ -41,7 +41,9 @@ pub struct Apart<'a> {
 
 /// A run by its name, and which of its diagnoses.
 pub struct RunStage<'a> {
+    /// As `calib log` names it.
     pub run: &'a str,
+    /// The stage, where there are several diagnoses.
     pub step: Option<&'a str>,
 }
 
@@ -144,7 +146,7 @@ fn name(text: &str) -> Result<(&str, Option<Place>)> {
 fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> Result<(FindingRow, EffectAtPlace)> {
     let list: Vec<String> = findings.0.iter().map(|row| format!("{} ({}@{})", row.rank, row.effect, row.place)).collect();
     if list.is_empty() {
-        return Err(Error::spec(place, "found nothing that could be told from something else"));
+        return Err(Error::spec(place, "has no finding that could be separated from another cause"));
     }
     // Of equals the first by name, as the table is sorted.
     let closest = |row: &FindingRow| {
@@ -154,14 +156,14 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     };
     let name_one = |found: &FindingRow| {
         let message = format!(
-            "{} at {} has no rival: this recording tells it from all others; name one as a second, e.g. 'link_compliance@link 2'",
+            "{} at {} has no rival: this recording separates it from all others; name one as a second, e.g. 'link_compliance@link 2'",
             found.effect, found.place
         );
         Error::spec("--separate", message)
     };
     let Some(first) = names.first() else {
         let found = findings.0.iter().find_map(|row| Some((row.clone(), closest(row)?)));
-        let message = format!("no finding has a rival; name a finding and what to tell it from: --separate {list:?}");
+        let message = format!("no finding has a rival; name a finding and the cause to separate it from: --separate {list:?}");
         return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
     };
     let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first)) {

@@ -12,9 +12,11 @@ use std::sync::Arc;
 
 /// Poses to drive to.
 pub struct Drive<'a> {
+    /// Whose joint names the file carries.
     pub robot: &'a RobotDescription,
     /// rad or m.
     pub ranges: &'a [[f64; 2]],
+    /// In the order of driving.
     pub poses: &'a Measurements,
     /// +1 or -1, row-major.
     pub direction: &'a [f64],
@@ -73,6 +75,7 @@ fn kind(path: &Path) -> Option<&'static str> {
     ["csv", "parquet"].into_iter().find(|known| *known == ending)
 }
 
+/// Writes the poses to a .csv or .parquet file. Fails where the file cannot be written.
 pub fn write(path: &Path, drive: &Drive) -> Result<()> {
     let bytes = if kind(path) == Some("parquet") { parquet(drive)? } else { csv(drive).into_bytes() };
     std::fs::write(path, bytes).map_err(|error| Error::store(path.display().to_string(), format!("cannot be written: {error}")))

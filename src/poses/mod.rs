@@ -18,9 +18,11 @@ use std::path::PathBuf;
 /// What is asked for, in the units of the command line.
 #[derive(Debug, Clone)]
 pub struct PoseRequest {
+    /// How many poses.
     pub count: usize,
     /// Random poses to choose from.
     pub candidates: usize,
+    /// The same seed gives the same poses.
     pub seed: u64,
     /// Effects to tell; none: all that `identify` estimates.
     pub effects: Vec<String>,
@@ -44,8 +46,11 @@ pub struct PoseRequest {
 pub trait PoseAnswer {
     /// None where no pose helps.
     fn drive(&self) -> Option<Drive<'_>>;
+    /// For a person.
     fn text(&self) -> String;
+    /// For a program.
     fn document(&self) -> serde_json::Value;
+    /// What a person must not overlook, a sentence each.
     fn warnings(&self) -> &[String] {
         &[]
     }

@@ -36,7 +36,9 @@ const SIGMA: f64 = 0.02;
 
 /// A robot file, and the URDF that it refers to.
 pub struct RobotFiles<'a> {
+    /// The robot file.
     pub file: &'a Path,
+    /// The URDF that it refers to.
     pub urdf: Option<&'a Path>,
 }
 

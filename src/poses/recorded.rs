@@ -29,7 +29,7 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription) -> Result<(Measur
         ),
         other => other,
     })?;
-    let warning = (!vouched).then(|| format!("{label} carries no content hash: whether it was changed cannot be told"));
+    let warning = (!vouched).then(|| format!("{label} carries no content hash: its content cannot be verified"));
     let prismatic: Vec<bool> = robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     if table.prismatic != prismatic {
         let message = format!("has {} joints of other number or kind than the robot file's {}", table.joints, prismatic.len());

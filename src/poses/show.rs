@@ -51,7 +51,7 @@ fn text(work: &PoseProposal) -> String {
     let proposal = &work.proposal;
     let asked = work.parameters.len();
     let mut text = format!(
-        "{} for {} of {} that position data can tell ({})\n",
+        "{} for {} of {} that position data can determine ({})\n",
         counted(proposal.poses.rows(), "pose"),
         proposal.jacobian.free().len(),
         counted(asked, "parameter"),

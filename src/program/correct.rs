@@ -16,7 +16,9 @@ const MOST_FAULTS: usize = 500;
 pub struct ProgramFile<'a> {
     /// How messages name it.
     pub place: &'a str,
+    /// As it is in the file.
     pub text: &'a [u8],
+    /// By the ending of the file.
     pub language: Language,
 }
 

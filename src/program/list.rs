@@ -12,6 +12,7 @@ pub const MOST_BYTES: usize = 64 << 20;
 pub struct ListedJoints {
     /// Line at which its first number stands, from 1.
     pub line: usize,
+    /// As the program calls it.
     pub name: String,
     /// Six joints, deg.
     pub joints: Vec<f64>,
@@ -22,6 +23,7 @@ pub struct ListedJoints {
 /// All joint positions that a program declares, in its order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointList {
+    /// In the order of the program.
     pub rows: Vec<ListedJoints>,
     /// How many poses it declares, whose joints it does not say.
     pub poses: usize,

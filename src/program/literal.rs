@@ -17,6 +17,7 @@ pub enum TargetKind {
 /// A target of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Literal {
+    /// Joints or pose.
     pub kind: TargetKind,
     /// In the order of the kind.
     pub values: Vec<f64>,

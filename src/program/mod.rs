@@ -23,7 +23,9 @@ use std::ops::Range;
 /// The languages of controllers that are known here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Language {
+    /// KUKA: .src, .dat.
     Krl,
+    /// ABB: .mod.
     Rapid,
 }
 
@@ -41,7 +43,9 @@ impl Language {
 /// What becomes of a target that states some of its numbers, as `LIN {X 10}`: the controller keeps the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Partial {
+    /// It refuses the whole program.
     Refused,
+    /// It stays as it is, with a warning.
     Left,
 }
 
@@ -51,8 +55,11 @@ const DEPTH: usize = 16;
 /// Something said of a place in a program; line and column count from 1, columns in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
+    /// From 1.
     pub line: usize,
+    /// From 1.
     pub column: usize,
+    /// What is wrong, and what is allowed.
     pub message: String,
 }
 
@@ -86,6 +93,7 @@ pub struct SolvedLiteral {
 /// A program with its targets corrected.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rewritten {
+    /// The program with its targets replaced.
     pub bytes: Vec<u8>,
     /// In the order of the program.
     pub warnings: Vec<Note>,

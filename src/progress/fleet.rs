@@ -33,6 +33,7 @@ struct State {
 }
 
 impl FleetProgress {
+    /// One bar for `total` robots and a line for each worker.
     pub fn new(verbosity: Verbosity, workers: usize, total: usize) -> Self {
         let terminal = verbosity == Verbosity::Normal && std::io::stderr().is_terminal();
         let bars = terminal.then(|| {

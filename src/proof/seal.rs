@@ -15,7 +15,9 @@ const FORMAT: u32 = 1;
 const HASH: &str = "SHA-256";
 /// Where what belongs to a set lies in its folder.
 pub const SEAL: &str = "seal.json";
+/// Folder of what is diagnosed.
 pub const RECORDINGS: &str = "recordings";
+/// Folder of the truths.
 pub const SEALED: &str = "sealed";
 
 /// Hashes by path below the folder of the set, with `/`.

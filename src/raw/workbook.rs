@@ -127,7 +127,7 @@ impl Workbook {
                 cells.push(([row, column], [start, texts.len()]));
             }
             if cells.len() > MOST_CELLS || texts.len() > MOST_LINES || row >= MOST_ROWS {
-                return Err(format!("more than {MOST_CELLS} cells; allowed: so many, or the sheet saved as CSV"));
+                return Err(format!("more than {MOST_CELLS} cells; allowed: up to that, or the sheet saved as CSV"));
             }
             Ok(true)
         })?;

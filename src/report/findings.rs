@@ -124,7 +124,7 @@ fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
         ),
     };
     match tables.withdrawn.iter().find(|gone| gone.step == verdict.step) {
-        Some(gone) => format!("This model does not stand for the run: {gone}. {said}"),
+        Some(gone) => format!("This step is not the one that the run uses: {gone}. {said}"),
         None => said,
     }
 }
@@ -152,7 +152,7 @@ fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
             "that it is this effect at this place; what is missing to 1 is below",
         ),
         ("of the place", share(row.place_probability), "that it acts at this place, whatever it is"),
-        ("of none", share(row.none_probability), "that it is neither this effect nor any that is named beside it"),
+        ("of none", share(row.none_probability), "that it is neither this effect nor any of its rivals"),
         ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
         ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
         ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),

@@ -9,8 +9,11 @@ use serde::Serialize;
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct AcceptanceLimits {
+    /// Of the held-out points.
     pub mean_mm: Option<f64>,
+    /// Of the held-out points, 95th percentile.
     pub p95_mm: Option<f64>,
+    /// Of the held-out points.
     pub max_mm: Option<f64>,
 }
 

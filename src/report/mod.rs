@@ -31,23 +31,41 @@ use std::collections::BTreeMap;
 
 /// What a report is made of; lists are in pipeline order and may be empty.
 pub struct Tables {
+    /// Errors of every step and set.
     pub statistics: Statistics,
+    /// Of every step that predicts.
     pub prediction: Vec<Prediction>,
+    /// Of the last identified model.
     pub parameters: Parameters,
+    /// The nominal arm.
     pub robot: Robot,
+    /// What was measured.
     pub recording: Recording,
+    /// Who is fitted, who judges.
     pub split: Split,
+    /// What was read from each file.
     pub intake: Vec<Intake>,
+    /// Rows that could not be used.
     pub rejected: Vec<Rejected>,
+    /// Course of every fit.
     pub fit: Vec<Fit>,
+    /// What the data determine.
     pub observability: Vec<Observability>,
+    /// Course of every training.
     pub training: Vec<Training>,
+    /// Rivals of learned corrections.
     pub corrections: Vec<Corrections>,
+    /// Of every diagnosis.
     pub verdict: Vec<Verdict>,
+    /// Of every diagnosis.
     pub findings: Vec<Findings>,
+    /// Of every diagnosis.
     pub finding_numbers: Vec<FindingNumbers>,
+    /// Of every diagnosis.
     pub rivals: Vec<Rivals>,
+    /// Rows that were set aside.
     pub suspects: Vec<Suspects>,
+    /// Findings over what reveals them.
     pub curves: Curves,
     /// The step that the report speaks of; without one, the last.
     pub standing: Option<String>,
@@ -57,9 +75,11 @@ pub struct Tables {
 
 /// What the person who asked for the report chose.
 pub struct ReportOptions<'a> {
+    /// Head of the page.
     pub title: Option<&'a str>,
     /// The held-out set of the first sentence; else the one with most points.
     pub set: Option<&'a str>,
+    /// What the user calls good enough.
     pub limits: AcceptanceLimits,
     /// Who, with what, where and when: shown as it was given.
     pub identity: &'a BTreeMap<String, String>,
@@ -89,7 +109,9 @@ struct Page<'a> {
 
 /// The report as HTML and as JSON.
 pub struct Pages {
+    /// One file that needs no other.
     pub html: String,
+    /// The same for programs.
     pub json: String,
 }
 

@@ -3,14 +3,18 @@
 /// What a joint does along its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
+    /// Turns about its axis; position in rad.
     Revolute,
+    /// Slides along its axis; position in m.
     Prismatic,
 }
 
 /// One joint and the body (link) that it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointDescription {
+    /// As people and files call it.
     pub name: String,
+    /// How it moves.
     pub kind: JointKind,
     /// Unit vector along the axis, zero pose, base frame.
     pub axis: [f64; 3],
@@ -24,26 +28,33 @@ pub struct JointDescription {
     pub motor_constant: Option<f64>,
     /// Mass of the body moved by this joint, kg, and its centre, m, zero pose, base frame.
     pub mass: Option<f64>,
+    /// Centre of mass of its link, m, base frame at the zero pose.
     pub centre: Option<[f64; 3]>,
 }
 
 /// Joint `moved` turns by `ratio` times the angle of joint `by` (both from 0), as the controller believes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
+    /// Joint that moves, from 0.
     pub moved: usize,
+    /// Joint that moves it, from 0.
     pub by: usize,
+    /// Travel of `moved` for each unit of travel of `by`.
     pub ratio: f64,
 }
 
 /// A serial robot: joints from the base to the tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
+    /// As people and files call it.
     pub name: String,
+    /// From base to tool.
     pub joints: Vec<JointDescription>,
     /// The measured point, m, zero pose, base frame.
     pub tool: [f64; 3],
     /// Orientation of the tool frame at the zero pose, row-major.
     pub tool_rotation: [[f64; 3]; 3],
+    /// What the controller believes of joints that move each other.
     pub couplings: Vec<Coupling>,
     /// Rated payload, kg; a recording says how much of it was on in each row.
     pub payload_mass: f64,

@@ -20,8 +20,11 @@ pub struct Instrument {
 /// An instrument by its name, with the document that states its figures.
 #[derive(Debug, Clone, Copy)]
 pub struct PublishedInstrument {
+    /// As the YAML names it.
     pub name: &'static str,
+    /// Its accuracy.
     pub figures: Instrument,
+    /// Data sheet that states it.
     pub source: &'static str,
 }
 
@@ -88,8 +91,10 @@ pub enum SigmaSource {
 }
 
 impl SigmaSource {
+    /// All of them, in order of preference.
     pub const ALL: [Self; 3] = [Self::Recorded, Self::Instrument, Self::Inferred];
 
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Recorded => "recorded",
@@ -112,8 +117,10 @@ pub enum NoiseBasis {
 }
 
 impl NoiseBasis {
+    /// All of them, in order of preference.
     pub const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
 
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Repeats => "repeats",
@@ -122,6 +129,7 @@ impl NoiseBasis {
         }
     }
 
+    /// The basis of a name in a table.
     pub fn parse(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|basis| basis.name() == name)
     }

@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
 #[derive(Debug, Clone, Default)]
 pub struct Measurements {
+    /// Joints of the arm, the width of per-joint rows.
     pub joints: usize,
     /// rad or m.
     pub q: Vec<f64>,
@@ -44,14 +45,17 @@ pub struct Measurements {
 }
 
 impl Measurements {
+    /// How many points were measured.
     pub fn rows(&self) -> usize {
         self.position.len()
     }
 
+    /// Joint positions of a row, rad or m.
     pub fn q(&self, row: usize) -> &[f64] {
         &self.q[row * self.joints..(row + 1) * self.joints]
     }
 
+    /// Motor currents of a row, A, where recorded.
     pub fn current(&self, row: usize) -> Option<&[f64]> {
         self.current.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints])
     }

@@ -8,11 +8,24 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Memory {
     /// Side to which pre-sliding friction has brought a joint: it fades in over a travel (rad or m) after each reversal, -1 to 1 (Dahl).
-    Slip { joint: usize, travel: f64 },
+    Slip {
+        /// From 0.
+        joint: usize,
+        /// rad or m.
+        travel: f64,
+    },
     /// Speed of a joint of late (rad/s or m/s), forgotten with a cooling time (s).
-    Work { joint: usize, cooling: f64 },
+    Work {
+        /// From 0.
+        joint: usize,
+        /// s.
+        cooling: f64,
+    },
     /// The recorded temperature (C) behind a time constant (s).
-    Temperature { lag: f64 },
+    Temperature {
+        /// s.
+        lag: f64,
+    },
 }
 
 impl Memory {

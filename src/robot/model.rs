@@ -21,6 +21,7 @@ pub struct RobotModel {
 }
 
 impl RobotModel {
+    /// The chain of a description, with nothing measured yet.
     pub fn new(description: RobotDescription) -> Self {
         let axes: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.axis).normalize()).collect();
         let points: Vec<Vector3<f64>> = description.joints.iter().map(|joint| Vector3::from(joint.point)).collect();
@@ -46,6 +47,7 @@ impl RobotModel {
         Self { setup, ..self }
     }
 
+    /// Targets and anchors that belong to the arm as it was measured.
     pub fn setup(&self) -> &MeasurementSetup {
         &self.setup
     }
@@ -55,6 +57,7 @@ impl RobotModel {
         target.and_then(|target| self.setup.targets.get(target)).map_or(&self.home, |target| &target.seat)
     }
 
+    /// The data that the model was made of.
     pub fn description(&self) -> &RobotDescription {
         &self.description
     }
@@ -79,6 +82,7 @@ impl RobotModel {
         &self.points[joint]
     }
 
+    /// Whether a joint (from 0) turns; else it slides.
     pub fn is_revolute(&self, joint: usize) -> bool {
         self.description.joints[joint].kind == JointKind::Revolute
     }

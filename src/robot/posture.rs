@@ -27,12 +27,14 @@ pub struct LoadCorrection {
 }
 
 impl LoadCorrection {
+    /// No correction, of an arm with so many joints.
     pub fn new(joints: usize) -> Self {
         let none = vec![0.0; joints];
         let body_moment = vec![Vector3::zeros(); joints];
         Self { payload: 0.0, payload_moment: Vector3::zeros(), body: none.clone(), body_moment, torque: none }
     }
 
+    /// Sets every correction to zero.
     pub fn clear(&mut self) {
         self.payload = 0.0;
         self.payload_moment = Vector3::zeros();
@@ -45,7 +47,9 @@ impl LoadCorrection {
 /// Mass (kg) and first moment (kg m, common frame) of all that hangs beyond a station.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Carried {
+    /// kg.
     pub mass: f64,
+    /// First moment, kg m.
     pub moment: Vector3<f64>,
 }
 

@@ -27,13 +27,16 @@ pub struct Readings {
 /// What a row measured of one kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading<'a> {
+    /// SI, as many as the kind has.
     pub values: &'a [f64],
+    /// Standard deviation of each, SI.
     pub sigma: f64,
     /// Empty where it has no name.
     pub anchor: &'a str,
 }
 
 impl Readings {
+    /// What was read in a row; none where nothing was.
     pub fn row(&self, row: usize) -> Option<Reading<'_>> {
         let values = &self.values[row * self.width..(row + 1) * self.width];
         let anchor = self.anchor.as_ref().map_or("", |anchor| anchor.name(row));
@@ -50,6 +53,7 @@ impl Named {
         Self { of: rows.map(number).collect(), names }
     }
 
+    /// The name that a row carries; empty where it carries none.
     pub fn name(&self, row: usize) -> &str {
         self.of.get(row).and_then(|number| self.names.get(*number as usize)).map_or("", String::as_str)
     }

@@ -13,9 +13,13 @@ const PARALLEL: f64 = 1e-12;
 /// Numbers of a row, m and rad.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct DhRow {
+    /// rad.
     pub theta: f64,
+    /// m.
     pub d: f64,
+    /// m.
     pub a: f64,
+    /// rad.
     pub alpha: f64,
 }
 
@@ -39,6 +43,7 @@ impl DhRow {
 }
 
 impl DhTable {
+    /// The table of an arm; common normals fix what the convention leaves free.
     pub fn of(robot: &RobotModel) -> Self {
         let mut frame = Pose::identity();
         let mut rows = Vec::new();

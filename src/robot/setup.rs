@@ -28,14 +28,17 @@ pub struct Anchor {
 pub struct MeasurementSetup {
     /// None: the robot's tool point is what is measured.
     pub targets: Vec<Target>,
+    /// Fixed ends of distances.
     pub anchors: Vec<Anchor>,
 }
 
 impl MeasurementSetup {
+    /// The number of a target by its name.
     pub fn target(&self, name: &str) -> Option<usize> {
         self.targets.iter().position(|target| target.name == name)
     }
 
+    /// The number of an anchor by its name.
     pub fn anchor(&self, name: &str) -> Option<usize> {
         self.anchors.iter().position(|anchor| anchor.name == name)
     }

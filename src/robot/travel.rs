@@ -12,6 +12,7 @@ pub struct Travel {
 const SMALL: f64 = 2e-2;
 
 impl Travel {
+    /// The range that holds one value.
     pub fn new(value: f64) -> Self {
         // The same bits on every machine, and no call into the C library, which here costs a fifth of a whole fit.
         let (sine, cosine) = libm::sincos(value);

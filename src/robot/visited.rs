@@ -87,7 +87,9 @@ pub enum Unmeasured {
     Joints(Vec<usize>),
     /// Joints, from 0, where no row was inside their range.
     Gaps(Vec<usize>),
+    /// Declared payload, kg.
     Payload,
+    /// Recorded temperature, C.
     Temperature,
 }
 

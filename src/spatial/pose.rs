@@ -7,7 +7,9 @@ use std::ops::Mul;
 /// Rotation (3x3) and translation (m); maps points of the right frame into the left one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
+    /// Orthonormal, right-handed.
     pub rotation: Matrix3<f64>,
+    /// m.
     pub translation: Vector3<f64>,
 }
 
@@ -15,10 +17,12 @@ pub struct Pose {
 const SMALL_ANGLE: f64 = 2e-2;
 
 impl Pose {
+    /// No motion.
     pub fn identity() -> Self {
         Self { rotation: Matrix3::identity(), translation: Vector3::zeros() }
     }
 
+    /// A pose from its parts; `rotation` must be orthonormal.
     pub fn new(rotation: Matrix3<f64>, translation: Vector3<f64>) -> Self {
         Self { rotation, translation }
     }
@@ -51,11 +55,13 @@ impl Pose {
         }
     }
 
+    /// The motion back: `pose * pose.inverse()` is the identity.
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
+    /// The point (m) as it stands after this motion.
     pub fn point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * point + self.translation
     }

@@ -33,6 +33,7 @@ reads! {
     }
 }
 writes! {
+    /// Output ports of `compare`.
     pub struct CompareWrites {
         changes: Changes,
     }
@@ -40,7 +41,7 @@ writes! {
 
 impl Stage for Compare {
     const NAME: &'static str = "compare";
-    const SUMMARY: &'static str = "Tests which parameters changed since an earlier recording of the same robot";
+    const SUMMARY: &'static str = "tests which parameters changed since an earlier recording of the same robot";
     const IMPLEMENTATION: u32 = 3;
     type Reads = CompareReads;
     type Writes = CompareWrites;
@@ -123,9 +124,7 @@ fn table<T: Table>(context: &Context, file: &RawFile) -> Result<T> {
     let loose = from_parquet(&source.label, bytes)?;
     if !loose.vouched {
         let label = &source.label;
-        context
-            .services
-            .warn(format!("{label} carries no content hash: whether it was changed since calib wrote it cannot be told"));
+        context.services.warn(format!("{label} carries no content hash: its content cannot be verified"));
     }
     Ok(loose.table)
 }

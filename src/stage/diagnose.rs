@@ -71,7 +71,8 @@ crate::stage::writes! {
 
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
-    const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
+    const SUMMARY: &'static str =
+        "locates where simulation and recording differ, and names the physics that the model leaves out";
     const IMPLEMENTATION: u32 = 13;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;

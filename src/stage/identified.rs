@@ -248,7 +248,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
         services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
     if fitted.downweighted > 0 {
-        services.note(format!("far off and of less weight: {}", counted(fitted.downweighted, "row")));
+        services.note(format!("far off and down-weighted: {}", counted(fitted.downweighted, "row")));
     }
 }
 

@@ -87,12 +87,14 @@ fn half() -> f64 {
 }
 
 reads! {
+    /// Input ports of `ingest`.
     pub struct IngestReads {
         robot: Robot,
     }
 }
 
 writes! {
+    /// Output ports of `ingest`.
     pub struct IngestWrites {
         recording: StreamedTable<Recording>,
         rejected: StreamedTable<Rejected>,
@@ -102,7 +104,7 @@ writes! {
 
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
-    const SUMMARY: &'static str = "raw delimited files -> recording, with every rejected row and its reason";
+    const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
     const IMPLEMENTATION: u32 = 4;
     type Reads = IngestReads;
     type Writes = IngestWrites;

@@ -179,7 +179,8 @@ writes! {
 
 impl Stage for Learn {
     const NAME: &'static str = "learn";
-    const SUMMARY: &'static str = "learns what the model leaves over: rivals compared, the best kept, and only where it helps";
+    const SUMMARY: &'static str =
+        "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
     const IMPLEMENTATION: u32 = 7;
     type Reads = LearnReads;
     type Writes = LearnWrites;

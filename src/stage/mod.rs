@@ -59,22 +59,30 @@ pub enum Arity {
 /// A named input or output of a stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Port {
+    /// In `reads:` of the YAML.
     pub name: &'static str,
+    /// The name of the schema.
     pub kind: &'static str,
+    /// How many tables it takes.
     pub arity: Arity,
 }
 
 /// What a field of a `reads!` struct may be: `T`, `Option<T>` or `Vec<From<T>>`.
 pub trait PortValue: Sized {
+    /// How many tables it takes.
     const ARITY: Arity;
+    /// The name of the schema.
     const KIND: &'static str;
+    /// The value from the frames that were wired to the port.
     fn take(frames: Vec<(String, Frame)>) -> Result<Self>;
 }
 
 /// A table together with the id of the stage that wrote it.
 #[derive(Debug, Clone)]
 pub struct Labelled<T> {
+    /// Its id.
     pub stage: String,
+    /// What it wrote.
     pub table: T,
 }
 
@@ -102,6 +110,7 @@ impl<T: Table> PortValue for Vec<Labelled<T>> {
 
 /// The input ports of a stage.
 pub trait Reads: Sized {
+    /// In the order of the fields.
     fn ports() -> Vec<Port>;
     /// Takes the frames of each port, in the order of [`Reads::ports`].
     fn take(frames: Vec<Vec<(String, Frame)>>) -> Result<Self>;
@@ -109,13 +118,17 @@ pub trait Reads: Sized {
 
 /// The output ports of a stage.
 pub trait Writes: Sized {
+    /// In the order of the fields.
     fn ports() -> Vec<Port>;
+    /// Checked columns, in the order of the ports. Fails where a value breaks its schema.
     fn give(self) -> Result<Vec<Output>>;
 }
 
 /// What a stage hands back on one port: columns in memory, or a table already streamed through [`Context::sink`].
 pub enum Output {
+    /// Columns in memory.
     Frame(Frame),
+    /// A finished file.
     Streamed(Streamed),
 }
 
@@ -123,7 +136,10 @@ pub enum Output {
 macro_rules! reads {
     ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
         $(#[$doc])*
-        pub struct $name { $( pub $field: $ty, )* }
+        pub struct $name { $(
+            #[doc = concat!("The port `", stringify!($field), "`.")]
+            pub $field: $ty,
+        )* }
         impl crate::stage::Reads for $name {
             fn ports() -> Vec<crate::stage::Port> {
                 vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::PortValue>::KIND, arity: <$ty as crate::stage::PortValue>::ARITY } ),* ]
@@ -139,7 +155,9 @@ macro_rules! reads {
 
 /// What a field of a `writes!` struct may be: a table, or a [`Streamed`] one.
 pub trait Produced {
+    /// The name of the schema.
     const KIND: &'static str;
+    /// Checked columns, or the finished file.
     fn give(self) -> Result<Output>;
 }
 impl<T: Table> Produced for T {
@@ -153,7 +171,10 @@ impl<T: Table> Produced for T {
 macro_rules! writes {
     ($(#[$doc:meta])* pub struct $name:ident { $( $field:ident: $ty:ty, )* }) => {
         $(#[$doc])*
-        pub struct $name { $( pub $field: $ty, )* }
+        pub struct $name { $(
+            #[doc = concat!("The port `", stringify!($field), "`.")]
+            pub $field: $ty,
+        )* }
         impl crate::stage::Writes for $name {
             fn ports() -> Vec<crate::stage::Port> {
                 vec![ $( crate::stage::Port { name: stringify!($field), kind: <$ty as crate::stage::Produced>::KIND, arity: crate::stage::Arity::One } ),* ]
@@ -169,7 +190,9 @@ pub(crate) use {reads, writes};
 
 /// A table written chunk by chunk, for what does not fit into memory.
 pub struct Streamed {
+    /// The name of the schema.
     pub kind: &'static str,
+    /// How many.
     pub rows: u64,
     /// The engine's handle to the finished file.
     pub handle: Box<dyn std::any::Any + Send>,
@@ -179,6 +202,7 @@ pub struct Streamed {
 pub struct StreamedTable<T>(Streamed, std::marker::PhantomData<fn() -> T>);
 
 impl<T: Table> StreamedTable<T> {
+    /// A finished table of this kind; panics where it is another.
     pub fn new(streamed: Streamed) -> Self {
         assert_eq!(streamed.kind, T::KIND, "a sink of another kind");
         Self(streamed, std::marker::PhantomData)
@@ -193,7 +217,9 @@ impl<T: Table> Produced for StreamedTable<T> {
 
 /// Takes chunks of one table, in key order, and checks each against the schema.
 pub trait Sink: Send {
+    /// Takes rows. Fails where they break the schema or the order of the key.
     fn push(&mut self, chunk: Frame) -> Result<()>;
+    /// Ends the table.
     fn finish(self: Box<Self>) -> Result<Streamed>;
 }
 
@@ -213,6 +239,7 @@ impl Serialize for RawFile {
 pub struct OpenedInput {
     /// As the user named it, for messages and tables.
     pub label: String,
+    /// Its bytes.
     pub reader: Box<dyn Read + Send>,
     /// Bytes, where known.
     pub size: Option<u64>,
@@ -220,13 +247,17 @@ pub struct OpenedInput {
 
 /// What a stage may ask of the engine while it runs.
 pub trait Services: Sync {
+    /// Opens an input file of the settings. Fails where it cannot be read.
     fn open(&self, file: &RawFile) -> Result<OpenedInput>;
+    /// A table to be written chunk by chunk.
     fn sink(&self, kind: &'static str) -> Result<Box<dyn Sink>>;
     /// A bar starts: what is done, how many units in all, and what a unit is called (`rows`, `generations`).
     fn begin(&self, what: &str, total: Option<u64>, unit: &str);
+    /// So many units of the bar are done.
     fn advance(&self, done: u64, message: &str);
     /// A line for the person and the run's record, e.g. `rank 27 as expected; 8 parameters redundant`.
     fn note(&self, line: String);
+    /// A line that a person must not overlook.
     fn warn(&self, line: String);
 }
 
@@ -238,16 +269,21 @@ pub struct Context<'a> {
     pub seed: u64,
     /// Worker threads that the stage may use; results must not depend on it.
     pub jobs: usize,
+    /// What the engine offers.
     pub services: &'a dyn Services,
 }
 
 /// A step of a pipeline: settings (`with:`), typed ports and a body. The settings are the type itself.
 pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'static {
+    /// In `uses:` of the YAML.
     const NAME: &'static str;
+    /// What it does, in one line.
     const SUMMARY: &'static str;
     /// Bumped by hand whenever equal inputs give other outputs.
     const IMPLEMENTATION: u32;
+    /// Tables that it takes.
     type Reads: Reads;
+    /// Tables that it gives.
     type Writes: Writes;
     /// Faults of the settings that types cannot express, each with its path below `with`.
     fn check(&self) -> Vec<crate::error::Fault> {
@@ -262,6 +298,7 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     fn look(&self, _reads: Option<Self::Reads>, _context: &Context) -> Result<Option<Self::Writes>> {
         Ok(None)
     }
+    /// Does the work. Fails with [`crate::error::Error::Data`] where the tables cannot be used.
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
 }
 

@@ -37,7 +37,9 @@ pub struct Optimise {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BenchmarkProblem {
+    /// What is minimised.
     pub function: Landscape,
+    /// How many numbers are searched.
     pub dimensions: usize,
     /// The search ends where the value is nearer to the minimum than this.
     pub tolerance: f64,

@@ -8,7 +8,9 @@ use schemars::{Schema, SchemaGenerator};
 
 /// A stage with its settings, its type erased.
 pub trait ErasedStage: Send + Sync {
+    /// As [`Stage::check`].
     fn check(&self) -> Vec<Fault>;
+    /// As [`Stage::files`].
     fn files(&self) -> Vec<(String, RawFile)>;
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
@@ -43,17 +45,24 @@ pub type ParsedStage = Result<Box<dyn ErasedStage>, Vec<Trouble>>;
 /// One kind of stage, as the pipeline's YAML names it.
 #[derive(Debug, Clone, Copy)]
 pub struct StageEntry {
+    /// In `uses:` of the YAML.
     pub name: &'static str,
+    /// What it does, in one line.
     pub summary: &'static str,
+    /// Version of its algorithm.
     pub implementation: u32,
+    /// Its input ports.
     pub reads: fn() -> Vec<Port>,
+    /// Its output ports.
     pub writes: fn() -> Vec<Port>,
     /// Types the settings; all their faults, with paths below `with`.
     pub parse: fn(&Node) -> ParsedStage,
+    /// The JSON Schema of its settings.
     pub schema: fn(&mut SchemaGenerator) -> Schema,
 }
 
 impl StageEntry {
+    /// The entry of a stage.
     pub const fn of<T: Stage>() -> Self {
         Self {
             name: T::NAME,

@@ -39,6 +39,7 @@ pub struct Accepted {
 }
 
 reads! {
+    /// Input ports of `report`.
     pub struct ReportReads {
         statistics: Statistics,
         prediction: Vec<Labelled<Prediction>>,
@@ -61,6 +62,7 @@ reads! {
     }
 }
 writes! {
+    /// Output ports of `report`.
     pub struct ReportWrites {
         document: Document,
         curves: Curves,
@@ -69,7 +71,7 @@ writes! {
 
 impl Stage for Report {
     const NAME: &'static str = "report";
-    const SUMMARY: &'static str = "Writes one self-contained HTML file: errors before and after, parameters, what was rejected";
+    const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
     const IMPLEMENTATION: u32 = 10;
     type Reads = ReportReads;
     type Writes = ReportWrites;

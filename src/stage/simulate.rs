@@ -66,12 +66,14 @@ pub struct Simulate {
 }
 
 reads! {
+    /// Input ports of `simulate`.
     pub struct SimulateReads {
         robot: Robot,
     }
 }
 
 writes! {
+    /// Output ports of `simulate`.
     pub struct SimulateWrites {
         recording: Recording,
         truth: Truth,

@@ -92,12 +92,14 @@ fn fit() -> String {
 }
 
 reads! {
+    /// Input ports of `split`.
     pub struct SplitReads {
         recording: Recording,
     }
 }
 
 writes! {
+    /// Output ports of `split`.
     pub struct SplitWrites {
         split: Split,
     }
@@ -105,7 +107,7 @@ writes! {
 
 impl Stage for SplitBy {
     const NAME: &'static str = "split";
-    const SUMMARY: &'static str = "recording -> named sets of rows: every n-th, blocks, random, by usage, by order";
+    const SUMMARY: &'static str = "deals rows out to named sets: every n-th, blocks, random, by usage, by order";
     const IMPLEMENTATION: u32 = 2;
     type Reads = SplitReads;
     type Writes = SplitWrites;

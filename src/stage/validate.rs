@@ -40,12 +40,14 @@ pub struct PublishedErrors {
 }
 
 reads! {
+    /// Input ports of `validate`.
     pub struct ValidateReads {
         prediction: Vec<Labelled<Prediction>>,
         observability: Vec<Labelled<Observability>>,
     }
 }
 writes! {
+    /// Output ports of `validate`.
     pub struct ValidateWrites {
         statistics: Statistics,
     }
@@ -53,7 +55,7 @@ writes! {
 
 impl Stage for Validate {
     const NAME: &'static str = "validate";
-    const SUMMARY: &'static str = "States the position error after every step, on held-out and training rows apart";
+    const SUMMARY: &'static str = "states the position error after every step, held-out and training rows apart";
     const IMPLEMENTATION: u32 = 4;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;

@@ -22,10 +22,15 @@ const RECORD_FORMAT: u32 = 1;
 /// What a stage made, and how it went.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
+    /// Of this record.
     pub record_format: u32,
+    /// Hash of the key.
     pub id: ActionId,
+    /// What the tables depend on.
     pub key: StageKey,
+    /// By port.
     pub tables: BTreeMap<String, TableRef>,
+    /// How it went.
     pub account: Account,
 }
 
@@ -37,17 +42,24 @@ pub struct Account {
     pub run: String,
     /// RFC 3339.
     pub started: String,
+    /// RFC 3339, UTC.
     pub ended: String,
+    /// From start to end.
     pub wall_seconds: f64,
+    /// Of all threads, where known.
     pub cpu_seconds: Option<f64>,
+    /// What the stage told.
     pub notes: Vec<String>,
+    /// What the stage warned of.
     pub warnings: Vec<String>,
 }
 
 /// The answer to "is this already done?".
 #[derive(Debug, Clone, PartialEq)]
 pub enum Lookup {
+    /// The record is there.
     Done(Box<ActionRecord>),
+    /// Nobody has done it.
     Absent,
     /// There is a record, but it or one of its tables is damaged: as good as absent. Why, in a sentence.
     Damaged(String),
@@ -56,13 +68,16 @@ pub enum Lookup {
 /// A table on its way into the store.
 #[derive(Debug)]
 pub enum PendingTable {
+    /// Columns in memory.
     Frame(Frame),
+    /// A file that is written already.
     File(FinishedFile),
 }
 
 /// The record that stands after publishing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
+    /// The record that stands: ours, or that of who was first.
     pub record: ActionRecord,
     /// Set where somebody published other content under the same key: the stage is not deterministic.
     pub conflict: Option<String>,

@@ -6,10 +6,13 @@ use std::sync::Arc;
 
 /// A Rust type that is one cell of a column.
 pub trait Cell: Sized + Clone {
+    /// Of its column.
     fn data_type() -> DataType;
+    /// Whether the column may hold nulls.
     fn nullable() -> bool {
         false
     }
+    /// A column of values.
     fn to_array(values: Vec<Self>) -> ArrayRef;
     /// None where the column has another type, or nulls that `Self` cannot hold.
     fn from_array(array: &ArrayRef) -> Option<Vec<Self>>;

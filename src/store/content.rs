@@ -16,6 +16,7 @@ use super::frame::Frame;
 pub struct TableHash(String);
 
 impl TableHash {
+    /// Hexadecimal.
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -25,9 +25,11 @@ pub struct FrameBuilder {
 }
 
 impl FrameBuilder {
+    /// An empty frame of a kind.
     pub fn new(kind: &str) -> Self {
         Self { kind: kind.into(), columns: Vec::new() }
     }
+    /// Adds a column.
     pub fn push(&mut self, name: impl Into<String>, column: ArrayRef) {
         self.columns.push((name.into(), column));
     }
@@ -47,21 +49,27 @@ impl FrameBuilder {
 }
 
 impl Frame {
+    /// The name of its schema.
     pub fn kind(&self) -> &'static str {
         &self.schema.name
     }
+    /// What it holds.
     pub fn schema(&self) -> &'static TableSchema {
         self.schema
     }
+    /// Its columns as Arrow has them.
     pub fn batch(&self) -> &RecordBatch {
         &self.batch
     }
+    /// How many.
     pub fn rows(&self) -> usize {
         self.batch.num_rows()
     }
+    /// A column by its name.
     pub fn column(&self, name: &str) -> Option<&ArrayRef> {
         self.batch.column_by_name(name)
     }
+    /// In the order of the file.
     pub fn column_names(&self) -> impl Iterator<Item = &str> {
         self.batch.schema_ref().fields().iter().map(|field| field.name().as_str())
     }

@@ -16,10 +16,13 @@ pub const KEY_FORMAT: u32 = 1;
 /// Everything that the outputs of a stage depend on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StageKey {
+    /// Of this key.
     pub key_format: u32,
     /// The stage's id: the `step` of its tables.
     pub id: String,
+    /// Its kind.
     pub stage: String,
+    /// Version of its algorithm.
     pub implementation: u32,
     /// Resolved settings, defaults filled in.
     pub settings: Value,
@@ -29,6 +32,7 @@ pub struct StageKey {
     pub files: BTreeMap<String, FileKey>,
     /// Output schemas (`name/version`) by port.
     pub schemas: BTreeMap<String, String>,
+    /// Of the stage.
     pub seed: u64,
 }
 
@@ -38,6 +42,7 @@ pub struct ReadKey {
     /// The stage that wrote it, where the port takes several and the reader sees whose they are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<String>,
+    /// Of its content.
     pub table: TableHash,
 }
 
@@ -46,6 +51,7 @@ pub struct ReadKey {
 pub struct FileKey {
     /// Its name without folders, which tables of rejected rows show.
     pub name: String,
+    /// Of its bytes.
     pub content: FileHash,
 }
 
@@ -60,6 +66,7 @@ pub struct ActionId(String);
 pub struct FileHash(String);
 
 impl StageKey {
+    /// The hash of the key.
     pub fn id(&self) -> ActionId {
         let value = serde_json::to_value(self).expect("a key is plain data");
         ActionId(blake3::hash(canonical(&value).as_bytes()).to_hex().to_string())
@@ -67,6 +74,7 @@ impl StageKey {
 }
 
 impl ActionId {
+    /// Hexadecimal.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -93,6 +101,7 @@ impl FileHash {
             };
         }
     }
+    /// Hexadecimal.
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -85,6 +85,7 @@ impl Store {
         Ok(Self { root, remote: None, workspace: Mutex::new(None), durability: Durability::default() })
     }
 
+    /// Its folder; of a bucket, that of what was fetched.
     pub fn root(&self) -> &Path {
         &self.root
     }

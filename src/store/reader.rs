@@ -17,6 +17,7 @@ use crate::raw;
 /// A table from a file outside of a store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loose<T> {
+    /// Its content.
     pub table: T,
     /// Whether the file carries the hash of its content. One that does not was written by another program: nobody can tell whether
     /// its numbers were changed.

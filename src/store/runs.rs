@@ -25,14 +25,18 @@ pub struct Run {
 /// A run and the seal of its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
+    /// Its id.
     pub run: String,
+    /// Hash of its manifest.
     pub sealed: String,
 }
 
 /// A manifest whose seal holds.
 #[derive(Debug, Clone)]
 pub struct Sealed {
+    /// As it was written.
     pub manifest: Value,
+    /// Hash of it.
     pub sealed: String,
 }
 
@@ -40,9 +44,11 @@ pub struct Sealed {
 const EVENT_DIGITS: usize = 16;
 
 impl Run {
+    /// ULID: ids sort by time.
     pub fn id(&self) -> &str {
         &self.id
     }
+    /// Its folder.
     pub fn dir(&self) -> &PathBuf {
         &self.dir
     }

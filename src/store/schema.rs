@@ -66,13 +66,17 @@ pub fn of(kind: &str) -> Result<&'static TableSchema> {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableSchema {
+    /// Of the kind of table.
     pub name: String,
+    /// Of the schema.
     pub version: Version,
+    /// What a row is.
     pub description: String,
     /// Columns that tell every row from every other.
     pub primary_key: Vec<String>,
     /// Columns that rows are in ascending order of: the primary key in some order.
     pub sort: Vec<String>,
+    /// In the order of the file.
     pub fields: Vec<FieldSchema>,
 }
 
@@ -80,36 +84,50 @@ pub struct TableSchema {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSchema {
+    /// Of the column; `{j}` stands for a joint.
     pub name: String,
+    /// As it is stored.
     #[serde(rename = "type")]
     pub column_type: ColumnType,
+    /// Whether null is allowed: nothing is known.
     #[serde(default)]
     pub nullable: bool,
     /// Symbol of a stored unit; `row` where the row says it in its own `unit` column.
     #[serde(default)]
     pub unit: Option<String>,
+    /// What it means.
     pub description: String,
     /// `angle`, `quaternion`, `json`, `unit`: how values compare.
     #[serde(default)]
     pub semantic: Option<String>,
+    /// What values are allowed.
     #[serde(default)]
     pub constraints: Constraints,
+    /// Which differences do not count.
     #[serde(default)]
     pub diff: Tolerance,
+    /// Whether files without the column are read too.
     #[serde(default)]
     pub optional: bool,
+    /// Whether it is a column for each joint.
     #[serde(default)]
     pub per_joint: bool,
+    /// Of joints: this column or that one is there, by the kind of the joint.
     #[serde(default)]
     pub either: Option<String>,
 }
 
+/// Types of stored columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColumnType {
+    /// Text.
     Utf8,
+    /// Whole numbers.
     Int64,
+    /// Numbers; no NaN, no infinity.
     Float64,
+    /// True or false.
     Boolean,
 }
 
@@ -117,10 +135,13 @@ pub enum ColumnType {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Constraints {
+    /// Least value.
     #[serde(default)]
     pub min: Option<f64>,
+    /// Largest value.
     #[serde(default)]
     pub max: Option<f64>,
+    /// Words that are allowed; any where there are none.
     #[serde(default, rename = "enum")]
     pub values: Vec<String>,
 }
@@ -129,8 +150,10 @@ pub struct Constraints {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerance {
+    /// In the unit of the column.
     #[serde(default)]
     pub atol: f64,
+    /// As a share of the larger value.
     #[serde(default)]
     pub rtol: f64,
     /// The column that holds one standard deviation of this one.
@@ -141,12 +164,16 @@ pub struct Tolerance {
 /// `major.minor.patch`: a new nullable column is a minor step, any other change of columns a major one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version {
+    /// Readers of another one refuse the table.
     pub major: u32,
+    /// Columns were added.
     pub minor: u32,
+    /// Descriptions changed.
     pub patch: u32,
 }
 
 impl Version {
+    /// The version of a text like `1.0.0`.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split('.').map(|part| part.parse::<u32>().ok());
         let version = Self { major: parts.next()??, minor: parts.next()??, patch: parts.next()?? };
@@ -168,6 +195,7 @@ impl<'de> Deserialize<'de> for Version {
 }
 
 impl ColumnType {
+    /// The type as Arrow has it.
     pub fn arrow(self) -> DataType {
         match self {
             Self::Utf8 => DataType::Utf8,

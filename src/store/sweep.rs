@@ -18,10 +18,15 @@ const RUN_ID: usize = 26;
 /// What was swept, or would be.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Sweep {
+    /// Records that go.
     pub actions: u64,
+    /// Tables that go.
     pub objects: u64,
+    /// Of the tables that go.
     pub bytes: u64,
+    /// Records that stay.
     pub kept_actions: u64,
+    /// Tables that stay.
     pub kept_objects: u64,
     /// Kept only because they are younger than the grace period.
     pub young: u64,

@@ -15,7 +15,9 @@ pub struct TableRef {
     pub table_hash: TableHash,
     /// Name of the object that holds it.
     pub file_hash: FileHash,
+    /// How many.
     pub rows: u64,
+    /// Of the file.
     pub bytes: u64,
 }
 

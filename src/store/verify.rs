@@ -17,15 +17,21 @@ use crate::error::{Error, Fault, Result};
 /// What a verification read, and everything that it found wrong.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Verification {
+    /// Tables that were read.
     pub objects: u64,
+    /// Of these tables.
     pub bytes: u64,
+    /// Records that were read.
     pub actions: u64,
+    /// Manifests that were read.
     pub runs: u64,
+    /// Names that were followed.
     pub tags: u64,
     /// Files below `tables/` and `documents/`.
     pub copies: u64,
     /// Sealed notes of documents and fleets.
     pub notes: u64,
+    /// What is not as it was written.
     #[serde(serialize_with = "texts")]
     pub faults: Vec<Fault>,
 }

@@ -79,6 +79,7 @@ impl TableWriter {
         open.push(self.schema, chunk, &self.path)
     }
 
+    /// Written so far.
     pub fn rows(&self) -> u64 {
         self.open.as_ref().map_or(0, |open| open.rows)
     }
@@ -92,6 +93,7 @@ impl TableWriter {
 }
 
 impl FinishedFile {
+    /// What a record says of the table.
     pub fn table(&self) -> &TableRef {
         &self.table
     }

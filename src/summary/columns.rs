@@ -5,10 +5,12 @@ use crate::error::{Result, counted};
 use crate::store::Store;
 use serde_json::{Value, json};
 
+/// Tables with their columns, as JSON.
 pub fn columns_json(store: &Store, tables: &[&QueryTable]) -> Result<Value> {
     tables.iter().map(|table| object(store, table)).collect::<Result<Vec<Value>>>().map(Value::from)
 }
 
+/// Tables with their columns, as text.
 pub fn columns(store: &Store, tables: &[&QueryTable]) -> Result<String> {
     let mut groups: Vec<(&str, Vec<&QueryTable>)> = Vec::new();
     for table in tables {

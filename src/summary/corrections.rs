@@ -48,6 +48,7 @@ pub fn corrections(outcome: &CompletedRun, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
+/// Rivals of learned corrections, as JSON.
 pub fn corrections_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: CorrectionsRow| {
         json!({

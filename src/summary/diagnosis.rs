@@ -136,6 +136,7 @@ impl DiagnosisSummary {
         self.located(by).iter().map(one).collect()
     }
 
+    /// The diagnosis as `calib diagnose` prints it; `store` is the `--store` of the commands that it proposes.
     pub fn text(&self, store: &str) -> String {
         let v = &self.verdict;
         let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
@@ -176,7 +177,7 @@ impl DiagnosisSummary {
             }
         }
         for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
-            text.push_str(&format!("taken back: {line}\n"));
+            text.push_str(&format!("withdrawn: {line}\n"));
         }
         for line in v.not_observable.lines() {
             text.push_str(&format!("not observable: {line}\n"));

@@ -4,6 +4,7 @@ use super::run::word;
 use crate::audit::Explanation;
 use crate::pipeline::StageStatus;
 
+/// Why a stage ran, as text.
 pub fn explanation(explanation: &Explanation) -> String {
     let stage = &explanation.stage;
     let mut text = format!("{} in run {}: {}", stage.id, explanation.run, word(stage));

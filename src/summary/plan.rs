@@ -3,6 +3,7 @@
 use crate::error::counted;
 use crate::pipeline::Plan;
 
+/// Stages with their tables and files, as `calib check` prints them.
 pub fn graph(plan: &Plan) -> String {
     let mut text = format!("pipeline {}, seed {}, {}\n", plan.name, plan.seed, counted(plan.stages.len(), "stage"));
     for stage in &plan.stages {

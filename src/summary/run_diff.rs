@@ -9,6 +9,7 @@ const TABLES: usize = 6;
 /// Settings and files that are told one by one.
 const CAUSES: usize = 5;
 
+/// Two runs compared, as text; with `stat` every table of which rows differ.
 pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
     let told = |letter: char, told: &crate::audit::RunSummary| {
         format!("{letter}  {}  {}  {:.16}\n", told.run, told.pipeline, told.started)
@@ -46,7 +47,7 @@ pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
     }
     let rest: Vec<&str> = rest.iter().map(|table| table.name.as_str()).collect();
     if !rest.is_empty() {
-        text.push_str(&format!("also changed: {} (--stat tells each)\n", list(&rest)));
+        text.push_str(&format!("also changed: {} (--stat lists each)\n", list(&rest)));
     }
     if same > 0 {
         text.push_str(&format!("same: {}\n", counted(same, "table")));

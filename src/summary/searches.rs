@@ -59,6 +59,7 @@ pub fn searches(outcome: &CompletedRun, store: &Store) -> Result<String> {
     Ok(text + "\n")
 }
 
+/// Optimisers beside each other, as JSON.
 pub fn searches_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: SearchesRow| {
         json!({

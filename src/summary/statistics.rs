@@ -161,6 +161,7 @@ fn block(title: &str, rows: &[&StatisticsRow]) -> String {
     text + "\n"
 }
 
+/// Errors of every step and set, as JSON.
 pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
     let row = |row: StatisticsRow| {
         json!({
@@ -178,6 +179,7 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
     Ok(rows(outcome, store)?.into_iter().map(row).collect())
 }
 
+/// How many rows of the raw files were rejected.
 pub fn rejected_rows(outcome: &CompletedRun) -> u64 {
     outcome.tables(crate::table::Rejected::KIND).map(|output| output.table.rows).sum()
 }

@@ -72,6 +72,7 @@ fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &crate::diagnose:
 }
 
 impl Findings {
+    /// A row for each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = ranked(diagnosis).map(|(rank, finding)| FindingRow {
             rank,
@@ -97,6 +98,7 @@ impl Findings {
 }
 
 impl FindingNumbers {
+    /// A row for each number of each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
             finding.parameters.iter().map(move |number| FindingNumberRow {
@@ -114,6 +116,7 @@ impl FindingNumbers {
 }
 
 impl Rivals {
+    /// A row for each rival of each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = ranked(diagnosis).flat_map(|(rank, finding)| {
             finding.rivals.iter().map(move |rival| RivalRow {

@@ -42,6 +42,7 @@ fn moments(diagnosis: &Diagnosis) -> [(&'static str, &Located); 2] {
 }
 
 impl Shares {
+    /// A row for each place and variable, before and after.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = moments(diagnosis).into_iter().flat_map(|(moment, located)| {
             located.shares.iter().map(move |share| ShareRow {
@@ -61,6 +62,7 @@ impl Shares {
 }
 
 impl Spectrum {
+    /// A row for each order of each joint.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let rows = moments(diagnosis).into_iter().flat_map(|(moment, located)| {
             located.spectrum.iter().map(move |line| SpectrumRow {

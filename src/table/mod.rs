@@ -10,8 +10,11 @@ use std::path::Path;
 
 /// A table kind: Rust values that go to and from checked columns.
 pub trait Table: Sized + Send + Sync + 'static {
+    /// The name of its schema.
     const KIND: &'static str;
+    /// Checked columns. Fails where a value breaks the schema.
     fn to_frame(&self) -> Result<Frame>;
+    /// Values from checked columns. Fails where columns of the schema are missing.
     fn from_frame(frame: &Frame) -> Result<Self>;
 }
 
@@ -32,8 +35,14 @@ fn typed<T: Table>(loose: Loose<Frame>) -> Result<Loose<T>> {
 /// Declares a table as a list of rows: `rows! { "kind", /// doc pub struct Name of Row { column: type, ... } }`.
 macro_rules! rows {
     ($kind:literal, $(#[$doc:meta])* pub struct $table:ident of $row:ident { $( $(#[$fdoc:meta])* $field:ident: $ty:ty, )+ }) => {
+        #[doc = concat!("A row of the table `", $kind, "`.")]
         #[derive(Debug, Clone, PartialEq)]
-        pub struct $row { $( $(#[$fdoc])* pub $field: $ty, )+ }
+        pub struct $row { $(
+            #[doc = concat!("Column `", stringify!($field), "`; its unit and meaning stand in the schema of the table.")]
+            #[doc = ""]
+            $(#[$fdoc])*
+            pub $field: $ty,
+        )+ }
         $(#[$doc])*
         #[derive(Debug, Clone, Default, PartialEq)]
         pub struct $table(pub Vec<$row>);

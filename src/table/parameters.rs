@@ -45,6 +45,7 @@ const CORRELATED: f64 = 0.9;
 /// What parameters correct.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Corrected {
+    /// The arm of the robot file.
     RobotFile,
     /// What stood in `sim_x`, `sim_y`, `sim_z`.
     OutsideSimulation,

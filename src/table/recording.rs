@@ -18,11 +18,13 @@ use std::collections::BTreeMap;
 /// Where an optional quantity is missing in a single row its value here is NaN, in the table null.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Recording {
+    /// Joints of the arm.
     pub joints: usize,
     /// Which joints are prismatic: their `q` is in m, stored as `q3_mm`.
     pub prismatic: Vec<bool>,
     /// Strictly increasing.
     pub sequence: Vec<i64>,
+    /// Names of the points, a row each.
     pub point_id: Vec<String>,
     /// What the recording itself says a row is for (`fit`, `validate`, ...).
     pub usage: Vec<Option<String>>,
@@ -57,6 +59,7 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// How many points.
     pub fn rows(&self) -> usize {
         self.sequence.len()
     }

@@ -32,15 +32,18 @@ pub struct Unseen {
 
 /// A step that predicts.
 pub struct Step {
+    /// Id of its stage.
     pub id: String,
     /// Whether it has a model of its own; else it learned on the step before it that has.
     pub own: bool,
+    /// Its errors at rows that its fits have not seen.
     pub unseen: Unseen,
 }
 
 /// The step that stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
+    /// Id of the stage that stands for the run.
     pub step: String,
     /// The step whose parameters it rests on: itself, or the one that it learned on.
     pub model: String,
@@ -53,10 +56,15 @@ pub struct Standing {
 /// A step that was worse than one before it, rms of the same points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Withdrawn {
+    /// Id of the stage that is withdrawn.
     pub step: String,
+    /// Its rms at the points that both predict without having seen them.
     pub rms_mm: f64,
+    /// Id of the earlier stage.
     pub than: String,
+    /// The rms of that one at the same points.
     pub than_rms_mm: f64,
+    /// How many these are.
     pub points: usize,
 }
 
@@ -92,6 +100,7 @@ impl Standing {
 }
 
 impl Unseen {
+    /// Errors of a step at rows that its fits have not seen.
     pub fn of(prediction: &Prediction) -> Self {
         let mut out = Self::default();
         for row in prediction.0.iter().filter(|row| !row.suspect && row.measured.is_none()) {

@@ -23,7 +23,9 @@ pub(super) enum ColumnRole {
 /// Units of columns whose names do not end in one.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Units {
+    /// Of angles whose column names none.
     pub angle: Option<Unit>,
+    /// Of lengths whose column names none.
     pub length: Option<Unit>,
 }
 

@@ -21,7 +21,9 @@ const MOST: usize = 20;
 pub struct Layout<'a> {
     /// For messages: the file's name, or `stdin`.
     pub place: &'a str,
+    /// Whose joint names columns may carry.
     pub robot: &'a RobotDescription,
+    /// Of columns that name none.
     pub units: Units,
     /// Appends nothing: joints are replaced, all else stays.
     pub plain: bool,
@@ -32,6 +34,7 @@ pub struct Layout<'a> {
 /// The targets of a table that are not reached; their joints are empty.
 #[derive(Debug, Default)]
 pub struct Unreached {
+    /// How many targets were read.
     pub count: u64,
     /// The first of them.
     pub faults: Vec<Fault>,

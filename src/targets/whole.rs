@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+/// The error of an output file that could not be written.
 pub fn unwritten(out: &Path, error: &std::io::Error) -> Error {
     Error::store(out.display().to_string(), format!("cannot be written: {error}"))
 }

@@ -11,7 +11,9 @@ use crate::robot::description::{JointKind, RobotDescription};
 /// A joint with the link that it moves, in the frame of that link.
 #[derive(Debug, Clone)]
 pub struct Link {
+    /// Whether the joint turns; else it slides.
     pub revolute: bool,
+    /// Unit vector.
     pub axis: Vector,
     /// From the origin of this link to the next joint (the last: to the measured point), m, errors included.
     pub span: Vector,
@@ -19,6 +21,7 @@ pub struct Link {
     pub tilt: Matrix,
     /// kg, and its centre in the frame of the link, m.
     pub mass: f64,
+    /// Of its mass, m.
     pub centre: Vector,
     /// Motor turns per turn of the joint; 1 where unknown.
     pub gear: f64,
@@ -31,6 +34,7 @@ pub struct Link {
 pub struct Arm {
     /// From the base to joint 1, m.
     pub foot: Vector,
+    /// From base to tool.
     pub links: Vec<Link>,
     /// Centre of the payload in the frame of the last link, m.
     pub payload_centre: Vector,
@@ -47,6 +51,7 @@ pub struct Posture {
     pub frames: Vec<Matrix>,
     /// The axis of every joint as a direction.
     pub axes: Vec<Vector>,
+    /// The measured point, m.
     pub tool: Vector,
 }
 

@@ -9,7 +9,9 @@ use super::statics::{Loads, Row};
 /// The arm at rest under its loads.
 #[derive(Debug, Clone)]
 pub struct Equilibrium {
+    /// Where everything is.
     pub posture: Posture,
+    /// What the effects move.
     pub motion: Motion,
     /// Torque of gravity and of other loads on each joint in the deflected posture, Nm.
     pub torque: Vec<f64>,

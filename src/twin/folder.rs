@@ -11,19 +11,26 @@ const TRACKER_LATER_S: f64 = 1.5;
 /// Decimals of what is written: joint angles in deg and deg/s, coordinates in mm, times in s.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decimals {
+    /// Of angles.
     pub angle: usize,
+    /// Of coordinates.
     pub length: usize,
+    /// Of times.
     pub time: usize,
 }
 
 /// A recording in SI; per-joint quantities are row-major. A quantity that is missing is not written.
 #[derive(Debug, Clone)]
 pub struct Log {
+    /// Of the arm.
     pub joints: usize,
+    /// Names of the points.
     pub id: Vec<String>,
+    /// Clock, s.
     pub time_s: Option<Vec<f64>>,
     /// What a row is for: `fit`, `validate`, ...
     pub usage: Vec<String>,
+    /// Declared, kg.
     pub payload_kg: Vec<f64>,
     /// rad.
     pub q: Vec<f64>,

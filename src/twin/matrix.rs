@@ -2,8 +2,10 @@
 
 /// A homogeneous transform, rows first.
 pub type Matrix = [[f64; 4]; 4];
+/// Three numbers: a point or a direction.
 pub type Vector = [f64; 3];
 
+/// No motion.
 pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 /// The motion `a` followed by `b` in a's frame.
@@ -11,6 +13,7 @@ pub fn times(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
+/// A displacement.
 pub fn shift(v: Vector) -> Matrix {
     let mut m = IDENTITY;
     for i in 0..3 {
@@ -73,30 +76,37 @@ pub fn see(m: &Matrix, v: Vector) -> Vector {
     std::array::from_fn(|i| (0..3).map(|k| m[k][i] * v[k]).sum())
 }
 
+/// What a motion makes of the origin.
 pub fn origin(m: &Matrix) -> Vector {
     [m[0][3], m[1][3], m[2][3]]
 }
 
+/// a + b.
 pub fn add(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
+/// a - b.
 pub fn minus(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
+/// s a.
 pub fn scale(a: Vector, s: f64) -> Vector {
     a.map(|x| x * s)
 }
 
+/// a . b.
 pub fn dot(a: Vector, b: Vector) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum()
 }
 
+/// a x b.
 pub fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Length.
 pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }

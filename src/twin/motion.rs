@@ -29,6 +29,7 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// No motion of an arm with so many joints.
     pub fn none(joints: usize) -> Motion {
         Motion {
             tracker: IDENTITY,

@@ -6,10 +6,15 @@ use rand::{RngExt, SeedableRng};
 /// What randomness is for; each has its own stream of the seed.
 #[derive(Debug, Clone, Copy)]
 pub enum Purpose {
+    /// Which poses are measured.
     Poses = 1,
+    /// Of the tracker's points.
     Tracker = 2,
+    /// Of motor currents.
     Current = 3,
+    /// Of joints from move to move.
     Repeatability = 4,
+    /// Of the pace of measurement.
     Clock = 5,
     /// What is concealed, and how.
     Design = 6,
@@ -21,6 +26,7 @@ pub enum Purpose {
 pub struct Noise(ChaCha8Rng);
 
 impl Noise {
+    /// Numbers of one purpose: other purposes do not shift them.
     pub fn new(seed: u64, purpose: Purpose) -> Noise {
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
         generator.set_stream(purpose as u64);

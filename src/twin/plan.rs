@@ -38,6 +38,7 @@ impl Default for Poses {
 pub struct Block {
     /// The label of its rows in the column `usage`, e.g. `fit`.
     pub usage: String,
+    /// How many.
     pub points: usize,
     /// Mass at the flange, kg.
     #[serde(default)]
@@ -59,6 +60,7 @@ pub struct Climate {
     /// A swing of the temperature on top, K, and its period, h: sun, doors, pauses.
     #[serde(skip_serializing_if = "no_swing")]
     pub swing_k: f64,
+    /// Period of the swing, h.
     #[serde(skip_serializing_if = "usual_swing")]
     pub swing_h: f64,
 }
@@ -97,12 +99,17 @@ pub fn direction(now: &[f64], before: &[f64]) -> Vec<f64> {
 /// A planned point.
 #[derive(Debug, Clone)]
 pub struct Point {
+    /// Number of its block, from 0.
     pub block: usize,
+    /// Commanded joints, rad or m.
     pub q: Vec<f64>,
     /// The point from which the arm came.
     pub before: Vec<f64>,
+    /// Side from which each joint comes, +1 or -1.
     pub direction: Vec<f64>,
+    /// s.
     pub time_s: f64,
+    /// C.
     pub temperature_c: f64,
     /// Declared mass at the flange, kg.
     pub payload_kg: f64,

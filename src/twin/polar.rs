@@ -5,17 +5,22 @@ use super::matrix::{self, Vector};
 /// m and rad, in the tracker's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Polar {
+    /// m.
     pub range: f64,
+    /// rad.
     pub azimuth: f64,
+    /// rad.
     pub elevation: f64,
 }
 
 impl Polar {
+    /// Of a point as the instrument sees it, m.
     pub fn of(point: Vector) -> Polar {
         let level = point[0].hypot(point[1]);
         Polar { range: matrix::norm(point), azimuth: point[1].atan2(point[0]), elevation: point[2].atan2(level) }
     }
 
+    /// The point, m.
     pub fn point(self) -> Vector {
         let (level, height) = (self.range * self.elevation.cos(), self.range * self.elevation.sin());
         [level * self.azimuth.cos(), level * self.azimuth.sin(), height]

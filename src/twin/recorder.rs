@@ -30,32 +30,46 @@ pub struct Motors {
 /// An experiment on a twin.
 #[derive(Debug, Clone)]
 pub struct Experiment<'a> {
+    /// As its owner believes it to be.
     pub robot: &'a RobotDescription,
+    /// As it is.
     pub truth: &'a TrueRobot,
+    /// What acts on it besides.
     pub effects: &'a [Physical],
+    /// Where it stands and how well it measures.
     pub tracker: &'a Tracker,
+    /// As the controller logs them.
     pub motors: &'a Motors,
     /// Standard deviation of each joint from move to move, arcsec (um for a prismatic joint); empty: none.
     pub repeatability_arcsec: &'a [f64],
+    /// Which poses may be measured.
     pub poses: &'a Poses,
+    /// In the order of measurement.
     pub blocks: &'a [Block],
+    /// Clock and temperature.
     pub climate: &'a Climate,
+    /// Of poses and noise.
     pub seed: u64,
 }
 
 /// A measured point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shot {
+    /// Number of its block, from 0.
     pub block: usize,
     /// Reported joint positions, rad or m.
     pub q: Vec<f64>,
+    /// Side from which each joint came, +1 or -1.
     pub direction: Vec<f64>,
+    /// s.
     pub time_s: f64,
+    /// C.
     pub temperature_c: f64,
     /// Logged currents, A.
     pub current: Vec<f64>,
     /// Tracker frame, m, and its standard deviation per axis.
     pub position: Vector,
+    /// m.
     pub sigma: f64,
     /// Velocities as the controller logs them, rad/s or m/s; empty where the arm stood.
     pub velocity: Vec<f64>,

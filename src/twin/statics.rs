@@ -55,8 +55,11 @@ pub struct Row {
     pub drive: Vec<f64>,
     /// +1, -1 or 0: last move of each joint.
     pub direction: Vec<f64>,
+    /// s.
     pub time_s: f64,
+    /// C.
     pub temperature_c: f64,
+    /// Declared, kg.
     pub payload_kg: f64,
     /// Of each joint, rad/s or m/s; empty where the arm stands.
     pub velocity: Vec<f64>,

@@ -13,6 +13,7 @@ const UNEVENNESS: f64 = 0.5;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scatter {
+    /// Normal.
     #[default]
     Gaussian,
     /// Student's t with 3 degrees of freedom: now and then far out.
@@ -55,6 +56,7 @@ pub struct Beam {
 }
 
 impl Beam {
+    /// A tracker with this seed of its noise.
     pub fn new(seed: u64) -> Self {
         Self { noise: Noise::new(seed, Purpose::Tracker), astray: None }
     }
@@ -74,6 +76,7 @@ pub struct Tracker {
     pub noise_um_per_m: f64,
     /// How many standard deviations the two figures stand for.
     pub coverage: f64,
+    /// How its points scatter.
     pub scatter: Scatter,
 }
 

@@ -62,10 +62,13 @@ pub struct TrueRobot {
 /// Summed errors of one link in m and rad.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RigidError {
+    /// m.
     pub shift: Vector,
+    /// rad.
     pub tilt: Vector,
 }
 
+/// rad.
 pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 impl TrueRobot {

@@ -16,6 +16,7 @@ pub struct Way {
     pub rate_hz: f64,
     /// Fastest that a joint turns, deg/s (mm/s for a prismatic joint).
     pub speed_deg_s: f64,
+    /// How joints get from pose to pose.
     pub shape: Shape,
     /// Standstill between two moves, s.
     pub dwell_s: f64,
@@ -45,6 +46,7 @@ pub enum Shape {
 pub enum Path {
     /// Middle, and amplitude, angular frequency, phase of each wave, of every joint.
     Waves(Vec<(f64, [[f64; 3]; 3])>),
+    /// From pose to pose, with rests between.
     Moves(Vec<Move>),
 }
 

@@ -46,6 +46,7 @@ pub fn written(text: &str) -> Option<Unit> {
 pub struct Header<'a> {
     /// The name without its unit.
     pub stem: &'a str,
+    /// The unit that the header states, if it does.
     pub unit: Option<Unit>,
     /// The unit as it stands there, where no bracket says that it is one: the `a` of `x_a`.
     pub ending: Option<&'a str>,

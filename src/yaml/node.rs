@@ -5,18 +5,25 @@ use super::path::{join, rest_after, split_index, split_key};
 /// Where a value was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
+    /// In the text.
     Line {
+        /// From 1.
         line: u64,
+        /// From 1.
         column: u64,
     },
     /// `--set`.
     CommandLine,
+    /// Not in a text, e.g. from the command line.
     Unknown,
 }
 
+/// A value with its place.
 #[derive(Debug, Clone)]
 pub struct Node {
+    /// What stands there.
     pub value: YamlValue,
+    /// Where it stands.
     pub mark: Mark,
     /// A number or boolean as it was spelt, for where text is wanted.
     pub raw: Option<String>,
@@ -25,25 +32,34 @@ pub struct Node {
     pub(crate) bytes: Option<(u64, u64)>,
 }
 
+/// What YAML can hold, keys in the order of the text.
 #[derive(Debug, Clone)]
 pub enum YamlValue {
+    /// `null`, `~` or nothing.
     Null,
+    /// `true` or `false`, and no other word.
     Bool(bool),
+    /// A whole number.
     Integer(i128),
+    /// Another number.
     Float(f64),
+    /// Anything else.
     Text(String),
+    /// In block or flow style.
     List(Vec<Node>),
     /// In the order of the file.
     Map(Vec<(String, Mark, Node)>),
 }
 
 impl Node {
+    /// A value at a place.
     pub fn new(value: YamlValue, mark: Mark) -> Self {
         Self { value, mark, raw: None, overridden: false, bytes: None }
     }
     pub(super) fn parsed(value: YamlValue, mark: Mark, bytes: Option<(u64, u64)>) -> Self {
         Self { value, mark, raw: None, overridden: false, bytes }
     }
+    /// A map without entries.
     pub fn empty_map(mark: Mark) -> Self {
         Self::new(YamlValue::Map(Vec::new()), mark)
     }
@@ -76,12 +92,15 @@ impl Node {
         }
     }
 
+    /// Entries of a map, each with the place of its key; none of anything else.
     pub fn entries(&self) -> &[(String, Mark, Node)] {
         if let YamlValue::Map(entries) = &self.value { entries } else { &[] }
     }
+    /// Items of a list; none of anything else.
     pub fn items(&self) -> &[Node] {
         if let YamlValue::List(items) = &self.value { items } else { &[] }
     }
+    /// The value of a key of a map.
     pub fn get(&self, key: &str) -> Option<&Node> {
         self.entries().iter().find(|(name, _, _)| name == key).map(|(_, _, node)| node)
     }
@@ -102,6 +121,7 @@ impl Node {
             _ => None,
         }
     }
+    /// The node of a path like `stages[2].with.n`, to be changed.
     pub fn at_mut(&mut self, path: &str) -> Option<&mut Node> {
         if path.is_empty() {
             return Some(self);
@@ -208,6 +228,7 @@ impl Node {
             _ => {}
         }
     }
+    /// Visits this node and all below it, each with its path, outer ones first.
     pub fn walk_mut(&mut self, path: &str, visit: &mut dyn FnMut(&str, &mut Node)) {
         visit(path, self);
         match &mut self.value {

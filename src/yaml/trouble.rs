@@ -6,10 +6,14 @@ use crate::error::{Fault, counted, nearest};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;
 
+/// A fault of a value, before it is known in which file.
 #[derive(Debug, Clone)]
 pub struct Trouble {
+    /// Path below the value that was read.
     pub path: String,
+    /// Where it stands, if that is known.
     pub mark: Option<Mark>,
+    /// What is wrong, and what is allowed.
     pub message: String,
     /// The key that is missing, where that is the fault.
     pub(super) missing: Option<&'static str>,
@@ -28,6 +32,7 @@ pub(super) enum Clue {
 }
 
 impl Trouble {
+    /// A fault of the value itself.
     pub fn new(message: impl Into<String>) -> Self {
         Self { path: String::new(), mark: None, message: message.into(), missing: None, clue: None }
     }

@@ -451,7 +451,7 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     // A balancer at a joint of unknown stiffness is a gear error of order 1.
     assert_eq!(found(here)["findings"][0]["rivals"][0]["effect"], "counterbalance");
     let said = calib(&["poses", "--run", &newest(here), "--separate", "gear_cyclic", "counterbalance@j4"], here);
-    assert!(said.contains("no pose tells gear_cyclic at joint 4 from counterbalance at joint 4"), "{said}");
+    assert!(said.contains("no pose separates gear_cyclic at joint 4 from counterbalance at joint 4"), "{said}");
     assert!(said.contains("instead: log motor currents at rest"), "{said}");
     let folder = concealed("zero_shift", "9", "60");
     let here = folder.path();

@@ -1,23 +1,26 @@
-//! The examples of the README are what calib reads.
+//! The YAML examples of the pages are what calib reads.
 
 use calib::pipeline::Plan;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::STAGES;
 use std::path::Path;
 
-/// The README's YAML blocks that contain `key` at the start of a line.
+/// The only YAML block of the pages about files that contains `key` at the start of a line.
 pub fn example(key: &str) -> String {
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).expect("a README");
-    let blocks = text.split("```yaml\n").skip(1).filter_map(|rest| rest.split_once("```")).map(|(block, _)| block);
-    let found: Vec<&str> = blocks.filter(|block| block.lines().any(|line| line.starts_with(key))).collect();
+    let pages = ["pipelines/README.md", "schemas/README.md"]
+        .map(|page| std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).expect("a page"));
+    let blocks = pages.iter().flat_map(|text| text.split("```yaml\n").skip(1).filter_map(|rest| rest.split_once("```")));
+    let found: Vec<&str> =
+        blocks.map(|(block, _)| block).filter(|block| block.lines().any(|line| line.starts_with(key))).collect();
     assert_eq!(found.len(), 1, "{key}");
     found[0].to_string()
 }
 
 #[test]
-fn the_robot_file_of_the_readme_is_read() {
+fn the_robot_file_of_the_pages_is_read() {
     let text = example("calib_robot:");
-    let robot = read_calib(RobotFileText { label: "README.md", text: &text }, None).unwrap_or_else(|e| panic!("{e}")).robot;
+    let robot =
+        read_calib(RobotFileText { label: "schemas/README.md", text: &text }, None).unwrap_or_else(|e| panic!("{e}")).robot;
     assert_eq!(robot.joints.len(), 6);
     // Its one twist is the axis of a wrist: through the axis of joint 4, parallel to joint 3.
     let wrist = &robot.joints[4];
@@ -26,7 +29,7 @@ fn the_robot_file_of_the_readme_is_read() {
 }
 
 #[test]
-fn the_pipeline_of_the_readme_is_understood() {
+fn the_pipeline_of_the_pages_is_understood() {
     let folder = tempfile::tempdir().expect("a folder");
     let put = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -42,7 +45,7 @@ fn the_pipeline_of_the_readme_is_understood() {
 }
 
 #[test]
-fn the_fleet_file_of_the_readme_is_understood() {
+fn the_fleet_file_of_the_pages_is_understood() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("FLEET.yaml");
     std::fs::write(&file, example("robots:")).expect("a file");

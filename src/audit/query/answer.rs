@@ -10,10 +10,15 @@ pub struct QueryResult(DataFrame);
 /// One value of an answer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum QueryValue<'a> {
+    /// Missing.
     Null,
+    /// True or false.
     Boolean(bool),
+    /// A whole number.
     Integer(i128),
+    /// A number.
     Number(f64),
+    /// Text.
     Text(Cow<'a, str>),
 }
 
@@ -22,10 +27,12 @@ impl QueryResult {
         Self(frame)
     }
 
+    /// How many.
     pub fn rows(&self) -> usize {
         self.0.height()
     }
 
+    /// Names of the columns, in order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.columns().iter().map(|column| column.name().as_str())
     }

@@ -21,23 +21,32 @@ pub struct QueryTable {
     pub name: String,
     /// Its kind, where no other stage of the run writes such a table.
     pub short: Option<String>,
+    /// Id of the stage that wrote it.
     pub stage: String,
+    /// On which it was written.
     pub port: String,
+    /// The name of its schema.
     pub kind: String,
+    /// Where it is.
     pub table: TableRef,
 }
 
 /// A column that can be asked, as the table's file has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct QueryColumn {
+    /// As SQL knows it.
     pub name: String,
+    /// As the schema states it.
     #[serde(rename = "type")]
     pub column_type: String,
+    /// Of numbers.
     pub unit: Option<String>,
+    /// What it means.
     pub description: String,
 }
 
 impl QueryTables {
+    /// The tables that a run wrote or took.
     pub fn of(manifest: &Manifest) -> Self {
         let outputs = || manifest.stages.iter().flat_map(|stage| stage.outputs.iter().map(move |output| (&stage.id, output)));
         let alone = |kind: &str| outputs().filter(|(_, output)| output.kind == kind).count() == 1;
@@ -52,6 +61,7 @@ impl QueryTables {
         Self { run: manifest.run_id.clone(), tables: outputs().map(table).collect() }
     }
 
+    /// In the order of the pipeline.
     pub fn iter(&self) -> impl Iterator<Item = &QueryTable> {
         self.tables.iter()
     }

@@ -13,7 +13,7 @@ use std::ffi::OsString;
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib fleet render FLEET.yaml --engine slurm --store /shared/store > jobs.sh
-  calib fleet render FLEET.yaml --engine k8s --store /store --image calib:0.1 --claim robots > job.yaml")]
+  calib fleet render FLEET.yaml --engine k8s --store /store --image calib:0.2 --claim robots > job.yaml")]
 pub(super) struct RenderArguments {
     #[command(flatten)]
     place: FleetLocation,

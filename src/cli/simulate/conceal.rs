@@ -71,7 +71,7 @@ pub(super) struct ConcealArguments {
     /// As most cells have it: robot files without masses, nothing on the tool, no motor currents
     #[arg(long)]
     bare: bool,
-    /// Rounds the logged joints to steps of so many degrees
+    /// Rounds the logged joints to steps of this size, deg
     #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     log_step: f64,
     /// Worker threads; no result depends on it [default: all cores]

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 ///
 /// Every file of DIR is held against seal.json first; one changed byte and nothing is revealed. VDIR/CASE.json is what
 /// `calib diagnose --json` printed for DIR/recordings/CASE. L is the squared displacement that geometry cannot absorb over the
-/// noise's variance: about 15 can be seen at all, 50 should be named.
+/// noise's variance: from about 15 an effect is detectable, from 50 it should be named.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate reveal blind --verdicts blind/verdicts

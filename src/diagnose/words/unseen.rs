@@ -43,7 +43,7 @@ pub(super) fn by_speed(last: &LastRound) -> Vec<String> {
     out
 }
 
-const ADVICE: &str = "geometry takes it up on this way: measure longer, faster, over the joints' whole range";
+const ADVICE: &str = "geometry absorbs it on this path: measure longer, faster, over the joints' whole range";
 
 fn size(limit: f64, unit: Unit) -> String {
     if limit.is_finite() { format!("by up to {:.1} {unit}", unit.from_si(limit)) } else { "by any amount".into() }

@@ -1,4 +1,4 @@
-//! Which poses to measure: D-optimal for the parameters that poses can tell, or T-optimal for telling two effects apart.
+//! Which poses to measure: D-optimal for the parameters that poses can tell, or T-optimal for separating two effects.
 //!
 //! Random allowed poses, the best of them by Fedorov's exchange, then exchanges with neighbours of what was chosen. Both aims
 //! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
@@ -37,6 +37,7 @@ pub enum Aim {
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub struct DesignRequest {
+    /// What the poses are for.
     pub aim: Aim,
     /// Poses to propose.
     pub count: usize,
@@ -44,6 +45,7 @@ pub struct DesignRequest {
     pub candidates: usize,
     /// Standard deviation per axis of a measured point, m.
     pub sigma: f64,
+    /// The same seed gives the same poses.
     pub seed: u64,
 }
 
@@ -57,6 +59,7 @@ pub struct Proposal {
     pub approach_seen: f64,
     /// Parameters that poses can tell, last the effects to separate.
     pub jacobian: PointJacobian,
+    /// Of the chosen poses.
     pub score: Score,
     /// The same for random sets of as many poses.
     pub random: Vec<Score>,
@@ -68,7 +71,9 @@ pub struct Proposal {
 
 /// How well an effect is told from its rival.
 pub struct Separation {
+    /// Canonical name.
     pub effect: String,
+    /// Canonical name.
     pub rival: String,
     /// Parameters that are separated, with their standard deviation (SI) beside the rival: proposed, and median of random sets.
     pub sigma: Vec<(usize, f64, f64)>,
@@ -107,7 +112,8 @@ pub fn propose(model: Model, site: &Site, wish: &DesignRequest) -> Result<Propos
     let Some((_, whole)) = jacobians.first() else { return Err("nothing to choose for".into()) };
     check(wish, &jacobians, whole)?;
     let terms = jacobians.iter().map(|(weight, jacobian)| DesignTerm::new(*weight, jacobian.clone(), &model, &drawn));
-    let criterion = Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidates do not tell the parameters apart")? };
+    let criterion =
+        Criterion { terms: terms.collect::<Option<_>>().ok_or("the candidate poses do not separate the parameters")? };
 
     let chosen = criterion.exchange(&model, &drawn, &[], wish.count);
     let mut poses = subset(&drawn, &chosen);
@@ -147,7 +153,7 @@ fn check(wish: &DesignRequest, jacobians: &[(f64, PointJacobian)], whole: &Point
     let least = parameters.div_ceil(3);
     if wish.count < least {
         return Err(format!(
-            "{} poses cannot tell {parameters} parameters: take at least {least}, better {parameters}",
+            "{} poses cannot determine {parameters} parameters: take at least {least}, better {parameters}",
             wish.count
         ));
     }
@@ -155,7 +161,7 @@ fn check(wish: &DesignRequest, jacobians: &[(f64, PointJacobian)], whole: &Point
         for ((_, without), (effect, rival)) in jacobians.iter().skip(1).zip([(a, b), (b, a)]) {
             if without.free().len() == parameters {
                 return Err(format!(
-                    "no allowed pose tells `{effect}` from `{rival}` and the other effects: more payloads, wider limits or fewer effects may"
+                    "no allowed pose separates `{effect}` from `{rival}` and the other effects: more payloads, wider limits or fewer effects may"
                 ));
             }
         }

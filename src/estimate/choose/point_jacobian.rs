@@ -28,6 +28,7 @@ pub struct PointJacobian {
 /// What a set of poses promises, before any measurement.
 #[derive(Debug, Clone)]
 pub struct Score {
+    /// How many points of the workspace.
     pub points: usize,
     /// Observability index O1, as after a fit.
     pub o1: f64,
@@ -35,7 +36,9 @@ pub struct Score {
     pub sigma: Vec<f64>,
     /// Length of one sigma of the predicted position over the workspace, m: median, 95th percentile, largest.
     pub median: f64,
+    /// 95th percentile, m.
     pub p95: f64,
+    /// m.
     pub max: f64,
 }
 

@@ -27,6 +27,7 @@ pub struct Circumstances {
     pub time: Option<f64>,
     /// Of the arm, C.
     pub temperature: Option<f64>,
+    /// The target that is measured, where there are several.
     pub target: Option<String>,
 }
 

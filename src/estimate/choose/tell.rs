@@ -22,13 +22,16 @@ pub struct Contest {
     pub model: Model,
     /// Positions in the stack of what is estimated whichever is true.
     pub nuisances: Vec<usize>,
+    /// The finding and its rival.
     pub sides: [Alternative; 2],
 }
 
 /// An explanation: its parameters' positions in the stack, and their values, SI.
 #[derive(Debug, Clone)]
 pub struct Alternative {
+    /// Positions in the stack.
     pub parameters: Vec<usize>,
+    /// Their sizes, SI.
     pub sizes: Vec<f64>,
 }
 
@@ -52,6 +55,7 @@ pub struct Proposed {
     pub approach_seen: f64,
     /// With the recorded rows; median of random sets of as many poses.
     pub after: [f64; 2],
+    /// The same of random sets of as many poses, their median.
     pub random: [f64; 2],
 }
 

@@ -9,7 +9,9 @@ use std::f64::consts::{LN_2, LOG2_E};
 /// The activation of the hidden layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Activation {
+    /// 1 / (1 + exp(-z)).
     Sigmoid,
+    /// tanh z.
     Tanh,
 }
 
@@ -46,6 +48,7 @@ impl Activation {
         }
     }
 
+    /// Its value at z.
     pub fn value(self, z: f64) -> f64 {
         let mut value = [(z * self.factor()).clamp(-FARTHEST, FARTHEST)];
         self.apply(&mut value);

@@ -21,8 +21,11 @@ pub struct Hinge {
 /// Screws, measured point (m) and the direction of gravity at the zero pose, tracker frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScrewArm {
+    /// One for each joint.
     pub hinges: Vec<Hinge>,
+    /// m, tracker's frame.
     pub tool: [f64; 3],
+    /// Direction of gravity, unit, tracker's frame.
     pub down: [f64; 3],
 }
 

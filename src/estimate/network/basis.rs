@@ -23,6 +23,7 @@ pub enum OutputMotion {
 pub enum Wave {
     /// Sine or cosine of `order` times a joint's angle.
     Sin(usize, usize),
+    /// The cosine of the same.
     Cos(usize, usize),
     /// The travel of a prismatic joint.
     Value(usize),
@@ -33,7 +34,9 @@ pub enum Wave {
 /// A way times the product of its waves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BasisTerm {
+    /// What its output moves.
     pub way: OutputMotion,
+    /// Factors that are multiplied.
     pub waves: Vec<Wave>,
 }
 
@@ -102,6 +105,7 @@ pub struct BasisFunctions<'a> {
 }
 
 impl<'a> BasisFunctions<'a> {
+    /// Terms over an arm; those that move joints need one.
     pub fn new(arm: Option<&'a ScrewArm>, terms: &'a [BasisTerm]) -> Self {
         let mut highest: Vec<usize> = Vec::new();
         for wave in terms.iter().flat_map(|term| &term.waves) {

@@ -12,19 +12,25 @@ use super::region::Region;
 /// How an input comes from a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Map {
+    /// As it is.
     Value,
+    /// Its sine.
     Sin,
+    /// Its cosine.
     Cos,
 }
 
 /// One input. Sources are the joints (rad or m, from 0), then the payload (kg).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Feature {
+    /// Number of the source.
     pub source: usize,
+    /// What is made of it.
     pub map: Map,
 }
 
 impl Feature {
+    /// Its value for the sources of a row.
     pub fn of(&self, sources: &[f64]) -> f64 {
         let value = sources[self.source];
         match self.map {
@@ -54,7 +60,9 @@ pub fn features(prismatic: &[bool], sin_cos: bool, payload: bool) -> Vec<Feature
 /// Linear scaling: `scaled = (value - mean) / scale`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaling {
+    /// Of the training rows.
     pub mean: f64,
+    /// Standard deviation of the training rows.
     pub scale: f64,
 }
 
@@ -66,6 +74,7 @@ impl Scaling {
         let scale = (values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / count).sqrt();
         Self { mean, scale: if scale > 1e-12 { scale } else { 1.0 } }
     }
+    /// (value - mean) / scale.
     pub fn scaled(&self, value: f64) -> f64 {
         (value - self.mean) / self.scale
     }
@@ -74,7 +83,9 @@ impl Scaling {
 /// Inputs and outputs with their scaling.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NetworkScaling {
+    /// Inputs, in order.
     pub features: Vec<Feature>,
+    /// Of each input.
     pub inputs: Vec<Scaling>,
     /// m.
     pub outputs: [Scaling; OUTPUTS],
@@ -98,6 +109,7 @@ impl NetworkScaling {
 /// Outputs that are motions of the joints, which move the point through the arm's Jacobian.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointMotion {
+    /// Whose joints the outputs move.
     pub arm: ScrewArm,
     /// Motion of each joint per unit of output, rad or m.
     pub scales: Vec<f64>,
@@ -114,6 +126,7 @@ impl JointMotion {
 /// Equal networks whose mean is the correction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Networks {
+    /// Inputs, neurons, outputs.
     pub shape: LayerSizes,
     /// `None`: outputs are the axes.
     pub joints: Option<JointMotion>,
@@ -131,15 +144,20 @@ impl Networks {
 /// What was learnt.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
+    /// Networks with one hidden layer, averaged.
     Networks(NetworkScaling, Networks),
+    /// A Gaussian process.
     Process(NetworkScaling, Process),
+    /// A sum of terms.
     Linear(Linear),
 }
 
 /// A learned correction with everything that is needed to apply it. Positions in m, tracker frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
+    /// What computes the displacement.
     pub body: Body,
+    /// Where it holds, and how it fades out beyond.
     pub region: Region,
     /// What is left of held-out rows, per axis, m: root mean square in cross-validation.
     pub left: f64,

@@ -15,18 +15,22 @@ const PATIENCE: usize = 20;
 /// One iteration of the training; iteration 0 is the start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescentIteration {
+    /// From 0.
     pub index: usize,
     /// Loss on the training rows, decay included.
     pub loss: f64,
     /// Mean squared error per output on the training rows, and on the rows kept back.
     pub train: [f64; OUTPUTS],
+    /// Mean squares of each output at the check rows, where there are some.
     pub check: Option<[f64; OUTPUTS]>,
+    /// Of the loss, so far.
     pub evaluations: u64,
 }
 
 /// Why the training ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DescentStop {
+    /// The limit of iterations.
     Iterations,
     /// The loss no longer falls.
     Flat,
@@ -37,8 +41,11 @@ pub enum DescentStop {
 /// A trained network.
 #[derive(Debug, Clone)]
 pub struct Descent {
+    /// At the best iteration.
     pub parameters: Vec<f64>,
+    /// Iteration by iteration.
     pub history: Vec<DescentIteration>,
+    /// Why it ended.
     pub stop: DescentStop,
 }
 

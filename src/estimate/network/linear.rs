@@ -29,7 +29,9 @@ pub const DRAWS: usize = 8;
 /// Terms and their coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linear {
+    /// For terms that move joints.
     pub arm: Option<ScrewArm>,
+    /// What is summed.
     pub terms: Vec<BasisTerm>,
     /// The most likely coefficients, then [`DRAWS`] draws from the posterior.
     pub members: Vec<Vec<f64>>,

@@ -47,6 +47,7 @@ impl Batch {
         self
     }
 
+    /// How many rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
@@ -87,6 +88,7 @@ pub struct LossBuffers {
 }
 
 impl LossBuffers {
+    /// Buffers for a network of this shape.
     pub fn new(shape: LayerSizes) -> Self {
         let block = |count: usize| vec![[0.0; BLOCK]; count];
         Self {
@@ -106,7 +108,9 @@ impl LossBuffers {
 /// A shape, the rows it is trained on and the decay: what is minimised.
 #[derive(Debug, Clone, Copy)]
 pub struct Loss<'a> {
+    /// Of the network.
     pub shape: LayerSizes,
+    /// Rows that it is fitted to.
     pub batch: &'a Batch,
     /// Weight of half the summed squared weights beside half the summed squared errors.
     pub decay: f64,

@@ -12,27 +12,36 @@ pub const OUTPUTS: usize = 3;
 /// Numbers of neurons; the parameters are kept apart from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LayerSizes {
+    /// Width of the input layer.
     pub inputs: usize,
+    /// Neurons.
     pub hidden: usize,
+    /// Width of the output layer.
     pub outputs: usize,
+    /// Of the hidden layer.
     pub activation: Activation,
 }
 
 impl LayerSizes {
+    /// How many weights and biases.
     pub fn parameters(&self) -> usize {
         self.output_biases().end
     }
+    /// Their place among the parameters, a row of inputs for each neuron.
     pub fn hidden_weights(&self) -> Range<usize> {
         0..self.hidden * self.inputs
     }
+    /// Their place among the parameters.
     pub fn hidden_biases(&self) -> Range<usize> {
         let start = self.hidden_weights().end;
         start..start + self.hidden
     }
+    /// Their place among the parameters, a row of neurons for each output.
     pub fn output_weights(&self) -> Range<usize> {
         let start = self.hidden_biases().end;
         start..start + self.outputs * self.hidden
     }
+    /// Their place among the parameters.
     pub fn output_biases(&self) -> Range<usize> {
         let start = self.output_weights().end;
         start..start + self.outputs

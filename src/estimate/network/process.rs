@@ -21,8 +21,11 @@ const PLAUSIBLE: f64 = 2.0;
 /// What the process remembers; inputs and outputs scaled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Process {
+    /// Length scale of each input, in scaled units.
     pub lengths: Vec<f64>,
+    /// Standard deviation of the function.
     pub signal: f64,
+    /// Standard deviation of the noise.
     pub noise: f64,
     /// Inputs of each row.
     pub rows: Vec<Vec<f64>>,

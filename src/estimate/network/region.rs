@@ -13,8 +13,11 @@ const LEAST_MARGIN: f64 = 0.01;
 /// The range of a source that the training saw, and how far beyond it the correction is gone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Valid {
+    /// Lowest training value.
     pub lower: f64,
+    /// Highest training value.
     pub upper: f64,
+    /// Over which the correction fades out beyond.
     pub margin: f64,
 }
 
@@ -41,10 +44,13 @@ impl Valid {
 /// All joints together: Mahalanobis' distance `|F (q - mean)|` of the farthest posture that was seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jointly {
+    /// Of the training rows.
     pub mean: Vec<f64>,
     /// Lower triangle of `F`, row by row.
     pub factor: Vec<Vec<f64>>,
+    /// Distance of the farthest posture.
     pub limit: f64,
+    /// Over which the correction fades out beyond.
     pub margin: f64,
 }
 
@@ -77,6 +83,7 @@ impl Jointly {
 pub struct Region {
     /// By source: the joints, and the payload where it was known in training, be it an input or not.
     pub ranges: Vec<Valid>,
+    /// Of all inputs together, where there are enough rows.
     pub jointly: Option<Jointly>,
 }
 

@@ -39,6 +39,7 @@ pub enum Rival {
 const KINDS: [fn(TrainingStart) -> Rival; 2] = [Rival::Network, Rival::JointNetwork];
 
 impl Rival {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ridge => "ridge",
@@ -79,9 +80,11 @@ impl Rival {
 /// What is compared.
 #[derive(Debug, Clone)]
 pub struct RivalContest<'a> {
+    /// What is compared.
     pub rivals: Vec<Rival>,
     /// What joint curves and joint networks go through; without it they are no rivals.
     pub arm: Option<&'a ScrewArm>,
+    /// Whether each joint slides.
     pub prismatic: &'a [bool],
     /// How the kept correction is trained.
     pub recipe: Recipe,
@@ -89,7 +92,9 @@ pub struct RivalContest<'a> {
     pub trial: Recipe,
     /// Decays and sizes of the hidden layer to choose from, with random starts.
     pub decays: Vec<f64>,
+    /// Numbers of neurons to compare.
     pub hidden: Vec<usize>,
+    /// Of the cross-validation.
     pub folds: usize,
 }
 
@@ -102,21 +107,26 @@ pub struct JudgedRival {
     pub left: Vec<f64>,
     /// Mean gain over no correction and its standard error, m.
     pub gain: f64,
+    /// Standard error of the mean gain, m.
     pub sigma: f64,
     /// Numbers of one correction, and evaluations of a loss for it; both of the first fold.
     pub numbers: usize,
+    /// Of the loss, in training.
     pub evaluations: u64,
     /// Hidden neurons and decay of networks.
     pub settings: Option<(usize, f64)>,
 }
 
 impl JudgedRival {
+    /// m.
     pub fn mean(&self) -> f64 {
         mean(&self.left)
     }
+    /// m.
     pub fn rms(&self) -> f64 {
         (self.left.iter().map(|e| e * e).sum::<f64>() / self.left.len().max(1) as f64).sqrt()
     }
+    /// m.
     pub fn max(&self) -> f64 {
         self.left.iter().copied().fold(0.0, f64::max)
     }
@@ -129,7 +139,9 @@ impl JudgedRival {
 /// Everything learnt from the samples: the rivals as judged, and the number of the one to keep (0: no correction).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RivalComparison {
+    /// Every rival with its cross-validated errors.
     pub judged: Vec<JudgedRival>,
+    /// Position of the one that is kept; 0 is no correction.
     pub chosen: usize,
 }
 

@@ -6,11 +6,14 @@ use crate::robot::pose_groups::{NEAR, grouped};
 /// Rows to learn from: sources (joints, payload) and the residual to be explained, m.
 #[derive(Debug, Clone, Default)]
 pub struct TrainingSamples {
+    /// Of each row: joints (rad or m), then payload (kg).
     pub sources: Vec<Vec<f64>>,
+    /// Measured minus predicted of each row, m.
     pub residual: Vec<[f64; OUTPUTS]>,
 }
 
 impl TrainingSamples {
+    /// How many rows.
     pub fn rows(&self) -> usize {
         self.residual.len()
     }
@@ -26,6 +29,7 @@ impl TrainingSamples {
         number
     }
 
+    /// Some of the rows.
     pub fn pick(&self, rows: &[usize]) -> Self {
         Self {
             sources: rows.iter().map(|r| self.sources[*r].clone()).collect(),

@@ -25,10 +25,12 @@ const SWARM_BOUND: f64 = 1.0;
 pub enum TrainingStart {
     /// Weights drawn evenly from the box that swarms search.
     Random,
+    /// By a swarm of networks.
     Swarm(Algorithm),
 }
 
 impl TrainingStart {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -42,43 +44,59 @@ impl TrainingStart {
 pub struct Recipe {
     /// How many of the sources are joints; one more is the payload.
     pub joints: usize,
+    /// Inputs, in order.
     pub features: Vec<Feature>,
     /// Outputs are motions of this arm's joints (Fig. 2 of the paper); without it, of the point.
     pub through: Option<ScrewArm>,
+    /// Neurons.
     pub hidden: usize,
+    /// Of the hidden layer.
     pub activation: Activation,
+    /// Where the gradient descent begins.
     pub start: TrainingStart,
+    /// Members of the swarm.
     pub beetles: usize,
+    /// Of the swarm.
     pub generations: usize,
     /// Most iterations of the gradient training.
     pub iterations: usize,
+    /// Weight decay.
     pub decay: f64,
     /// Networks whose mean is the correction.
     pub members: usize,
     /// Share of the rows kept back from each member's training to stop it early.
     pub keep_back: f64,
+    /// Of start and swarm.
     pub seed: u64,
+    /// Threads; the result does not depend on them.
     pub jobs: usize,
 }
 
 /// Which part of the training a record is from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
+    /// The swarm looks for a start.
     Swarm,
+    /// The gradient goes on from there.
     Gradient,
 }
 
 /// One generation or iteration of the training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainingStep {
+    /// Which part of the training.
     pub phase: Phase,
     /// From 1; the swarm serves all members and has 0.
     pub member: usize,
+    /// Generation or iteration, from 0.
     pub index: usize,
+    /// Lowest loss so far.
     pub best: f64,
     /// Root of the mean squared length of the error on the training rows, m, and on the rows kept back.
     pub train_rms: f64,
+    /// At rows that it is not fitted to, m.
     pub check_rms: Option<f64>,
+    /// Of the loss, so far.
     pub evaluations: u64,
 }
 

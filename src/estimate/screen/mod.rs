@@ -23,6 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Suspect {
     /// Row of the recording, from 0.
     pub row: usize,
+    /// How it differs from its neighbours.
     pub kind: SuspectKind,
     /// The row whose joints put the tool where this row was measured.
     pub partner: Option<usize>,

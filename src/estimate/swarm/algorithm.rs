@@ -50,8 +50,10 @@ macro_rules! with {
 }
 
 impl Algorithm {
+    /// All of them, as tables list them.
     pub const ALL: [Self; 5] = [Self::Bas, Self::Bso, Self::Pso, Self::Ga, Self::Abc];
 
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bas => "bas",

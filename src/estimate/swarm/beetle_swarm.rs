@@ -12,6 +12,7 @@ use rand::RngExt;
 /// Parameters of beetle swarm optimisation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BeetleSwarm {
+    /// Members.
     pub beetles: usize,
     /// Share of the swarm's velocity in a move; the rest follows the antennae.
     pub lambda: f64,

@@ -8,6 +8,7 @@ use rand::rngs::ChaCha8Rng;
 /// Parameters of the genetic algorithm; the default is usual for real numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Genetic {
+    /// Members.
     pub individuals: usize,
     /// The best so many live on unchanged.
     pub elite: usize,

@@ -23,6 +23,7 @@ pub enum Landscape {
 }
 
 impl Landscape {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Michalewicz => "michalewicz",
@@ -32,6 +33,7 @@ impl Landscape {
         }
     }
 
+    /// Its value at a point of any dimension.
     pub fn value(self, x: &[f64]) -> f64 {
         let n = x.len() as f64;
         match self {

@@ -27,7 +27,9 @@ use rand::{RngExt, SeedableRng};
 pub trait Objective: Sync {
     /// Memory that one thread reuses between evaluations.
     type Scratch;
+    /// Buffers, one a thread.
     fn scratch(&self) -> Self::Scratch;
+    /// What is minimised, at a point within the bounds.
     fn value(&self, x: &[f64], scratch: &mut Self::Scratch) -> f64;
 }
 
@@ -57,6 +59,7 @@ impl SearchBox {
     pub fn cube(dimensions: usize, lower: f64, upper: f64) -> Self {
         Self::new(vec![lower; dimensions], vec![upper; dimensions])
     }
+    /// How many numbers are searched.
     pub fn dimensions(&self) -> usize {
         self.lower.len()
     }
@@ -79,11 +82,13 @@ impl SearchBox {
 /// How long to search, and with what.
 #[derive(Debug, Clone)]
 pub struct Budget {
+    /// At most.
     pub generations: usize,
     /// No generation is begun once so many evaluations are spent.
     pub evaluations: Option<u64>,
     /// The search ends where the best value is at or below this.
     pub target: Option<f64>,
+    /// The same seed gives the same search.
     pub seed: u64,
     /// Threads that evaluate; the result does not depend on it.
     pub jobs: usize,
@@ -92,6 +97,7 @@ pub struct Budget {
 /// One generation of the history; generation 0 is the start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generation {
+    /// From 0.
     pub index: usize,
     /// Best value so far.
     pub best: f64,
@@ -104,25 +110,34 @@ pub struct Generation {
 /// Why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchStop {
+    /// The limit of generations.
     Generations,
+    /// The limit of evaluations.
     Evaluations,
+    /// The wanted value was reached.
     Target,
 }
 
 /// What a search found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SwarmResult {
+    /// The best point.
     pub position: Vec<f64>,
+    /// The value there.
     pub value: f64,
     /// The best position of each individual with its value, best first.
     pub elite: Vec<(f64, Vec<f64>)>,
+    /// Generation by generation.
     pub history: Vec<Generation>,
+    /// How often the function was asked.
     pub evaluations: u64,
+    /// Why it ended.
     pub stop: SearchStop,
 }
 
 /// A swarm optimiser: plain parameters, with the state of a search apart from them.
 pub trait Method {
+    /// What it keeps from generation to generation.
     type State;
     /// Evaluations of the first generation.
     fn first(&self) -> usize;

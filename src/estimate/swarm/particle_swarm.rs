@@ -8,6 +8,7 @@ use rand::RngExt;
 /// Parameters of particle swarm optimisation; the default is that of Shi and Eberhart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleSwarm {
+    /// Members.
     pub particles: usize,
     /// Pull to the particle's own best position.
     pub c1: f64,

@@ -26,7 +26,7 @@ impl Apart<'_> {
             let means =
                 other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
             return vec![
-                format!("no pose tells {finding} from {rival}: they do the same at every one"),
+                format!("no pose separates {finding} from {rival}: they move the point alike at every one"),
                 format!("instead: {means}"),
             ];
         };

@@ -17,14 +17,18 @@ mod urdf;
 /// A file's content and the name by which messages call it.
 #[derive(Debug, Clone, Copy)]
 pub struct RobotFileText<'a> {
+    /// Names the text in errors.
     pub label: &'a str,
+    /// YAML, URDF or JSON.
     pub text: &'a str,
 }
 
 /// A robot and what its reader wants to tell the person, e.g. keys that were not used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imported {
+    /// The robot as it is described.
     pub robot: RobotDescription,
+    /// What a person should know of how it was read, a sentence each.
     pub notes: Vec<String>,
 }
 

@@ -84,8 +84,11 @@ pub enum Decimal {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
+    /// Along x.
     X,
+    /// Along y.
     Y,
+    /// Along z.
     Z,
 }
 

@@ -169,6 +169,7 @@ pub struct CoupledColumn {
 /// Columns of a quantity of several numbers, by convention.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ConventionColumns {
+    /// Setting -> columns of the file.
     #[serde(flatten)]
     pub columns: BTreeMap<&'static str, Vec<ColumnRef>>,
     /// Unit of the numbers, e.g. `deg`.

@@ -19,7 +19,9 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum InstrumentSetting {
+    /// By name.
     Named(&'static str),
+    /// By numbers.
     Figures(Instrument),
 }
 

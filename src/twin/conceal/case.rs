@@ -18,6 +18,7 @@ use std::collections::BTreeSet;
 /// A recording that was tampered with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tampering {
+    /// What was done, by its canonical name.
     pub effect: &'static str,
     /// Rows, from 0.
     pub rows: Vec<usize>,
@@ -26,27 +27,43 @@ pub struct Tampering {
 /// A finished case.
 #[derive(Debug, Clone)]
 pub struct Case {
+    /// As its folder is called.
     pub name: String,
+    /// What it conceals.
     pub content: Content,
+    /// The list that its effects are drawn from.
     pub collection: Collection,
+    /// Of this case.
     pub seed: u64,
+    /// Of the robot.
     pub kind: Kind,
+    /// As its owner believes it to be.
     pub robot: RobotDescription,
     /// Whether the robot file keeps the masses of the links to itself.
     pub bare: bool,
+    /// As it is.
     pub truth: TrueRobot,
+    /// Where it stands and how well it measures.
     pub tracker: Tracker,
     /// Joint repeatability, rad.
     pub play_rad: f64,
+    /// Clock and temperature.
     pub climate: Climate,
+    /// Effects, each with how visible it is.
     pub concealed: Vec<Concealed>,
+    /// Names and places that are right too, since the data cannot separate them.
     pub accepted: Vec<(&'static str, String)>,
+    /// Columns that the recording lacks.
     pub hidden: BTreeSet<Column>,
+    /// Gross errors and exchanged points.
     pub tampered: Vec<Tampering>,
+    /// Measured points in their order.
     pub shots: Vec<Shot>,
     /// Declared payload of every shot, kg, and what the arm's thermometer says, C.
     pub payload_kg: Vec<f64>,
+    /// C.
     pub thermometer_c: Vec<f64>,
+    /// How many of the points, from the first, are to be fitted.
     pub fit: usize,
     /// Root mean square of a coordinate's noise at the points to fit and at those held out, mm.
     pub noise_mm: [f64; 2],

@@ -8,8 +8,11 @@ use crate::twin::tracker::Scatter;
 /// Shares and bounds of a set of cases; everything else comes from the seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Design {
+    /// The same seed gives the same cases.
     pub seed: u64,
+    /// How many.
     pub cases: usize,
+    /// The list that effects are drawn from.
     pub collection: Collection,
     /// Canonical names that single effects and pairs are drawn from; empty: all, of the library but `unknown`.
     pub families: Vec<String>,
@@ -19,7 +22,9 @@ pub struct Design {
     pub points: Option<usize>,
     /// Shares of cases without an effect, with two, with one outside every list; the rest has one.
     pub nulls: f64,
+    /// With two effects.
     pub pairs: f64,
+    /// With an effect outside every list.
     pub open: f64,
     /// Share of effects in another form than the obvious one.
     pub other_forms: f64,
@@ -60,9 +65,11 @@ impl Default for Design {
 /// What a case conceals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Content {
+    /// No effect.
     Null,
     /// One effect of this row of the collection's families.
     Single(usize),
+    /// Two effects, of these rows.
     Pair(usize, usize),
 }
 

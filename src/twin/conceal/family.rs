@@ -24,17 +24,24 @@ use crate::twin::truth::ARCSEC;
 /// A column of the recording that may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Column {
+    /// The clock.
     Time,
+    /// The temperature.
     Temperature,
+    /// Motor currents.
     Current,
+    /// Sides of approach.
     Direction,
 }
 
 /// One concealed cause: what a diagnosis should name, and what the twin does for it.
 #[derive(Debug, Clone)]
 pub struct Cause {
+    /// Canonical name.
     pub effect: &'static str,
+    /// In the words of the interface.
     pub place: String,
+    /// What makes it.
     pub physical: Vec<Physical>,
     /// Its size may be changed to reach a visibility.
     pub sized: bool,
@@ -47,6 +54,7 @@ pub struct Cause {
 pub struct Draft {
     /// The form, in a few words.
     pub form: &'static str,
+    /// More than one where they act together.
     pub causes: Vec<Cause>,
     /// Names that are true as well, or that no position data can separate: they neither count nor hurt.
     pub accepted: Vec<(&'static str, String)>,
@@ -95,14 +103,18 @@ fn link(number: usize) -> String {
 /// Whether a form is the one that a library would hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
+    /// As a library would hold it.
     Obvious,
+    /// Otherwise.
     Other,
 }
 
 /// What a family may look at: the robot, the plan, and the loads of the undeflected arm.
 #[derive(Debug)]
 pub struct Bench<'a> {
+    /// As its owner believes it to be.
     pub robot: &'a RobotDescription,
+    /// Of every joint, deg.
     pub ranges_deg: &'a [[f64; 2]],
     /// Largest torque on each joint over the points, Nm.
     pub peak: Vec<f64>,
@@ -110,6 +122,7 @@ pub struct Bench<'a> {
     pub overturning: f64,
     /// When the last point to fit is measured, and when the load changes, s.
     pub end_s: f64,
+    /// s.
     pub change_s: f64,
 }
 
@@ -272,6 +285,7 @@ pub enum Collection {
 }
 
 impl Collection {
+    /// Kinds of effects that are drawn.
     pub fn families(self) -> &'static [Family] {
         match self {
             Self::Library => FAMILIES,
@@ -279,6 +293,7 @@ impl Collection {
         }
     }
 
+    /// Robots that are drawn.
     pub fn robots(self) -> &'static [Kind] {
         match self {
             Self::Library => &KINDS,

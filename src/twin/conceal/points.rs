@@ -8,12 +8,15 @@ use crate::twin::truth::TrueRobot;
 
 /// Blocks of the plan: points to fit and points held out.
 pub const FIT: usize = 0;
+/// Number of the block of points to judge by.
 pub const VALIDATE: usize = 1;
 
 /// How many points, and which of them twice.
 #[derive(Debug, Clone, Copy)]
 pub struct Amount {
+    /// To fit.
     pub fit: usize,
+    /// To judge by.
     pub validate: usize,
     /// Share of points that repeat the one before.
     pub repeated: f64,

@@ -17,6 +17,7 @@ pub enum Kind {
 
 /// Those that recordings with effects of the library are made of.
 pub const KINDS: [Kind; 3] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r];
+/// All of them.
 pub const ALL_KINDS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 
 /// Joint by joint: axis, point on it (mm), mass (kg), its centre (mm), gear, Nm/A, range of measurement (deg).
@@ -65,6 +66,7 @@ const FIVE5R: [Row; 5] = [
 ];
 
 impl Kind {
+    /// As the command line names it.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Sr210d => "sr210d",

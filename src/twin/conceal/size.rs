@@ -9,15 +9,19 @@ use crate::twin::noise::Noise;
 /// A cause with how visible it is at the points to fit.
 #[derive(Debug, Clone)]
 pub struct Concealed {
+    /// What acts.
     pub cause: Cause,
+    /// The word for its form.
     pub form: &'static str,
     /// Made by a formula that a library is not expected to hold; stated of what lies beyond the library.
     pub strange: bool,
     /// Root mean square of its displacement per axis, mm: all of it, and what geometry and the other causes leave.
     pub raw_mm: f64,
+    /// What geometry and the other causes leave, mm.
     pub visible_mm: f64,
     /// Squared visible displacement over the noise's variance, `3 N SNR^2`: beside the other causes, and with geometry alone.
     pub strength: f64,
+    /// With geometry alone.
     pub strength_alone: f64,
 }
 

@@ -16,10 +16,13 @@ use crate::twin::truth::TrueRobot;
 /// What a recording is made of, but for its effects and its noise.
 #[derive(Debug, Clone, Copy)]
 pub struct Site<'a> {
+    /// As its owner believes it to be.
     pub robot: &'a RobotDescription,
     /// With a number for every joint, link and coupling.
     pub truth: &'a TrueRobot,
+    /// Where it stands and how well it measures.
     pub tracker: &'a Tracker,
+    /// In the order of measurement.
     pub points: &'a [Point],
 }
 

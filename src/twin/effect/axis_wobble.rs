@@ -20,6 +20,7 @@ pub struct AxisWobble {
     /// Second half axis per first: 0 swings in one plane, 1 goes round.
     #[serde(default)]
     pub ellipse: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -18,6 +18,7 @@ pub struct BaseSway {
     pub turn_arcsec: Vector,
     /// s.
     pub period_s: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

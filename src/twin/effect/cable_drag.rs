@@ -25,6 +25,7 @@ pub struct CableDrag {
     pub by: usize,
     /// Share of the other joint in the bend of the hose.
     pub lead: f64,
+    /// How it pulls.
     pub pull: Pull,
     /// Turn of the joint by the pull, arcsec.
     #[serde(default)]
@@ -32,6 +33,7 @@ pub struct CableDrag {
     /// Torque of the pull, Nm: the joint's spring and the motor feel it.
     #[serde(default)]
     pub torque_nm: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

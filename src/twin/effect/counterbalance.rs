@@ -20,9 +20,11 @@ pub enum Balancer {
 pub struct Counterbalance {
     /// From 1.
     pub joint: usize,
+    /// What pushes.
     pub balancer: Balancer,
     /// The largest torque on the joint, Nm; its sign is that of the turn.
     pub torque_nm: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -21,6 +21,7 @@ pub struct GearCyclic {
     /// Growth of the amplitude with the load, arcsec per Nm.
     #[serde(default)]
     pub arcsec_per_nm: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }
@@ -35,6 +36,7 @@ pub struct GearMotorCyclic {
     pub order: f64,
     /// arcsec at the joint.
     pub amplitude_arcsec: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -17,6 +17,7 @@ pub struct GearEccentricity {
     pub amplitude_arcsec: f64,
     /// Below 1.
     pub skew: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -15,6 +15,7 @@ pub struct GearFlank {
     pub order: f64,
     /// Half the difference of the two flanks, arcsec.
     pub amplitude_arcsec: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -13,7 +13,9 @@ pub struct GearLoad {
     pub joint: usize,
     /// Periods per turn of the joint.
     pub order: f64,
+    /// Amplitude for each Nm of load.
     pub arcsec_per_nm: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
     /// Torque at which the mesh is fully in contact, Nm; 0: it never is.

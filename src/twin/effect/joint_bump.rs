@@ -13,7 +13,9 @@ pub struct JointBump {
     pub joint: usize,
     /// arcsec.
     pub amplitude_arcsec: f64,
+    /// Its middle, deg.
     pub centre_deg: f64,
+    /// Its width, deg.
     pub width_deg: f64,
 }
 

@@ -25,6 +25,7 @@ pub enum Curve {
 pub struct JointHardening {
     /// From 1.
     pub joint: usize,
+    /// Over the torque.
     pub curve: Curve,
     /// arcsec.
     pub amplitude_arcsec: f64,

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 pub struct JointHinge {
     /// From 1.
     pub joint: usize,
+    /// Where it begins, deg.
     pub from_deg: f64,
     /// arcsec per rad beyond.
     pub arcsec_per_rad: f64,

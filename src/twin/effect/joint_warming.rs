@@ -25,6 +25,7 @@ pub enum Heat {
 pub struct JointWarming {
     /// From 1.
     pub joint: usize,
+    /// What warms the joint.
     pub heat: Heat,
     /// Time constant, s; of temperature 0: at once.
     #[serde(default)]

@@ -97,9 +97,13 @@ use serde::{Deserialize, Serialize};
 
 /// What an effect may look at: the row, and the arm as it hangs at present.
 pub struct State<'a> {
+    /// As it really is.
     pub arm: &'a Arm,
+    /// What is recorded at this point.
     pub row: &'a Row,
+    /// Where everything is.
     pub posture: &'a Posture,
+    /// What it carries.
     pub loads: &'a Loads,
     /// Torque of gravity and of other loads on each joint, Nm.
     pub torque: &'a [f64],

@@ -15,6 +15,7 @@ pub struct ThermalBow {
     pub um_per_m_k: f64,
     /// Temperature at which the link has its length, C.
     pub reference_c: f64,
+    /// Of the cosine of the next joint.
     pub power: i32,
 }
 

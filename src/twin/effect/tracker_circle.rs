@@ -24,9 +24,11 @@ pub enum Circle {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrackerCircle {
+    /// Which circle.
     pub circle: Circle,
     /// arcsec.
     pub amplitude_arcsec: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
 }

@@ -31,6 +31,7 @@ pub struct TrackerDrift {
     pub turn_arcsec: Vector,
     /// Time constant, h; for the courses that do not settle, the time at which the motion is as stated.
     pub settling_h: f64,
+    /// Over time.
     #[serde(default)]
     pub course: Course,
 }

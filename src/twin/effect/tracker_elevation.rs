@@ -18,6 +18,7 @@ pub struct TrackerElevation {
     pub sag_arcsec: f64,
     /// The elevation by this times `sin(elevation + phase)`, arcsec.
     pub circle_arcsec: f64,
+    /// Phase at zero, deg.
     pub phase_deg: f64,
     /// The azimuth by this times the tangent of the elevation, arcsec: the transit axis is not square to the standing one.
     pub transit_arcsec: f64,

@@ -18,6 +18,7 @@ pub struct TrackerOffset {
     pub cyclic_um: f64,
     /// Length of the cycle, mm.
     pub wave_mm: f64,
+    /// Phase of the cycle at the instrument, deg.
     pub phase_deg: f64,
     /// Times the square of the range, um per m2.
     pub um_per_m2: f64,

@@ -19,6 +19,7 @@ pub struct TrackerSway {
     pub turn_arcsec: Vector,
     /// s.
     pub period_s: f64,
+    /// Phase at zero, deg.
     #[serde(default)]
     pub phase_deg: f64,
     /// Time in which the swing fades to 37 %, s; 0: never.

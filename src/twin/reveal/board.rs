@@ -16,9 +16,13 @@ pub const NEAR_BOUND: f64 = 1.15;
 /// Outcomes of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Counts {
+    /// Named, at their places.
     pub exact: usize,
+    /// Among the rivals.
     pub in_set: usize,
+    /// Not named, and something else was.
     pub wrong: usize,
+    /// Not named, and nothing else was.
     pub silent: usize,
 }
 
@@ -35,9 +39,11 @@ impl Counts {
         }
         out
     }
+    /// All of them.
     pub fn all(&self) -> usize {
         self.exact + self.in_set + self.wrong + self.silent
     }
+    /// Those that were named.
     pub fn exactly(&self) -> Share {
         Share { count: self.exact, of: self.all() }
     }
@@ -46,6 +52,7 @@ impl Counts {
 /// All marked cases.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Board {
+    /// One a recording.
     pub cases: Vec<Case>,
     /// Cases without a verdict, or with one that cannot be read, and why.
     pub missing: Vec<(String, String)>,

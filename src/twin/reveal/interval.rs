@@ -8,8 +8,11 @@ use crate::units::Unit;
 /// Whether a stated 95 % interval holds the true number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interval {
+    /// Canonical name of the effect.
     pub effect: String,
+    /// Of the number.
     pub name: String,
+    /// Whether it holds the truth.
     pub holds: bool,
 }
 

@@ -20,6 +20,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// As tables hold it.
     pub fn name(self) -> &'static str {
         match self {
             Outcome::Exact => "exact",
@@ -33,13 +34,19 @@ impl Outcome {
 /// A cause and how it was named.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marked {
+    /// Canonical name.
     pub effect: String,
+    /// In the words of the interface.
     pub place: String,
+    /// The word for its form.
     pub form: String,
     /// Made by a formula that the library is not expected to hold.
     pub strange: bool,
+    /// L, squared visible displacement over the variance of the noise.
     pub strength: f64,
+    /// How it was named.
     pub outcome: Outcome,
+    /// Whether its place was found.
     pub placed: Placed,
     /// What was said instead, strongest first: `effect at place`.
     pub said: Option<String>,
@@ -50,7 +57,9 @@ pub struct Marked {
 /// Held-out errors against what noise and the parameters' uncertainty leave, rms mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOut {
+    /// Of the base model.
     pub before: f64,
+    /// With the findings.
     pub after: f64,
     /// `floor sqrt(1 + p / (n - p - 1))` with the true noise, p of geometry and of the findings, n coordinates to fit.
     pub bound: f64,
@@ -71,19 +80,29 @@ impl HeldOut {
 /// A marked case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Case {
+    /// Of the recording.
     pub name: String,
+    /// What it conceals, in a word.
     pub content: String,
+    /// Of its effect.
     pub family: String,
+    /// Its kind.
     pub robot: String,
+    /// How many were measured.
     pub points: usize,
+    /// As it was given.
     pub verdict: String,
+    /// What was concealed.
     pub causes: Vec<Marked>,
     /// Faults of the recording, and whether each was named.
     pub tampered: Vec<(String, bool)>,
     /// Findings that are neither wanted nor accepted, strongest first.
     pub strays: Vec<String>,
+    /// Where points were held out.
     pub held_out: Option<HeldOut>,
+    /// Of the numbers that were stated.
     pub intervals: Vec<Interval>,
+    /// With a probability.
     pub statements: Vec<Statement>,
 }
 

@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 /// An effect and its place.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 pub struct Name {
+    /// Canonical name.
     pub effect: String,
+    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
 }
@@ -14,10 +16,14 @@ pub struct Name {
 /// A true number.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Number {
+    /// Of the parameter.
     pub name: String,
+    /// In `unit`.
     pub value: f64,
+    /// Symbol.
     #[serde(default)]
     pub unit: String,
+    /// One standard deviation, if stated.
     #[serde(default)]
     pub sigma: Option<f64>,
 }
@@ -25,9 +31,12 @@ pub struct Number {
 /// A concealed cause.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Cause {
+    /// Canonical name.
     pub effect: String,
+    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
+    /// The word for its form.
     pub form: String,
     /// Made by a formula that the library is not expected to hold.
     #[serde(default)]
@@ -38,7 +47,9 @@ pub struct Cause {
     /// Squared visible displacement over the noise's variance.
     #[serde(rename = "L")]
     pub strength: f64,
+    /// What geometry and the other causes leave, rms, mm.
     pub visible_rms_mm: f64,
+    /// Its true numbers.
     pub parameters: Vec<Number>,
 }
 
@@ -46,53 +57,75 @@ fn yes() -> bool {
     true
 }
 
+/// How many points.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Points {
+    /// To fit.
     pub fit: usize,
+    /// To judge by.
     pub validate: usize,
 }
 
+/// Noise as it fell out, mm.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct NoiseSize {
+    /// At the points to fit.
     pub fit_rms_per_axis_mm: f64,
+    /// At the points to judge by.
     pub validate_rms_per_axis_mm: f64,
 }
 
 /// The truth of a case; what it holds besides is not needed here.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Truth {
+    /// Name of the recording.
     pub case: String,
     /// `null`, `single`, `pair`, `open`.
     pub content: String,
+    /// Of its effect.
     pub family: String,
+    /// Its kind.
     pub robot: String,
+    /// Names that are right too.
     pub accepted: Vec<Name>,
+    /// What was concealed.
     pub effects: Vec<Cause>,
     /// Faults of the recording itself.
     pub tampered: Vec<Name>,
+    /// How many points.
     pub points: Points,
+    /// Numbers that geometry amounts to.
     pub geometry_rank: usize,
+    /// As it fell out.
     pub noise: NoiseSize,
 }
 
+/// Errors of held-out points.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub struct Errors {
+    /// rms, mm.
     #[serde(default)]
     pub validate_rms_mm: Option<f64>,
 }
 
+/// A finding as the diagnosis states it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Finding {
+    /// Canonical name.
     pub effect: String,
+    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
+    /// Fitted numbers.
     #[serde(default)]
     pub parameters: Vec<Number>,
+    /// Explanations that were not excluded.
     #[serde(default)]
     pub rivals: Vec<Rival>,
     /// That it is this effect at this place, and that it acts at this place.
     #[serde(default)]
     pub probability: Option<f64>,
+    /// Of the place.
     #[serde(default)]
     pub place_probability: Option<f64>,
 }
@@ -100,9 +133,12 @@ pub struct Finding {
 /// Another explanation of a finding.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Rival {
+    /// Canonical name.
     pub effect: String,
+    /// In the words of the interface.
     #[serde(rename = "where")]
     pub place: String,
+    /// Of this rival.
     #[serde(default)]
     pub probability: Option<f64>,
 }
@@ -110,11 +146,15 @@ pub struct Rival {
 /// What a diagnosis said.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Answer {
+    /// As it was given.
     pub verdict: String,
+    /// Of the base model.
     #[serde(default)]
     pub before: Option<Errors>,
+    /// With the findings.
     #[serde(default)]
     pub after: Option<Errors>,
+    /// The strongest first.
     pub findings: Vec<Finding>,
 }
 

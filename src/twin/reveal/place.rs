@@ -58,8 +58,11 @@ pub(super) fn placed(
 /// Shares of causes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Places {
+    /// Right places.
     pub place: Share,
+    /// Right names, or `unknown` at the right place.
     pub name_or_unknown: Share,
+    /// Wrong names.
     pub wrong_name: Share,
 }
 

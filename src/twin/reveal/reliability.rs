@@ -14,6 +14,7 @@ pub enum Subject {
 }
 
 impl Subject {
+    /// As people read it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Name => "names",
@@ -25,18 +26,24 @@ impl Subject {
 /// Something that was said with a probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Statement {
+    /// What it is about.
     pub subject: Subject,
+    /// As it was stated.
     pub probability: f64,
+    /// Whether it held.
     pub right: bool,
 }
 
 /// Statements whose probability lies in a range, and how many of them are right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bin {
+    /// Lower end.
     pub from: f64,
+    /// Upper end.
     pub to: f64,
     /// Mean of the stated probabilities.
     pub stated: f64,
+    /// Statements that held.
     pub right: Share,
 }
 

@@ -3,7 +3,9 @@
 /// How many of how many, with Wilson's 95 % limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Share {
+    /// So many.
     pub count: usize,
+    /// Of so many.
     pub of: usize,
 }
 
@@ -12,6 +14,7 @@ impl Share {
     pub fn of(all: impl IntoIterator<Item = bool>) -> Share {
         all.into_iter().fold(Share::default(), |share, holds| Share { count: share.count + usize::from(holds), of: share.of + 1 })
     }
+    /// The fraction; none of nothing.
     pub fn value(&self) -> Option<f64> {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
     }

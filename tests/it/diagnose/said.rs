@@ -111,7 +111,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     assert_eq!(said["leftover"]["p_value"], Value::Null);
     assert_eq!(
         said["not_observable"][0],
-        "what is missing: 12 rows were fitted, at least 15 are needed to tell it from geometry"
+        "what is missing: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
     let text = calib(&["diagnose", "HEAD"], here);
     assert!(text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"), "{text}");

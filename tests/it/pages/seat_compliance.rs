@@ -1,0 +1,96 @@
+use calib::effect::{Axes, Basis, Cause, CauseDescription, Hypothesis, Law, Motion, NumberSpec, Summary, Survey, Term, Variable};
+use calib::robot::RobotModel;
+use calib::units::Unit;
+
+/// The seat of the tool yields in proportion to the payload.
+pub struct SeatCompliance;
+
+impl Cause for SeatCompliance {
+    fn about(&self) -> &'static CauseDescription {
+        &CauseDescription {
+            name: "seat_compliance",
+            place: "tool",
+            formula: "the target moves by c times the payload over the largest payload",
+            size: "10 to 200 um",
+            confounded: "payload_error, joint_compliance of the last joints",
+            needs: "rows with and without the payload",
+        }
+    }
+
+    /// One hypothesis, where the recording can tell.
+    fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
+        if !survey.payload_changes() {
+            return Vec::new();
+        }
+        let law = Law::new(Variable::Payload, Basis::Linear { zero: 0.0, per: 2.0 * survey.heavy_payload() });
+        vec![Hypothesis::new(Term::new(&Self, Motion::Tool { axes: Axes::Place }, law), 1)]
+    }
+
+    /// Its three numbers: name, unit for people, and how large they may be (SI).
+    fn numbers(&self, _term: &Term, _robot: &RobotModel) -> Vec<NumberSpec> {
+        ["x", "y", "z"].map(|axis| (axis.to_string(), Unit::Millimetre, 1e-3)).into()
+    }
+
+    fn sentence(&self, summary: &Summary) -> String {
+        let square = summary.parameters.iter().map(|number| number.value.powi(2)).sum::<f64>();
+        format!("the seat of the tool yields by {:.3} mm under the largest payload", square.sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture;
+    use calib::effect::{Clock, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, whole};
+    use calib::estimate::{FitOptions, Model, fit};
+    use calib::robot::Measurements;
+    use calib::spatial::{Pose, Twist};
+    use nalgebra::Vector3;
+
+    /// Yield along the axes of the tool, m.
+    const TRUE: [f64; 3] = [40e-6, 0.0, -120e-6];
+
+    #[test]
+    fn the_cause_of_the_walk_is_proposed_fitted_and_put_into_words() {
+        let robot = RobotModel::new(fixture::spherical());
+        let rows: Vec<usize> = (0..60).collect();
+        let mut data = Measurements {
+            joints: robot.joints(),
+            q: fixture::poses(robot.description(), rows.len()),
+            position: vec![Vector3::zeros(); rows.len()],
+            sigma: vec![Vector3::repeat(1e-5); rows.len()],
+            payload: rows.iter().map(|row| [0.0, 100.0, 210.0][row % 3]).collect(),
+            ..Measurements::default()
+        };
+        let (torque, compliance) = (vec![0.0; rows.len() * robot.joints()], vec![0.0; robot.joints()]);
+        let form: Form = {
+            let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
+            let [hypothesis] = SeatCompliance.propose(&survey).try_into().expect("one");
+            hypothesis.form
+        };
+        let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.1, 2.0));
+        let setting = EffectContext { base, load: Load::GravityTorque };
+        let effects: Vec<Box<dyn Effect>> = vec![whole("base_frame", &setting).expect("a cause"), Box::new(form.clone())];
+        let start = Model::nominal(robot.clone(), EffectStack::new(&robot, base, effects));
+        let mut truth = start.clone();
+        let first = truth.x.len() - 3;
+        truth.x[first..].copy_from_slice(&TRUE);
+        data.position = truth.predict(&data);
+        let candidates: Vec<usize> = (0..start.x.len()).collect();
+        let (fitted, _) = fit(&start, &data, &FitOptions { rows: &rows, candidates: &candidates });
+        for (found, truth) in fitted.x[first..].iter().zip(TRUE) {
+            assert!((found - truth).abs() < 1e-9, "{found} for {truth}");
+        }
+        let number = |(k, value): (usize, &f64)| ParameterEstimate {
+            name: fitted.stack.specs()[first + k].name.clone(),
+            form: 0,
+            value: 1e3 * value,
+            unit: "mm",
+            sigma: None,
+        };
+        let parameters: Vec<ParameterEstimate> = fitted.x[first..].iter().enumerate().map(number).collect();
+        let forms = [form];
+        let summary = Summary { place: forms[0].place(), forms: &forms, parameters: &parameters, clock: Clock::Rows };
+        assert_eq!(SeatCompliance.sentence(&summary), "the seat of the tool yields by 0.126 mm under the largest payload");
+    }
+}
