@@ -43,8 +43,6 @@ pub struct Evidence {
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,
-    /// How much worse it is with the best law without a name at the same place instead, priors aside; `None` of what has no name.
-    pub over_nameless: Option<f64>,
     /// Fall of the rms error of fitted rows under fits that did not see their pose, m; `None` where poses are too few, or several effects
     /// make up the finding.
     pub heldout_gain: Option<f64>,

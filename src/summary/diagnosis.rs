@@ -103,7 +103,6 @@ impl DiagnosisSummary {
                 "parameters": numbers.collect::<Vec<_>>(),
                 "evidence": {
                     "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
-                    "nameless_delta_bic": finding.nameless_delta_bic,
                     "heldout_gain_mm": finding.heldout_gain_mm, "effect_rms_mm": finding.effect_rms_mm,
                 },
                 "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,

@@ -18,8 +18,6 @@ crate::table::rows! { "findings",
         p_value: Option<f64>,
         /// How much worse the criterion is without it.
         delta_bic: Option<f64>,
-        /// The same with the best law without a name in its stead, priors aside; null of what has no name.
-        nameless_delta_bic: Option<f64>,
         /// By how much the held-out rms is larger without it; null where no rows are held out, or several effects make it up.
         heldout_gain_mm: Option<f64>,
         /// Rms of the whole effect over the fitted rows.
@@ -82,7 +80,6 @@ impl Findings {
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),
             delta_bic: finding.evidence.map(|e| e.delta_bic),
-            nameless_delta_bic: finding.evidence.and_then(|e| e.over_nameless),
             heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).map(|gain| gain * 1e3),
             effect_rms_mm: finding.evidence.map(|e| e.effect_rms * 1e3),
             probability: Some(finding.probabilities.name),

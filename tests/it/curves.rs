@@ -24,7 +24,6 @@ fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
         f_statistic: None,
         p_value: None,
         delta_bic: None,
-        nameless_delta_bic: None,
         heldout_gain_mm: None,
         effect_rms_mm: None,
         probability: None,

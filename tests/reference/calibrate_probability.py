@@ -4,7 +4,7 @@
 
 Every finding with evidence is one draw: it is what it is called, one of its rivals, or none of these, by the sealed truth; names that
 the truth accepts count where none is its own. The causes after DIR are those that its pipeline left out (`diagnose: without`): they
-stand for physics that no list holds, which is `unknown` at its place. Prints the numbers, the mean log likelihood and a reliability table of the statements that they make.
+stand for physics that no list holds, which is `unknown` at its place, and their findings count LEFT_OUT each. Prints the numbers, the mean log likelihood and a reliability table of the statements that they make.
 Needs nothing but Python.
 """
 import json
@@ -12,6 +12,8 @@ import math
 import re
 import sys
 from pathlib import Path
+
+LEFT_OUT = 0.3
 
 
 def atoms(effect, place):
@@ -21,7 +23,7 @@ def atoms(effect, place):
 
 
 def draws(argument):
-    """((ln loss, no law, ln margin), [(delta, right) of own name and rivals], place right) of every finding with evidence."""
+    """((ln loss, no law), [(delta, right) of own name and rivals], place right, weight) of every finding with evidence."""
     folder, _, left_out = argument.partition("=")
     folder, left_out = Path(folder), left_out.split(",") if left_out else []
     for path in sorted((folder / "verdicts").glob("*.json")):
@@ -40,15 +42,13 @@ def draws(argument):
             known = strict if any(name in strict for _, name in said) else accepted
             names = [(max(delta, 0.0), name in known) for delta, name in said]
             there = any(place in places for _, place in said[0][1])
-            margin = finding["evidence"]["nameless_delta_bic"]
-            margin = math.log1p(max(margin, 0.0)) if margin is not None else 0.0
-            yield (math.log(max(loss, 1.0)), finding["effect"] == "unknown", margin), names, there
+            yield (math.log(max(loss, 1.0)), finding["effect"] == "unknown"), names, there, (LEFT_OUT if left_out else 1.0)
 
 
 def stated(numbers, draw):
-    constant, by_loss, no_law, by_margin, temperature, identity = numbers
-    (loss, unknown, margin), names, _ = draw
-    odds = constant + by_loss * loss + no_law * unknown + by_margin * margin
+    constant, by_loss, no_law, temperature, identity = numbers
+    (loss, unknown), names, _, _ = draw
+    odds = constant + by_loss * loss + no_law * unknown
     none = 1.0 / (1.0 + math.exp(-odds))
     weight = lambda delta: math.exp(-(delta or identity) / (2.0 * max(temperature, 0.05)))
     weights = [1.0] + [weight(delta) for delta, _ in names[1:]]
@@ -60,8 +60,8 @@ def cost(numbers, all_draws):
     for draw in all_draws:
         none, shares = stated(numbers, draw)
         right = [share for share, (_, true) in zip(shares, draw[1]) if true]
-        total -= math.log(max(sum(right) if right else none, 1e-9))
-    return total / len(all_draws) + 1e-3 * sum(value * value for value in numbers[:4])
+        total -= draw[3] * math.log(max(sum(right) if right else none, 1e-9))
+    return total / sum(draw[3] for draw in all_draws) + 1e-3 * sum(value * value for value in numbers[:3])
 
 
 def minimum(function, start):
@@ -96,9 +96,9 @@ def minimum(function, start):
 
 def main():
     all_draws = [draw for argument in sys.argv[1:] for draw in draws(argument)]
-    value, numbers = minimum(lambda numbers: cost(numbers, all_draws), [1.0, -1.0, 1.0, -0.5, 2.0, 4.0])
+    value, numbers = minimum(lambda numbers: cost(numbers, all_draws), [1.0, -1.0, 1.0, 2.0, 4.0])
     print(f"{len(all_draws)} findings, mean -ln likelihood {value:.4f}")
-    for name, number in zip(["NONE", "BY_LOSS", "NO_LAW", "BY_MARGIN", "TEMPERATURE", "IDENTITY"], numbers):
+    for name, number in zip(["NONE", "BY_LOSS", "NO_LAW", "TEMPERATURE", "IDENTITY"], numbers):
         print(f"{name:12} {number:.3f}")
     nowhere = [draw for draw in all_draws if not any(true for _, true in draw[1])]
     if nowhere:

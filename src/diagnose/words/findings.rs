@@ -4,7 +4,6 @@ use super::faults::{faults, rows_apart};
 use super::groups::{FindingKey, REFINEMENT, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
-use super::probability::is_doubtful;
 use super::rivals::{exact, rivals};
 use super::statement::{not_so, sentence};
 use crate::diagnose::judge::FoldGain;
@@ -40,9 +39,6 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     out
 }
 
-/// What the criterion loses by a name that is not given: it fits as its forms do.
-const NEAREST: f64 = 1e-3;
-
 /// All causes together.
 struct Whole {
     set: Vec<usize>,
@@ -77,7 +73,6 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
         f_statistic,
         p_value: tail(f_statistic, rank as f64, freedom),
         delta_bic: pool.bic(&rest) - whole.bic,
-        over_nameless: over_nameless(pool, &rest, &own, whole.bic, place),
         heldout_gain: heldout_gain(&forms, place, &last.judged.gains),
         effect_rms,
         gain,
@@ -86,11 +81,8 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let clock = Clock::of(last.survey.data);
     let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
     let varies = varying(&own, pool, whole, gain, clock);
-    let doubtful = effect != Unknown::NAME && is_doubtful(&evidence);
-    let unproven = doubtful.then(|| (String::from("a law without a name fits nearly as well"), NEAREST));
-    let misnamed = varies.or(unproven);
-    let why = impossible(last, members).map(String::from).or_else(|| misnamed.as_ref().map(|(why, _)| why.clone()));
-    rivals.extend(misnamed.map(|(_, loss)| RivalCause { effect, place, delta_bic: loss, probability: 0.0 }));
+    let why = impossible(last, members).map(String::from).or_else(|| varies.as_ref().map(|(why, _)| why.clone()));
+    rivals.extend(varies.map(|(_, loss)| RivalCause { effect, place, delta_bic: loss, probability: 0.0 }));
     rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
     let (effect, statement) = match (why, turn) {
         (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, effect_rms)),
@@ -109,19 +101,6 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
         valid,
         forms,
     }
-}
-
-/// By how much the best law without a name at the same place would be worse than the finding's own causes; `None` where they have none.
-fn over_nameless(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic: f64, place: Place) -> Option<f64> {
-    let nameless = |h: usize| pool.hypotheses[h].form.cause().is_nameless();
-    if own.iter().all(|k| nameless(*k)) {
-        return None;
-    }
-    let fit = bic - own.iter().map(|k| pool.prior_penalty[*k]).sum::<f64>();
-    let given = pool.given(rest);
-    let there = given.falls.iter().filter(|(_, h)| nameless(*h) && pool.hypotheses[*h].form.place() == place);
-    let best = there.map(|(fall, h)| fall + pool.prior_penalty[*h]).max_by(f64::total_cmp).unwrap_or(0.0);
-    Some(pool.bic(rest) - best.max(0.0) - fit)
 }
 
 /// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows.

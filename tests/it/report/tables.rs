@@ -172,7 +172,6 @@ fn findings() -> Findings {
         f_statistic: Some(812.0),
         p_value: Some(1e-40),
         delta_bic: Some(330.0),
-        nameless_delta_bic: Some(52.0),
         heldout_gain_mm: Some(0.3),
         effect_rms_mm: Some(0.28),
         probability: Some(0.85),
