@@ -1,6 +1,6 @@
 //! What a diagnosis is asked, and what it answers.
 
-use crate::effect::{Form, ParameterEstimate, Place};
+use crate::effect::{DeclaredCause, Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
@@ -19,6 +19,8 @@ pub struct Question<'a> {
     pub prior_weight: f64,
     /// Names of causes that are not tried.
     pub without: &'a [String],
+    /// Effects that the user declares: they are tried beside the library's.
+    pub own: &'a [&'static DeclaredCause],
     pub seed: u64,
 }
 

@@ -17,6 +17,8 @@ pub enum Variable {
     Load { joint: usize },
     /// Load torque plus so much friction (Nm) to the side from which the joint came, Nm.
     Push { joint: usize, friction_nm: f64 },
+    /// Motor current of a joint, A, where recorded.
+    Current { joint: usize },
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
     Approach { joint: usize },
     /// What a joint moved from the stop before, rad or m.
@@ -64,6 +66,7 @@ impl Variable {
             Self::Motor { joint } => Some(robot.description().joints[joint].reduction_ratio.unwrap_or(0.0) * state.q[joint]),
             Self::Load { joint } => Some(state.torque()[joint]),
             Self::Push { joint, friction_nm } => Some(state.torque()[joint] + friction_nm * state.direction(joint)),
+            Self::Current { joint } => state.current().map(|all| all[joint]).filter(|current| current.is_finite()),
             Self::Approach { joint } => Some(state.direction(joint)),
             Self::Move { joint } => Some(state.last_move(joint)),
             Self::Velocity { joint } => Some(state.velocity(joint)),
@@ -99,6 +102,7 @@ impl fmt::Display for Variable {
             Self::Motor { joint } => write!(f, "motor {}", joint + 1),
             Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
             Self::Push { joint, .. } | Self::Approach { joint } => write!(f, "approach of joint {}", joint + 1),
+            Self::Current { joint } => write!(f, "current of joint {}", joint + 1),
             Self::Move { joint } => write!(f, "last move of joint {}", joint + 1),
             Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
             Self::Payload => f.write_str("payload"),

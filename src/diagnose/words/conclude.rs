@@ -3,7 +3,7 @@
 use super::findings::findings;
 use super::last_round::LastRound;
 use super::probability::weigh;
-use super::statement::{next, not_observable, slower_than_noise};
+use super::statement::{next, not_observable, not_tried, slower_than_noise};
 use super::unseen::by_speed;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
@@ -39,6 +39,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let signature = signature(&rest, &last, something_left, misfit.not_carried);
     findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
+    not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(by_speed(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
@@ -55,7 +56,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         after: ErrorLengths::of(data, &predicted, &misfit.rows),
         held_out: misfit.held_out,
         folds,
-        next_measurements: next(&findings),
+        next_measurements: next(&findings, fitter.question.own),
         findings,
         withdrawn: last.judged.withdrawn,
         clock: data.has_clock(),
