@@ -1,6 +1,6 @@
 //! What a diagnosis is asked, and what it answers.
 
-use crate::effect::{DeclaredCause, Form, ParameterEstimate, Place};
+use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
@@ -83,6 +83,24 @@ pub struct Finding {
     /// Joint (from 0) and range (rad) over which it holds, for joint errors.
     pub valid: Option<(usize, [f64; 2])>,
     pub forms: Vec<Form>,
+}
+
+/// A formula for what a finding without a name does, as an effect that may be declared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedForm {
+    /// Position of the finding.
+    pub finding: usize,
+    pub declaration: EffectDeclaration,
+    /// Parts of its formulas and a coefficient each.
+    pub price: usize,
+    /// Rms (m) of fitted rows under fits that did not see their pose: with the formula, with the finding as it is, without both.
+    pub folds: f64,
+    pub curve: f64,
+    pub without: f64,
+    /// The cheapest that is as good as the best.
+    pub chosen: bool,
+    /// Shape numbers, then coefficients.
+    pub numbers: Vec<ParameterEstimate>,
 }
 
 /// What a wrong set-up is called.
@@ -205,6 +223,8 @@ pub struct Diagnosis {
     pub folds: Option<Folds>,
     /// Strongest first.
     pub findings: Vec<Finding>,
+    /// Formulas for findings without a name, those of a finding cheapest first.
+    pub formulas: Vec<ClosedForm>,
     /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
     pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.

@@ -23,8 +23,8 @@ pub use limits::AcceptanceLimits;
 
 use crate::error::Result;
 use crate::table::{
-    Corrections, Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected,
-    Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
+    Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction, Recording,
+    Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -47,6 +47,7 @@ pub struct Tables {
     pub findings: Vec<Findings>,
     pub finding_numbers: Vec<FindingNumbers>,
     pub rivals: Vec<Rivals>,
+    pub forms: Vec<Forms>,
     pub suspects: Vec<Suspects>,
     pub curves: Curves,
     /// The step that the report speaks of; without one, the last.

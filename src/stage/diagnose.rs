@@ -9,8 +9,8 @@ use crate::stage::own_effects::own_effects;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
-    Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
-    Split, Suspects, Verdict,
+    Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
+    Spectrum, Split, Suspects, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -64,6 +64,7 @@ crate::stage::writes! {
         findings: Findings,
         finding_numbers: FindingNumbers,
         rivals: Rivals,
+        forms: Forms,
         shares: Shares,
         spectrum: Spectrum,
         parameters: Parameters,
@@ -76,7 +77,7 @@ crate::stage::writes! {
 impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str = "locates where simulation and recording differ, and names the physics that was left out";
-    const IMPLEMENTATION: u32 = 12;
+    const IMPLEMENTATION: u32 = 13;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -160,6 +161,7 @@ impl Stage for Diagnose {
             findings: Findings::of(&diagnosis),
             finding_numbers: FindingNumbers::of(&diagnosis),
             rivals: Rivals::of(&diagnosis),
+            forms: Forms::of(&diagnosis),
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
             parameters: parameters.correcting(corrected),

@@ -12,7 +12,7 @@ pub(super) fn text(file: &RawFile, what: &str, most: u64, context: &Context) -> 
     if bytes.len() as u64 > most {
         return Err(Error::spec(&source.label, format!("longer than {} MB; expected {what}", most >> 20)));
     }
-    let text = String::from_utf8(bytes)
-        .map_err(|_| Error::spec(&source.label, format!("not a text file in UTF-8; expected {what}")))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| Error::spec(&source.label, format!("not a text file in UTF-8; expected {what}")))?;
     Ok((source.label, text))
 }

@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use calib::effect::{
-    Axes, Basis, DeclaredCause, DeclaredForm, Effect, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion,
-    Polar, ShapeRange, Starts, Survey, Term, Variable, cause,
+    Axes, Basis, DeclaredCause, DeclaredForm, EffectDeclaration, EffectStack, Form, GearCyclic, Law, Laws, Motion, Polar,
+    ShapeRange, Starts, Survey, Term, Variable, cause,
 };
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
@@ -76,11 +76,7 @@ fn a_formula_moves_the_arm_as_the_same_law_of_the_library() {
         (declaration("joint 3", "angle", &["sin(3 * q)", "cos(3 * q)"]), GearCyclic::term(joint, 3, false).into()),
         (
             declaration("joint 3", "angle", &["(temperature - 20) * q"]),
-            term(
-                "joint_warming",
-                Motion::Joint { joint },
-                warm.times(Variable::Angle { joint }, Basis::PROPORTIONAL),
-            ),
+            term("joint_warming", Motion::Joint { joint }, warm.times(Variable::Angle { joint }, Basis::PROPORTIONAL)),
         ),
         (
             declaration("joint 3", "angle", &["q_before * load"]),

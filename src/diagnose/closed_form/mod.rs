@@ -37,21 +37,19 @@ struct Candidate {
 }
 
 impl FormulaSearch<'_, '_> {
-    /// Formulas for a finding, cheapest first; none where it has a name, or is no function of one or two variables.
-    pub fn of(&self, finding: &Finding) -> Vec<ClosedForm> {
-        self.forms(finding).unwrap_or_default()
+    /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
+    pub fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
+        findings.iter().enumerate().filter_map(|(at, finding)| self.forms(at, finding)).flatten().collect()
     }
 
-    fn forms(&self, finding: &Finding) -> Option<Vec<ClosedForm>> {
+    fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
         let nameless = |form: &Form| form.cause().is_nameless() || form.is(&JointTable);
         if finding.forms.is_empty() || !finding.forms.iter().all(nameless) {
             return None;
         }
-        let members: Vec<usize> =
-            (0..self.set.len()).filter(|i| finding.forms.contains(&self.state.causes[*i].form)).collect();
+        let members: Vec<usize> = (0..self.set.len()).filter(|i| finding.forms.contains(&self.state.causes[*i].form)).collect();
         let (place, variables) = self.variables(finding)?;
-        let mut rest: Vec<usize> =
-            (0..self.set.len()).filter(|i| !members.contains(i)).map(|i| self.set[i]).collect();
+        let mut rest: Vec<usize> = (0..self.set.len()).filter(|i| !members.contains(i)).map(|i| self.set[i]).collect();
         rest.sort_unstable();
         let beside = Beside::of(self.pool, &rest);
         let candidates: Vec<Candidate> = declarations(&place, &variables)
@@ -70,13 +68,14 @@ impl FormulaSearch<'_, '_> {
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
         let (shown, chosen) = front(&priced, without)?;
         let one = |(position, k): (usize, &usize)| ClosedForm {
+            finding: at,
             declaration: candidates[*k].cause.declaration().clone(),
             price: priced[*k].price,
             folds: priced[*k].error,
             curve,
             without,
             chosen: position == chosen,
-            numbers: self.numbers(&candidates[*k], &members, &beside),
+            numbers: self.numbers(&candidates[*k], &variables, (&members, &beside)),
         };
         Some(shown.iter().enumerate().map(one).collect())
     }
@@ -140,12 +139,17 @@ impl FormulaSearch<'_, '_> {
     }
 
     /// Shape numbers, then coefficients as the whole model has them with the formula in place of the curves.
-    fn numbers(&self, candidate: &Candidate, members: &[usize], beside: &Beside) -> Vec<ParameterEstimate> {
+    fn numbers(
+        &self,
+        candidate: &Candidate,
+        variables: &[NamedVariable],
+        (members, beside): (&[usize], &Beside),
+    ) -> Vec<ParameterEstimate> {
         let Candidate { form, .. } = candidate;
         let sigmas = shape_sigmas(form, beside);
         let shape = form.shape_numbers().into_iter().zip(sigmas);
         let mut out: Vec<ParameterEstimate> = shape
-            .map(|((name, value), sigma)| ParameterEstimate { name, form: 0, value, unit: "SI", sigma })
+            .map(|((name, value), sigma)| ParameterEstimate { unit: unit(&name, variables), name, form: 0, value, sigma })
             .collect();
         let others = self.state.causes.iter().enumerate().filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone());
         let fitted = self.fitter.fit(&self.state.model, others.chain([self.at_zero(form)]).collect());
@@ -161,5 +165,14 @@ impl FormulaSearch<'_, '_> {
             out.push(ParameterEstimate { name: format!("c{number}"), form: 0, value, unit: symbol, sigma });
         }
         out
+    }
+}
+
+/// The unit of a shape number: that of the variable, or turns of it; in SI where it is no angle.
+fn unit(name: &str, variables: &[NamedVariable]) -> &'static str {
+    match (name, variables.iter().all(|variable| variable.is_angle)) {
+        ("order", true) => "1",
+        (_, true) => "rad",
+        _ => "SI",
     }
 }

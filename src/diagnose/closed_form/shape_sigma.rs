@@ -1,7 +1,7 @@
 //! How well shape numbers are known: by the curvature of what is left, with all coefficients fitted at every step.
 
 use crate::diagnose::pool::Beside;
-use crate::effect::Form;
+use crate::effect::{DeclaredForm, Form};
 use nalgebra::DMatrix;
 
 /// Steps as shares of a shape number's range.
@@ -9,7 +9,8 @@ const STEP: f64 = 1e-3;
 
 /// One standard deviation of each shape number of a form that fits best; none where what is left has no minimum there.
 pub(super) fn shape_sigmas(form: &Form, beside: &Beside) -> Vec<Option<f64>> {
-    let steps = form.shape_steps(STEP);
+    let Some(declared) = form.as_a::<DeclaredForm>() else { return Vec::new() };
+    let steps = declared.shape_steps(STEP);
     let count = steps.len();
     let unknown = vec![None; count];
     if count == 0 {
@@ -18,13 +19,11 @@ pub(super) fn shape_sigmas(form: &Form, beside: &Beside) -> Vec<Option<f64>> {
     let at = |moves: &[(usize, f64)]| {
         let mut shift = vec![0.0; count];
         moves.iter().for_each(|(k, times)| shift[*k] += times * steps[*k]);
-        form.shifted(&shift)
+        declared.shifted(&shift)
     };
     let pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
     let corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-    let forms: Option<Vec<Form>> =
-        pairs.iter().flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)]))).collect();
-    let Some(forms) = forms else { return unknown };
+    let forms: Vec<Form> = pairs.iter().flat_map(|(a, b)| corners.map(|(i, j)| at(&[(*a, i), (*b, j)]))).collect();
     let gains = beside.gains(&forms);
     // Squares of whitened residuals fall by the gain: half of their second derivatives is the information.
     let mut information = DMatrix::zeros(count, count);

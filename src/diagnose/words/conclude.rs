@@ -5,6 +5,7 @@ use super::last_round::LastRound;
 use super::probability::weigh;
 use super::statement::{next, not_observable, not_tried, slower_than_noise};
 use super::unseen::by_speed;
+use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::{Misfit, TOO_LOUD};
@@ -43,6 +44,8 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     not_observable.extend(by_speed(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
+    let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
+    let formulas = search.of_all(&findings);
     let state = last.judged.state;
     let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
     let basis = basis(fitter);
@@ -58,6 +61,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         folds,
         next_measurements: next(&findings, fitter.question.own),
         findings,
+        formulas,
         withdrawn: last.judged.withdrawn,
         clock: data.has_clock(),
         not_observable,

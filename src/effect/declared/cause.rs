@@ -65,6 +65,11 @@ impl DeclaredCause {
         &self.declaration
     }
 
+    /// What it costs a reader: the parts of its formulas and a coefficient each.
+    pub fn price(&self) -> usize {
+        self.pattern.laws.iter().map(|law| law.parts() + 1).sum()
+    }
+
     pub fn pattern(&self) -> &DeclaredPattern {
         &self.pattern
     }
@@ -90,13 +95,19 @@ impl Cause for DeclaredCause {
             "values" => numbers.join(", "),
             other => shape.iter().find(|(name, _)| name == other).map_or_else(String::new, |(_, value)| figure(*value, 2)),
         };
-        match &self.declaration.sentence {
+        let said = match &self.declaration.sentence {
             Some(sentence) => filled(sentence, &known),
             None => {
                 let laws = self.about.formula;
                 format!("{} errs as {} says, {laws}: {}", summary.place, self.about.name, known("values"))
             }
-        }
+        };
+        let ends = |(name, value): &(String, f64)| {
+            let range = self.declaration.shape.get(name)?;
+            (*value <= range.from || *value >= range.to).then(|| format!("; {name} ends at its bound {value}"))
+        };
+        let ends: Vec<String> = shape.iter().filter_map(ends).collect();
+        format!("{said}{}", ends.concat())
     }
 
     fn is_of_the_measurement(&self) -> bool {

@@ -108,6 +108,21 @@ impl DeclaredForm {
         self.quantities().iter().filter_map(|quantity| self.variable(quantity, usize::MAX)).collect()
     }
 
+    /// Small steps of its shape numbers, by a share of their ranges, or of themselves where these go in ratios.
+    pub fn shape_steps(&self, share: f64) -> Vec<f64> {
+        let step = |(value, range): (&f64, &ShapeRange)| match range.is_of_ratios() {
+            true => share * value,
+            false => share * (range.to - range.from),
+        };
+        self.shape.iter().zip(&self.cause.pattern().shape).map(step).collect()
+    }
+
+    /// The same with other shape numbers.
+    pub fn shifted(&self, by: &[f64]) -> Form {
+        let shape = self.shape.iter().zip(by).map(|(value, by)| value + by).collect();
+        Self { shape, ..self.clone() }.into()
+    }
+
     /// Shapes around its own, closer with every level.
     fn shapes(&self, level: i32) -> Vec<Vec<f64>> {
         let around = |(value, range): (&f64, &ShapeRange)| {

@@ -150,6 +150,13 @@ impl Formula {
         }
     }
 
+    /// How many parts it has.
+    pub fn parts(&self) -> usize {
+        let mut count = 0;
+        self.walk(&mut |_| count += 1);
+        count
+    }
+
     /// What it asks of a row, each once.
     pub fn quantities(&self) -> Vec<RowQuantity> {
         let mut out = Vec::new();

@@ -124,10 +124,10 @@ impl FormulaReader<'_> {
             self.at += 1;
         }
         let text: String = self.letters[start..self.at].iter().collect();
-        text.parse::<f64>().ok().filter(|number| number.is_finite()).ok_or_else(|| FormulaFault {
-            at: start + 1,
-            message: format!("`{text}` is no number"),
-        })
+        text.parse::<f64>()
+            .ok()
+            .filter(|number| number.is_finite())
+            .ok_or_else(|| FormulaFault { at: start + 1, message: format!("`{text}` is no number") })
     }
 
     fn name(&mut self) -> Result<Formula, FormulaFault> {

@@ -2,7 +2,7 @@
 //!
 //! Without a number a name is of the joint at which the effect acts, `_next` and `_before` of its neighbours.
 
-use super::super::Variable;
+use crate::effect::Variable;
 
 /// A number of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -182,6 +182,37 @@ impl RowQuantity {
             K::Velocity => Some("joint velocities"),
             K::Temperature | K::Lagging => Some("temperature"),
             _ => None,
+        }
+    }
+}
+
+impl Variable {
+    /// Its name in formulas of an effect at `joint`; `None` where formulas have none for it.
+    pub fn in_formulas(self, joint: usize) -> Option<String> {
+        let (kind, of) = match self {
+            Self::Angle { joint } => (K::Angle, Some(joint)),
+            Self::Load { joint } => (K::Load, Some(joint)),
+            Self::Approach { joint } => (K::Approach, Some(joint)),
+            Self::Move { joint } => (K::Move, Some(joint)),
+            Self::Velocity { joint } => (K::Velocity, Some(joint)),
+            Self::Payload => (K::Payload, None),
+            Self::Temperature => (K::Temperature, None),
+            Self::Time => (K::Time, None),
+            _ => return None,
+        };
+        let whose = |of| if of == joint { Whose::Own } else { Whose::Joint(of) };
+        Some(RowQuantity { kind, of: of.map_or(Whose::Row, whose), constant: None }.text(&[]))
+    }
+
+    /// Whether it is a joint's own, or the whole row's.
+    pub fn is_of(self, joint: usize) -> bool {
+        match self {
+            Self::Angle { joint: of } | Self::Load { joint: of } | Self::Approach { joint: of } | Self::Move { joint: of } => {
+                of == joint
+            }
+            Self::Velocity { joint: of } => of == joint,
+            Self::Payload | Self::Temperature | Self::Time => true,
+            _ => false,
         }
     }
 }

@@ -27,11 +27,8 @@ pub enum Moves {
 const OF_JOINTS: [(&str, Moves); 3] =
     [("angle", Moves::Angle), ("axis", Moves::Axis { turning: false }), ("turning_axis", Moves::Axis { turning: true })];
 const OF_LINKS: [(&str, Moves); 1] = [("growth", Moves::Growth)];
-const OF_FRAMES: [(&str, Moves); 3] = [
-    ("displacement", Moves::Frame(Axes::Place)),
-    ("rotation", Moves::Frame(Axes::Rotation)),
-    ("both", Moves::Frame(Axes::Both)),
-];
+const OF_FRAMES: [(&str, Moves); 3] =
+    [("displacement", Moves::Frame(Axes::Place)), ("rotation", Moves::Frame(Axes::Rotation)), ("both", Moves::Frame(Axes::Both))];
 const OF_TRACKERS: [(&str, Moves); 6] = [
     ("displacement", Moves::Frame(Axes::Place)),
     ("rotation", Moves::Frame(Axes::Rotation)),
@@ -41,7 +38,6 @@ const OF_TRACKERS: [(&str, Moves); 6] = [
     ("range", Moves::Reading(Polar::Range)),
 ];
 pub const PLACES: &str = "joint, joint 3, link, link 2, link 2-4, base, tool, tracker";
-
 
 impl Seat {
     /// The place of these words.
