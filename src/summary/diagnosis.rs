@@ -58,7 +58,10 @@ impl DiagnosisSummary {
         let row = all.next().ok_or_else(|| {
             let which =
                 finding.map_or("no finding".to_string(), |rank| format!("finding {rank} of {}, which", self.findings.0.len()));
-            Error::spec("--export-effect", format!("{which} has no formula: those without a name may have one"))
+            Error::spec(
+                "--export-effect",
+                format!("{which} has no formula that does what its curve does: findings without a name may have one"),
+            )
         })?;
         let told =
             format!("a formula for {} at {}, found in run {}", self.effect_of(row.rank), self.place_of(row.rank), self.run);

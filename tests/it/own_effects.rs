@@ -135,7 +135,7 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
     // The twin's own: -41 deg, 34 deg.
     let truth = std::fs::read_to_string(here.join(format!("sealed/sealed/{}.json", bumps[2].0))).expect("the truth");
     let truth: Value = serde_json::from_str(&truth).expect("JSON");
-    let bump = &truth["effects"][0]["effects"][0]["joint_bump"];
+    let bump = &truth["effects"][0]["physical"][0]["joint_bump"];
     for (name, key) in [("centre", "centre_deg"), ("width", "width_deg")] {
         let ([value, sigma], expected) = (number(name), bump[key].as_f64().expect("degrees").to_radians());
         assert!((value - expected).abs() < 4.0 * sigma && sigma < 0.1, "{name}: {value} +- {sigma}, truth {expected}");
@@ -183,7 +183,7 @@ name: late_zero
 place: joint
 law: step(time - moment)
 shape:
-  moment: {from: 0, to: 40000}
+  moment: {from: 0, to: 3400}
 unit: arcsec
 ";
     std::fs::write(here.join("late_zero.yaml"), declared).expect("written");

@@ -27,7 +27,7 @@ impl NamedVariable {
 /// rad; no joint of an arm goes further.
 const TURN: f64 = 6.4;
 /// rad, between places at which a search begins.
-const SPACING: f64 = 0.4;
+const SPACING: f64 = 0.2;
 /// Highest wave number of an angle, and of another variable in turns over its range.
 const ORDER: f64 = 50.0;
 const TURNS: f64 = 8.0;
@@ -109,7 +109,7 @@ fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
     let (v, [low, high]) = (&variable.name, variable.range);
     let bare = |label, laws: &[String]| Sketch { label, laws: laws.to_vec(), shape: Vec::new() };
     let mut out = vec![
-        bare("line", &[v.clone()]),
+        bare("line", std::slice::from_ref(v)),
         bare("square", &[format!("{v}^2")]),
         bare("cube", &[format!("{v}^3")]),
         bare("cubic", &[format!("{v}^2"), format!("{v}^3")]),
@@ -201,8 +201,8 @@ mod tests {
         let other = NamedVariable::of(Variable::Angle { joint: 4 }, 2, [0.0, 1.0]).expect("a name");
         assert_eq!([&angle.name, &load.name, &other.name], ["q", "load", "q5"]);
         assert_eq!(load.range, [-200.0, 90.0]);
-        for variables in [&[angle.clone()][..], &[load.clone()], &[angle.clone(), load], &[angle, other]] {
-            let all = declarations("joint 3", variables);
+        for variables in [vec![angle.clone()], vec![load.clone()], vec![angle.clone(), load], vec![angle, other]] {
+            let all = declarations("joint 3", &variables);
             assert!(all.len() > 10);
             for declaration in all {
                 if let Err(faults) = DeclaredCause::of(&declaration) {

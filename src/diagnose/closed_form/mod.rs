@@ -29,6 +29,9 @@ pub(super) struct FormulaSearch<'a, 'b> {
     pub fitter: &'b Fitter<'b>,
 }
 
+/// Starts of a formula's shape numbers that are refined.
+const STARTS: usize = 4;
+
 /// A formula with its shape numbers where they fit best.
 struct Candidate {
     cause: &'static DeclaredCause,
@@ -66,7 +69,7 @@ impl FormulaSearch<'_, '_> {
             error: judge(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
         };
         let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
-        let (shown, chosen) = front(&priced, without)?;
+        let (shown, chosen) = front(&priced, [without, curve])?;
         let one = |(position, k): (usize, &usize)| ClosedForm {
             finding: at,
             declaration: candidates[*k].cause.declaration().clone(),
@@ -74,7 +77,7 @@ impl FormulaSearch<'_, '_> {
             folds: priced[*k].error,
             curve,
             without,
-            chosen: position == chosen,
+            chosen: Some(position) == chosen,
             numbers: self.numbers(&candidates[*k], &variables, (&members, &beside)),
         };
         Some(shown.iter().enumerate().map(one).collect())
@@ -129,8 +132,13 @@ impl FormulaSearch<'_, '_> {
         let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
         let gains = beside.gains(&forms);
-        let (_, form) = gains.into_iter().zip(forms).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Candidate { cause, form: beside.refined(form, self.survey), price: cause.price() })
+        let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // The best start need not lead to the best shape.
+        let ends: Vec<Form> = starts.into_iter().take(STARTS).map(|(_, form)| beside.refined(form, self.survey)).collect();
+        let gains = beside.gains(&ends);
+        let (_, form) = gains.into_iter().zip(ends).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Candidate { cause, form, price: cause.price() })
     }
 
     fn at_zero(&self, form: &Form) -> EstimatedCause {

@@ -13,7 +13,7 @@ pub(super) fn shape_sigmas(form: &Form, beside: &Beside) -> Vec<Option<f64>> {
     let steps = declared.shape_steps(STEP);
     let count = steps.len();
     let unknown = vec![None; count];
-    if count == 0 {
+    if count == 0 || declared.declared().pattern().jumps() {
         return unknown;
     }
     let at = |moves: &[(usize, f64)]| {

@@ -74,13 +74,13 @@ impl DeclarationFaults {
             } else if !is_snake(name) {
                 self.add(&path, format!("expected a name in lower snake case, e.g. t0; found `{name}`"));
             }
-            if !(range.from < range.to) {
+            if range.from >= range.to {
                 self.add(&path, format!("expected `from` below `to`; found {} and {}", range.from, range.to));
             }
             for start in range.start.0.iter().filter(|start| !(range.from..=range.to).contains(*start)) {
                 self.add(format!("{path}.start"), format!("{start} lies outside {} to {}", range.from, range.to));
             }
-            starts *= range.starts().len();
+            starts *= range.starts(declaration.shape.len()).len();
         }
         if starts > STARTS {
             self.add("shape", format!("{starts} combinations of starts; expected at most {STARTS}"));

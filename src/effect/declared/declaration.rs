@@ -62,21 +62,22 @@ pub struct ShapeRange {
     pub start: Starts,
 }
 
-/// Starts between both ends where none are given.
-const BETWEEN: usize = 5;
+/// Starts between both ends where none are given: of one shape number, of each of two, of each of three.
+const BETWEEN: [usize; 3] = [25, 9, 5];
 
 impl ShapeRange {
-    /// At which a search starts.
-    pub fn starts(&self) -> Vec<f64> {
+    /// At which a search of so many shape numbers starts.
+    pub fn starts(&self, numbers: usize) -> Vec<f64> {
         if !self.start.0.is_empty() {
             return self.start.0.clone();
         }
-        let share = |k: usize| (k as f64 + 0.5) / BETWEEN as f64;
+        let count = BETWEEN[numbers.clamp(1, BETWEEN.len()) - 1];
+        let share = |k: usize| (k as f64 + 0.5) / count as f64;
         let between = |k| match self.is_of_ratios() {
             true => self.from * libm::pow(self.to / self.from, share(k)),
             false => self.from + share(k) * (self.to - self.from),
         };
-        (0..BETWEEN).map(between).collect()
+        (0..count).map(between).collect()
     }
 
     /// Whether it goes in ratios: over more than a power of ten of positive numbers.

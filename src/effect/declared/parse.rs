@@ -118,7 +118,7 @@ impl FormulaReader<'_> {
         while self.at < self.letters.len() {
             let letter = self.letters[self.at];
             let inside = letter.is_ascii_digit() || matches!(letter, '.' | 'e' | 'E');
-            if !inside && !(self.at > start && exponent(self.at, self.letters)) {
+            if !(inside || self.at > start && exponent(self.at, self.letters)) {
                 break;
             }
             self.at += 1;

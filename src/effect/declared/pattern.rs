@@ -2,7 +2,7 @@
 
 use super::check::{DeclarationFault, DeclarationFaults};
 use super::declaration::{EffectDeclaration, ShapeRange};
-use super::formula::Formula;
+use super::formula::{Formula, Function};
 use super::seat::{Moves, Seat};
 use crate::effect::motion::{SHORT, extent};
 use crate::effect::{Motion, NumberSpec, Place, Survey};
@@ -39,7 +39,7 @@ impl DeclaredPattern {
         faults.shape(declaration);
         let laws = faults.laws(declaration, &names);
         let unit = moves.and_then(|moves| faults.unit(moves, declaration.unit.as_deref()));
-        if let Some(size) = declaration.size.filter(|size| !(*size > 0.0)) {
+        if let Some(size) = declaration.size.filter(|size| *size <= 0.0) {
             faults.add("size", format!("expected the usual size of a coefficient, more than 0; found {size}"));
         }
         if let (Some(seat), Some(moves)) = (seat, moves) {
@@ -62,6 +62,14 @@ impl DeclaredPattern {
         }
     }
 
+    /// Whether a law jumps, so that what is left has no curvature by its shape numbers.
+    pub fn jumps(&self) -> bool {
+        let mut found = false;
+        let jump = |part: &Formula| matches!(part, Formula::Call(Function::Step | Function::Sign, _));
+        self.laws.iter().for_each(|law| law.walk(&mut |part| found |= jump(part)));
+        found
+    }
+
     /// Where it may act on an arm.
     pub fn motions(&self, survey: &Survey) -> Vec<Motion> {
         let joints = survey.joints();
@@ -80,7 +88,7 @@ impl DeclaredPattern {
 
     /// All combinations of starts.
     pub fn starts(&self) -> Vec<Vec<f64>> {
-        let each = self.shape.iter().map(ShapeRange::starts);
+        let each = self.shape.iter().map(|range| range.starts(self.shape.len()));
         each.fold(vec![Vec::new()], |all, starts| {
             let with = |begun: &Vec<f64>, start: &f64| begun.iter().copied().chain([*start]).collect();
             all.iter().flat_map(|begun| starts.iter().map(move |start| with(begun, start))).collect()
