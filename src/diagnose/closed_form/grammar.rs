@@ -172,7 +172,7 @@ fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
                     _ => "product_with_turn",
                 },
                 ("turn", "turn") => "product_of_turns",
-                _ => "product_of_functions",
+                _ => "mixed_product",
             };
             out.push(Sketch { label, laws: products(&a, &b), shape: Vec::new() });
         }
