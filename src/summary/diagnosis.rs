@@ -56,12 +56,8 @@ impl DiagnosisSummary {
     pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
         let mut all = self.forms.0.iter().filter(|row| row.proposed && finding.is_none_or(|rank| row.rank == rank));
         let row = all.next().ok_or_else(|| {
-            let which =
-                finding.map_or("no finding".to_string(), |rank| format!("finding {rank} of {}, which", self.findings.0.len()));
-            Error::spec(
-                "--export-effect",
-                format!("{which} has no formula that does what its curve does: findings without a name may have one"),
-            )
+            let which = finding.map_or("no finding has a formula".to_string(), |rank| format!("finding {rank} has no formula"));
+            Error::spec("--export-effect", format!("{which} that does what its curve does; findings without a name may have one"))
         })?;
         let told =
             format!("a formula for {} at {}, found in run {}", self.effect_of(row.rank), self.place_of(row.rank), self.run);

@@ -144,8 +144,10 @@ fn a_formula_of_an_unknown_is_found_by_its_name_in_the_next_recording() {
         forms.iter().map(|form| (form["price"].as_i64().unwrap(), form["folds_rms_mm"].as_f64().unwrap())).collect();
     assert!(prices.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 > pair[1].1), "{prices:?}");
 
-    calib(&["diagnose", "HEAD", "--export-effect", "mine.yaml"], here);
-    let refused = output(&["diagnose", "HEAD", "--export-effect", "mine.yaml"], here);
+    let set = case(&bumps[2].0);
+    let export = ["diagnose", "p.yaml", "--quiet", "--set", &set, "--export-effect", "mine.yaml"];
+    calib(&export, here);
+    let refused = output(&export, here);
     assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
     let text = std::fs::read_to_string(here.join("mine.yaml")).expect("a file");
     std::fs::write(here.join("mine.yaml"), text.replace("bump_of_q", "soft_spot")).expect("written");
