@@ -35,7 +35,7 @@
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
-//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, pipeline, shell, stage, store, table |
+//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, effect, pipeline, shell, stage, store, table |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # A measurement, from file to report
@@ -67,6 +67,7 @@
 //! | add | new | touch |
 //! |---|---|---|
 //! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
+//! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
 //! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
@@ -106,6 +107,8 @@
 //! |---|---|
 //! | cause | a physical reason of position error, in a list; an effect is the motion that it makes on the chain |
 //! | form | a cause at a place with its shape numbers; a hypothesis is a form that a search may choose |
+//! | declared effect | a cause that a user states in YAML: place, motion, laws as formulas; its forms carry the declaration |
+//! | closed form | a formula proposed for a finding without a name |
 //! | place | where on the chain (or in the measurement) a cause acts: joint 2, link 3, base, tool, recording |
 //! | law | a function of what a row offers (angle, load, time ...): a basis of one variable, or a product of two |
 //! | shape number | a parameter that enters a law nonlinearly (a threshold, a time, a width); coefficients enter linearly |

@@ -11,6 +11,7 @@ use crate::stage::{Diagnose, Stage};
 use crate::summary::DiagnosisSummary;
 use clap::Args;
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Say where simulation and recording differ, what physics was left out, and how much better the model is with it.
@@ -29,6 +30,13 @@ pub(super) struct DiagnoseArguments {
     step: Option<String>,
     #[command(flatten)]
     means: Means,
+    /// Writes the formula proposed for a finding without a name as an effect of your own, which `diagnose` takes by
+    /// `with: {effects: [FILE]}`
+    #[arg(long, value_name = "FILE")]
+    export_effect: Option<PathBuf>,
+    /// The finding whose formula is written, by its number [default: the first that has one]
+    #[arg(long, value_name = "N", requires = "export_effect")]
+    finding: Option<i64>,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -41,6 +49,7 @@ const EXAMPLES: &str = "Examples:
   calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
   calib diagnose pipeline.yaml --json > diagnosis.json
   calib diagnose HEAD
+  calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
 pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
@@ -75,8 +84,23 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         let (manifest, stage) = diagnosis(&store, run, step)?;
         DiagnosisSummary::read(&manifest.run_id, &stage, &store)?
     };
+    if let Some(file) = &arguments.export_effect {
+        write_new(file, &told.effect_file(arguments.finding)?)?;
+    }
     let store = arguments.means.store_again();
     if arguments.json { emit_json(&told.document(&store)) } else { emit(&told.text(&store)) }
+}
+
+/// Writes a file that is not there yet.
+fn write_new(file: &Path, text: &str) -> Result<()> {
+    let place = || file.display().to_string();
+    match std::fs::File::create_new(file) {
+        Ok(mut open) => open.write_all(text.as_bytes()).map_err(|error| Error::store(place(), error.to_string())),
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+            Err(Error::spec(place(), "is there already; name another file"))
+        }
+        Err(error) => Err(Error::store(place(), error.to_string())),
+    }
 }
 
 /// A file, or what is named like one; everything else names a run.

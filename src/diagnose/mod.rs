@@ -9,6 +9,7 @@
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
 //! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
 
+mod closed_form;
 mod judge;
 mod locate;
 mod misfit;
@@ -30,8 +31,8 @@ pub use round::BASE;
 pub use separate::{DiagnosedModel, contest};
 pub use setup::wrong_setup;
 pub use types::{
-    Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question, RivalCause,
-    SETUP, SpectrumLine, VerdictKind,
+    ClosedForm, Diagnosis, ErrorLengths, Evidence, ExplainedShare, Finding, JointRepeatability, Located, Probabilities, Question,
+    RivalCause, SETUP, SpectrumLine, VerdictKind,
 };
 pub use words::other_means;
 

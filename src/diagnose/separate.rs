@@ -3,7 +3,10 @@
 use super::pool::{CachedHypotheses, HypothesisSet};
 use super::round::compliance;
 use super::whitened::WhitenedProblem;
-use crate::effect::{Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown, hypotheses, whole};
+use crate::effect::{
+    Cause, DeclaredCause, DeclaredForm, Effect, EffectContext, EffectStack, Form, Hypothesis, Load, Place, Survey, Unknown,
+    hypotheses, whole,
+};
 use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, Contest};
 use crate::robot::Measurements;
@@ -42,7 +45,7 @@ pub fn contest(diagnosed: &DiagnosedModel, finding: &[Form], (effect, place): (&
     }
     let nuisances: Vec<usize> = free.iter().copied().filter(|k| !own.contains(k)).collect();
     let jacobian = problem.jacobian(&nuisances);
-    let rivals = rivals(&survey, effect, place, finding)?;
+    let rivals = rivals(&survey, model, (effect, place), finding)?;
     let open: Vec<f64> = problem.residual.iter().zip(&caused).map(|(left, own)| left + own).collect();
     // As diagnosis names rivals: by what fits in place of the finding.
     let mut pool = CachedHypotheses::from(HypothesisSet::new(&problem, &jacobian, &open, 1.0, rivals));
@@ -78,10 +81,14 @@ fn best(pool: &CachedHypotheses, first: usize) -> Option<(f64, usize)> {
 }
 
 /// All that diagnosis would try under this name at this place.
-fn rivals(survey: &Survey, effect: &str, place: Place, finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
+fn rivals(survey: &Survey, model: &Model, (effect, place): (&str, Place), finding: &[Form]) -> Result<Vec<Hypothesis>, String> {
     // What is called by its shape alone.
     let named = |form: &Form| form.name() == effect || form.is(&Unknown) && form.called(&[], survey) == effect;
-    let all = hypotheses(survey).into_iter().filter(|hypothesis| named(&hypothesis.form));
+    let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| Some(other.form()?.as_a::<DeclaredForm>()?.declared());
+    let mut own: Vec<&'static DeclaredCause> = model.stack.effects().filter_map(declared).collect();
+    own.dedup_by_key(|cause| cause.name());
+    let own = own.into_iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey));
+    let all = hypotheses(survey).into_iter().chain(own).filter(|hypothesis| named(&hypothesis.form));
     let all: Vec<Hypothesis> = all.filter(|hypothesis| finding != std::slice::from_ref(&hypothesis.form)).collect();
     let own: Vec<Hypothesis> = all.iter().filter(|hypothesis| hypothesis.form.place() == place).cloned().collect();
     if !own.is_empty() {

@@ -1,6 +1,6 @@
 //! What a diagnosis is asked, and what it answers.
 
-use crate::effect::{Form, ParameterEstimate, Place};
+use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use nalgebra::Vector3;
@@ -21,6 +21,8 @@ pub struct Question<'a> {
     pub prior_weight: f64,
     /// Names of causes that are not tried.
     pub without: &'a [String],
+    /// Effects that the user declares: they are tried beside the library's.
+    pub own: &'a [&'static DeclaredCause],
     /// Of the bootstrap and the folds.
     pub seed: u64,
 }
@@ -97,6 +99,27 @@ pub struct Finding {
     pub valid: Option<(usize, [f64; 2])>,
     /// By which the model is rebuilt.
     pub forms: Vec<Form>,
+}
+
+/// A formula for what a finding without a name does, as an effect that may be declared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedForm {
+    /// Position of the finding.
+    pub finding: usize,
+    /// The formula, ready to be declared.
+    pub declaration: EffectDeclaration,
+    /// Parts of its formulas and a coefficient each.
+    pub price: usize,
+    /// Rms (m) of fitted rows under fits that did not see their pose, with the formula.
+    pub folds: f64,
+    /// The same with the finding as it is.
+    pub curve: f64,
+    /// The same without both.
+    pub without: f64,
+    /// The cheapest that is as good as the best.
+    pub chosen: bool,
+    /// Shape numbers, then coefficients.
+    pub numbers: Vec<ParameterEstimate>,
 }
 
 /// What a wrong set-up is called.
@@ -231,6 +254,8 @@ pub struct Diagnosis {
     pub folds: Option<Folds>,
     /// Strongest first.
     pub findings: Vec<Finding>,
+    /// Formulas for findings without a name, those of a finding cheapest first.
+    pub formulas: Vec<ClosedForm>,
     /// Findings that the whole model left without size or made worse, a sentence each: they are not in the model.
     pub withdrawn: Vec<String>,
     /// Whether the recording has a clock; else times in the model count rows from 0.

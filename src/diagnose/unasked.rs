@@ -43,6 +43,7 @@ pub(super) fn unasked(
         leftover_rms: misfit.leftover_rms,
         chi_square: misfit.chi_square,
         gate_first: None,
+        formulas: Vec::new(),
         gate_last: None,
         repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
         located_before: Located::default(),

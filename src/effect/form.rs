@@ -2,7 +2,7 @@
 //!
 //! A form is what diagnosis tries, what a model is refitted with, and what a table of parameters keeps as JSON: `{"<cause>": <body>}`.
 
-use super::{ArmState, Cause, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
+use super::{ArmState, Cause, DeclaredForm, Deflection, Effect, ParameterSpec, Place, Survey, Term, Variable, cause};
 use crate::robot::{LoadCorrection, Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -40,6 +40,10 @@ pub trait Placed: Effect + Any {
     /// The law, where it is one at a place.
     fn term(&self) -> Option<&Term> {
         None
+    }
+    /// Its shape numbers by their names, where they have names.
+    fn shape_numbers(&self) -> Vec<(String, f64)> {
+        Vec::new()
     }
     /// Whether it is a number of the torque model, seen only through what yields.
     fn is_of_torque_model(&self) -> bool {
@@ -125,8 +129,11 @@ impl<'de> Deserialize<'de> for Form {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let stored = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
         let [(name, body)] = <[_; 1]>::try_from(Vec::from_iter(stored)).map_err(|_| D::Error::custom("expected one cause"))?;
-        let cause = cause(&name).ok_or_else(|| D::Error::custom(format!("no cause `{name}`")))?;
-        cause.read(&body).unwrap_or_else(|| Term::read(cause, body)).map_err(D::Error::custom)
+        let form = match cause(&name) {
+            Some(cause) => cause.read(&body).unwrap_or_else(|| Term::read(cause, body)),
+            None => DeclaredForm::read(&name, body),
+        };
+        form.map_err(D::Error::custom)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a cause is given to put its finding into words.
 
-use super::{Clock, Form, Place, Term, Variable, figure};
+use super::{Cause, Clock, Form, Place, Term, Variable, cause, figure};
 use crate::units::Unit;
 
 /// A coefficient of a finding in the unit in which people read it.
@@ -47,6 +47,11 @@ pub struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
+    /// The cause of a name: of one of the forms, or of the library.
+    pub fn cause(&self, name: &str) -> Option<&'static dyn Cause> {
+        self.forms.iter().map(|form| form.cause()).find(|own| own.name() == name).or_else(|| cause(name))
+    }
+
     /// The first form of a type.
     pub(super) fn form<T: super::Placed>(&self) -> Option<&'a T> {
         self.forms.iter().find_map(Form::as_a)

@@ -31,6 +31,11 @@ pub enum Variable {
         /// Nm.
         friction_nm: f64,
     },
+    /// Motor current of a joint, A, where recorded.
+    Current {
+        /// From 0.
+        joint: usize,
+    },
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
     Approach {
         /// From 0.
@@ -103,6 +108,7 @@ impl Variable {
             Self::Motor { joint } => Some(robot.description().joints[joint].reduction_ratio.unwrap_or(0.0) * state.q[joint]),
             Self::Load { joint } => Some(state.torque()[joint]),
             Self::Push { joint, friction_nm } => Some(state.torque()[joint] + friction_nm * state.direction(joint)),
+            Self::Current { joint } => state.current().map(|all| all[joint]).filter(|current| current.is_finite()),
             Self::Approach { joint } => Some(state.direction(joint)),
             Self::Move { joint } => Some(state.last_move(joint)),
             Self::Velocity { joint } => Some(state.velocity(joint)),
@@ -138,6 +144,7 @@ impl fmt::Display for Variable {
             Self::Motor { joint } => write!(f, "motor {}", joint + 1),
             Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
             Self::Push { joint, .. } | Self::Approach { joint } => write!(f, "approach of joint {}", joint + 1),
+            Self::Current { joint } => write!(f, "current of joint {}", joint + 1),
             Self::Move { joint } => write!(f, "last move of joint {}", joint + 1),
             Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
             Self::Payload => f.write_str("payload"),

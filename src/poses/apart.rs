@@ -6,7 +6,7 @@ use super::site::site;
 use super::{PoseRequest, wish};
 use crate::audit::diagnosis;
 use crate::diagnose::{DiagnosedModel, contest};
-use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place};
+use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place, cause};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
 use crate::pipeline::StageReport;
@@ -79,6 +79,11 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let sigma = request.sigma.map_or(usual, |sigma| sigma * 1e-3);
     let circumstances = circumstances(&data, &rows);
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
+    if cause(&rival.0).is_none() && !model.stack.effects().any(|(effect, _)| effect.name() == rival.0) {
+        let message =
+            format!("`{}` is an effect of your own, and a run keeps of these what it found: it was not found here", rival.0);
+        return Err(Error::spec("--separate", message));
+    }
     let mut tried = None;
     let told = match contest(&diagnosed, &forms, (&rival.0, rival.1)) {
         Ok((contest, form)) => {
@@ -124,13 +129,14 @@ fn table<T: Table>(store: &Store, table: Option<&TableRef>) -> Result<T> {
     T::from_frame(&store.load(table)?)
 }
 
-/// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place.
-fn name(text: &str) -> Result<(&str, Option<Place>)> {
+/// `joint_compliance@joint 2`, `joint_compliance at joint 2` or `joint_compliance` -> effect and place; effects of the library, and those
+/// that the diagnosis `told` of.
+fn name<'t>(text: &'t str, told: &[&str]) -> Result<(&'t str, Option<Place>)> {
     let (effect, place) = match text.split_once('@').or_else(|| text.split_once(" at ")) {
         Some((effect, place)) => (effect.trim(), Some(place.trim())),
         None => (text.trim(), None),
     };
-    let known = || CAUSES.iter().map(|cause| cause.name());
+    let known = || CAUSES.iter().map(|cause| cause.name()).chain(told.iter().copied());
     let named = |place: &str| {
         let allowed = "allowed are e.g. `joint 2`, `joint 4->5`, `link 3`, `link 2-4`, `base`, `tool`, `tracker`, `recording`";
         place.parse().map_err(|()| Error::spec("--separate", format!("`{place}` is no place; {allowed}")))
@@ -166,7 +172,9 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
         let message = format!("no finding has a rival; name a finding and the cause to separate it from: --separate {list:?}");
         return found.ok_or_else(|| Error::spec(place, message.replace(['[', ']', '"'], "")));
     };
-    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first)) {
+    let told: Vec<&str> =
+        findings.0.iter().map(|row| row.effect.as_str()).chain(rivals.0.iter().map(|row| row.effect.as_str())).collect();
+    let fits = |row: &&FindingRow| match (first.trim().parse::<i64>(), name(first, &told)) {
         (Ok(rank), _) => row.rank == rank,
         (_, Ok((effect, place))) => row.effect == effect && place.is_none_or(|place| is_at(&row.place, place)),
         _ => false,
@@ -174,7 +182,7 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
     let fitting: Vec<&FindingRow> = findings.0.iter().filter(fits).collect();
     let [found] = fitting[..] else {
         if first.trim().parse::<i64>().is_err() {
-            name(first)?;
+            name(first, &told)?;
         }
         let many = if fitting.is_empty() { "no finding" } else { "several findings" };
         return Err(Error::spec("--separate", format!("`{first}` is {many} of {place}; it has {}", list.join(", "))));
@@ -183,7 +191,7 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
         let rival = closest(found).ok_or_else(|| name_one(found))?;
         return Ok((found.clone(), rival));
     };
-    let (effect, at) = name(second)?;
+    let (effect, at) = name(second, &told)?;
     let Some(at) = at else {
         return Err(Error::spec("--separate", format!("`{second}`: say where, e.g. '{effect}@{}'", found.place)));
     };

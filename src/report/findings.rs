@@ -4,7 +4,7 @@ use super::Tables;
 use super::axis::{Area, Scale, baseline, label, name_x, name_y};
 use super::number::{count, mm, significant};
 use super::svg::Svg;
-use crate::table::{CurveRow, FindingRow, RivalRow, VerdictRow};
+use crate::table::{CurveRow, FindingRow, FormRow, RivalRow, VerdictRow, formula_in_words};
 use crate::units::Unit;
 use serde::Serialize;
 
@@ -41,6 +41,8 @@ struct FindingView {
     /// What, figure, what it means.
     evidence: Vec<(&'static str, String, &'static str)>,
     rivals: Vec<String>,
+    /// Formulas that do what it does, with what they cost and bring.
+    formulas: Vec<String>,
     valid: Option<String>,
     pictures: Vec<(String, String)>,
 }
@@ -183,9 +185,21 @@ fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
             .collect(),
         evidence: evidence.into_iter().filter_map(|(name, value, meaning)| Some((name, value?, meaning))).collect(),
         rivals: rivals.map(rival).collect(),
+        formulas: tables.forms.iter().flat_map(|table| table.of_finding(row.rank)).map(formula).collect(),
         valid,
         pictures: pictures(row, &curve),
     }
+}
+
+/// A formula with its numbers, its price and its errors on folds.
+fn formula(rows: &[FormRow]) -> String {
+    let words = formula_in_words(rows);
+    let errors = rows.first().map(|row| {
+        let proposed = if row.proposed { ", proposed" } else { "" };
+        let [with, curve, without] = [row.folds_rms_mm, row.curve_rms_mm, row.without_rms_mm].map(mm);
+        format!(" ({} parts{proposed}; {with} mm on unseen poses, {curve} mm with the curve, {without} mm without)", row.price)
+    });
+    format!("{words}{}", errors.unwrap_or_default())
 }
 
 fn rival(row: &RivalRow) -> String {

@@ -3,6 +3,7 @@
 use super::limits::Judgement;
 use super::{ReportOptions, Tables};
 use crate::error::{Error, Result};
+use crate::table::FormRow;
 use serde_json::{Value, json};
 
 /// The document; `judgement` is that of the page.
@@ -22,6 +23,7 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
             "probability": row.probability, "place_probability": row.place_probability, "none_probability": row.none_probability,
             "numbers": numbers.map(|n| json!({ "name": n.name, "value": n.value, "unit": n.unit, "sigma": n.sigma })).collect::<Vec<_>>(),
             "evidence": { "f_statistic": row.f_statistic, "p_value": row.p_value, "delta_bic": row.delta_bic, "heldout_gain_mm": row.heldout_gain_mm },
+            "forms": tables.forms.iter().flat_map(|table| table.of_finding(row.rank)).map(form).collect::<Vec<_>>(),
             "rivals": rivals.map(|r| json!({ "effect": r.effect, "where": r.place, "delta_bic": r.delta_bic, "probability": r.probability })).collect::<Vec<_>>(),
         })
     });
@@ -69,4 +71,13 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
 
 fn number(text: &str) -> Value {
     text.parse::<f64>().map_or(Value::Null, Value::from)
+}
+
+fn form(rows: &[FormRow]) -> Value {
+    let numbers = rows.iter().map(|row| json!({ "name": row.number, "value": row.value, "unit": row.unit, "sigma": row.sigma }));
+    let numbers: Vec<Value> = numbers.collect();
+    rows.first().map_or(Value::Null, |row| {
+        json!({ "formula": row.formula, "price": row.price, "folds_rms_mm": row.folds_rms_mm, "curve_rms_mm": row.curve_rms_mm,
+            "without_rms_mm": row.without_rms_mm, "proposed": row.proposed, "numbers": numbers })
+    })
 }

@@ -23,8 +23,8 @@ pub use limits::AcceptanceLimits;
 
 use crate::error::Result;
 use crate::table::{
-    Corrections, Curves, FindingNumbers, Findings, Fit, Intake, Observability, Parameters, Prediction, Recording, Rejected,
-    Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
+    Corrections, Curves, FindingNumbers, Findings, Fit, Forms, Intake, Observability, Parameters, Prediction, Recording,
+    Rejected, Rivals, Robot, Split, Statistics, Suspects, Training, Verdict, Withdrawn,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -63,6 +63,8 @@ pub struct Tables {
     pub finding_numbers: Vec<FindingNumbers>,
     /// Of every diagnosis.
     pub rivals: Vec<Rivals>,
+    /// Formulas of findings without a name.
+    pub forms: Vec<Forms>,
     /// Rows that were set aside.
     pub suspects: Vec<Suspects>,
     /// Findings over what reveals them.

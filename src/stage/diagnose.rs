@@ -5,11 +5,12 @@ use crate::effect::CAUSES;
 use crate::error::{Error, Fault, Result};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
+use crate::stage::own_effects::own_effects;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
-use crate::stage::{Context, Stage, screened};
+use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
-    Corrected, CovarianceTable, FindingNumbers, Findings, Parameters, Prediction, Recording, Rivals, Robot, Shares, Spectrum,
-    Split, Suspects, Verdict,
+    Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
+    Spectrum, Split, Suspects, Verdict,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,6 +29,9 @@ pub struct Diagnose {
     /// Causes that are not tried, by their names: what a cell cannot have, or what a test of the library leaves out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
+    /// Files with effects of your own, which are tried beside those of the library.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<RawFile>,
 }
 
 fn as_believed() -> f64 {
@@ -60,6 +64,7 @@ crate::stage::writes! {
         findings: Findings,
         finding_numbers: FindingNumbers,
         rivals: Rivals,
+        forms: Forms,
         shares: Shares,
         spectrum: Spectrum,
         parameters: Parameters,
@@ -73,7 +78,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 13;
+    const IMPLEMENTATION: u32 = 14;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -93,7 +98,16 @@ impl Stage for Diagnose {
         faults
     }
 
+    fn files(&self) -> Vec<(String, RawFile)> {
+        self.effects.iter().enumerate().map(|(k, file)| (format!("effects[{k}]"), file.clone())).collect()
+    }
+
+    fn look(&self, _reads: Option<DiagnoseReads>, context: &Context) -> Result<Option<DiagnoseWrites>> {
+        own_effects(&self.effects, context).map(|_| None)
+    }
+
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
+        let own = own_effects(&self.effects, context)?;
         let mut data = reads.recording.measurements();
         let asked = reads.split.rows(&reads.recording, &self.on)?;
         let mut corrected = Corrected::RobotFile;
@@ -128,6 +142,7 @@ impl Stage for Diagnose {
             set: &set,
             prior_weight: self.prior_weight,
             without: &self.without,
+            own: &own,
             seed: context.seed,
         };
         // Points beside an outside simulation are moved by it: what moves them says nothing of this robot file.
@@ -147,6 +162,7 @@ impl Stage for Diagnose {
             findings: Findings::of(&diagnosis),
             finding_numbers: FindingNumbers::of(&diagnosis),
             rivals: Rivals::of(&diagnosis),
+            forms: Forms::of(&diagnosis),
             shares: Shares::of(&diagnosis),
             spectrum: Spectrum::of(&diagnosis),
             parameters: parameters.correcting(corrected),

@@ -6,7 +6,7 @@ use crate::report::{AcceptanceLimits, ReportOptions, Tables, pages};
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Frame, Intake, Observability, Parameters,
+    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake, Observability, Parameters,
     Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
     Verdict, standing,
 };
@@ -58,6 +58,7 @@ reads! {
         findings: Vec<Labelled<Findings>>,
         finding_numbers: Vec<Labelled<FindingNumbers>>,
         rivals: Vec<Labelled<Rivals>>,
+        forms: Vec<Labelled<Forms>>,
         suspects: Vec<Labelled<Suspects>>,
     }
 }
@@ -111,6 +112,7 @@ impl Stage for Report {
             findings: unlabelled(reads.findings),
             finding_numbers: unlabelled(reads.finding_numbers),
             rivals: unlabelled(reads.rivals),
+            forms: unlabelled(reads.forms),
             suspects: unlabelled(reads.suspects),
             curves,
             standing: stands.map(|stands| stands.step),

@@ -1,12 +1,12 @@
 //! Stage `robot`: a robot file -> the `robot` table.
 
+use super::text_file::text;
 use super::{Context, RawFile, Stage, reads, writes};
-use crate::error::{Error, Fault, Result};
+use crate::error::{Fault, Result};
 use crate::robot::import::{RobotFileText, read_calib, read_case};
 use crate::table::Robot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::io::Read;
 
 // Bytes; the largest URDF we know is 200 kB. A recording named here by mistake must not fill the memory.
 const MOST_BYTES: u64 = 16 << 20;
@@ -71,12 +71,12 @@ impl Stage for ReadRobot {
     }
 
     fn run(&self, _reads: RobotReads, context: &Context) -> Result<RobotWrites> {
-        let (label, text) = text(&self.file, context)?;
+        let (label, text) = robot_text(&self.file, context)?;
         let file = RobotFileText { label: &label, text: &text };
         let imported = match self.format {
             RobotFormat::Case => read_case(file)?,
             RobotFormat::Calib => {
-                let urdf = self.urdf.as_ref().map(|file| self::text(file, context)).transpose()?;
+                let urdf = self.urdf.as_ref().map(|file| robot_text(file, context)).transpose()?;
                 read_calib(file, urdf.as_ref().map(|(label, text)| RobotFileText { label, text }))?
             }
         };
@@ -87,15 +87,6 @@ impl Stage for ReadRobot {
     }
 }
 
-/// The label and content of a text file.
-fn text(file: &RawFile, context: &Context) -> Result<(String, String)> {
-    let source = context.services.open(file)?;
-    let mut bytes = Vec::new();
-    source.reader.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::store(&source.label, e.to_string()))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(Error::spec(&source.label, format!("longer than {} MB; expected a robot file", MOST_BYTES >> 20)));
-    }
-    let text =
-        String::from_utf8(bytes).map_err(|_| Error::spec(&source.label, "not a text file in UTF-8; expected a robot file"))?;
-    Ok((source.label, text))
+fn robot_text(file: &RawFile, context: &Context) -> Result<(String, String)> {
+    text(file, "a robot file", MOST_BYTES, context)
 }

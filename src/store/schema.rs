@@ -25,6 +25,7 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/fit.json"),
     include_str!("../../schemas/fleet.json"),
     include_str!("../../schemas/fleet_changes.json"),
+    include_str!("../../schemas/forms.json"),
     include_str!("../../schemas/intake.json"),
     include_str!("../../schemas/network.json"),
     include_str!("../../schemas/observability.json"),

@@ -1,12 +1,14 @@
 //! A diagnosis from its tables, as text and as JSON.
 
+use super::own_effect::declared_in_yaml;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
 use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
-    FindingNumbers, Findings, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow, is_separable_by_poses,
+    FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow, formula_in_words,
+    is_separable_by_poses,
 };
 use serde_json::{Value, json};
 
@@ -19,6 +21,7 @@ pub struct DiagnosisSummary {
     numbers: FindingNumbers,
     rivals: Rivals,
     shares: Shares,
+    forms: Forms,
 }
 
 /// Rivals of a finding that poses are offered for.
@@ -37,14 +40,54 @@ fn rival_words(rival: &RivalRow) -> String {
     format!("{} at {}{probability}", rival.effect, rival.place)
 }
 
+fn form_json(rows: &[FormRow]) -> Value {
+    let numbers = rows.iter().map(|row| json!({ "name": row.number, "value": row.value, "unit": row.unit, "sigma": row.sigma }));
+    let numbers: Vec<Value> = numbers.collect();
+    rows.first().map_or(Value::Null, |row| {
+        json!({
+            "formula": row.formula, "price": row.price, "proposed": row.proposed, "numbers": numbers,
+            "folds_rms_mm": row.folds_rms_mm, "curve_rms_mm": row.curve_rms_mm, "without_rms_mm": row.without_rms_mm,
+        })
+    })
+}
+
 impl DiagnosisSummary {
+    /// The proposed formula of a finding, of the first one that has one where none is named, as a file that declares it.
+    pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
+        let mut all = self.forms.0.iter().filter(|row| row.proposed && finding.is_none_or(|rank| row.rank == rank));
+        let row = all.next().ok_or_else(|| {
+            let which = finding.map_or("no finding has a formula".to_string(), |rank| format!("finding {rank} has no formula"));
+            Error::spec("--export-effect", format!("{which} that does what its curve does; findings without a name may have one"))
+        })?;
+        let told =
+            format!("a formula for {} at {}, found in run {}", self.effect_of(row.rank), self.place_of(row.rank), self.run);
+        declared_in_yaml(&row.declaration, &told)
+    }
+
+    fn effect_of(&self, rank: i64) -> &str {
+        self.findings.0.iter().find(|finding| finding.rank == rank).map_or("-", |finding| &finding.effect)
+    }
+
+    fn place_of(&self, rank: i64) -> &str {
+        self.findings.0.iter().find(|finding| finding.rank == rank).map_or("-", |finding| &finding.place)
+    }
+
     /// What a stage `diagnose` of a run wrote. Fails where a table has left the store.
     pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
         let verdict: Verdict = table(stage, store)?;
         let verdict = verdict.0.into_iter().next().ok_or_else(|| Error::Bug("a diagnosis without a verdict".into()))?;
         let (findings, numbers) = (table(stage, store)?, table(stage, store)?);
         let (run, step) = (run.to_string(), stage.id.clone());
-        Ok(Self { run, step, verdict, findings, numbers, rivals: table(stage, store)?, shares: table(stage, store)? })
+        Ok(Self {
+            run,
+            step,
+            verdict,
+            findings,
+            numbers,
+            rivals: table(stage, store)?,
+            shares: table(stage, store)?,
+            forms: table(stage, store)?,
+        })
     }
 
     /// What to measure next, a sentence each, then what to type for poses that tell findings from their closest rivals.
@@ -105,6 +148,7 @@ impl DiagnosisSummary {
                     "f_statistic": finding.f_statistic, "p_value": finding.p_value, "delta_bic": finding.delta_bic,
                     "heldout_gain_mm": finding.heldout_gain_mm, "effect_rms_mm": finding.effect_rms_mm,
                 },
+                "forms": self.forms.of_finding(finding.rank).map(form_json).collect::<Vec<_>>(),
                 "rivals": rivals.collect::<Vec<_>>(), "valid_range": valid,
             })
         });
@@ -169,6 +213,12 @@ impl DiagnosisSummary {
             {
                 let (effect, at) = (&finding.effect, &finding.place);
                 text.push_str(&format!("   probability: {effect} {name:.2}, at {at} {place:.2}, none of the names {none:.2}\n"));
+            }
+            for rows in self.forms.of_finding(finding.rank) {
+                let proposed = if rows.iter().any(|row| row.proposed) { ", proposed" } else { "" };
+                let (price, folds) = rows.first().map_or((0, 0.0), |row| (row.price, row.folds_rms_mm));
+                let words = formula_in_words(rows);
+                text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm on unseen poses{proposed})\n"));
             }
             let rivals: Vec<String> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).map(rival_words).collect();
             if !rivals.is_empty() {

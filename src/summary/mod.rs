@@ -6,6 +6,7 @@ mod diagnosis;
 mod explanation;
 mod grid;
 mod lines;
+mod own_effect;
 mod plan;
 mod run;
 mod run_diff;

@@ -75,6 +75,7 @@ mod document;
 mod findings;
 mod fit;
 mod fleet;
+mod forms;
 mod intake;
 mod located;
 mod network;
@@ -102,6 +103,7 @@ pub use document::{Document, DocumentRow};
 pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, RivalRow, Rivals, is_separable_by_poses};
 pub use fit::{Fit, FitRow};
 pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
+pub use forms::{FormRow, Forms, formula_in_words};
 pub use intake::{Intake, IntakeRow};
 pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
 pub use network::{Network, NetworkRow};
@@ -134,6 +136,7 @@ pub const TABLES: &[&str] = &[
     Fit::KIND,
     FleetTable::KIND,
     FleetChanges::KIND,
+    Forms::KIND,
     Intake::KIND,
     Network::KIND,
     Observability::KIND,

@@ -106,6 +106,7 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
         findings: labelled(Findings(findings)),
         finding_numbers: Vec::new(),
         rivals: Vec::new(),
+        forms: Vec::new(),
         suspects: Vec::new(),
     };
     let tables = Desk::default().run(&Report::default(), reads).expect("a report");

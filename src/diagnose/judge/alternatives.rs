@@ -7,7 +7,7 @@ use crate::estimate::{Model, NearbyFits, Session};
 use std::ops::Range;
 
 /// A fitted state beside which causes are left out, and rivals that may come in.
-pub(super) struct Alternatives<'a> {
+pub(crate) struct Alternatives<'a> {
     state: &'a FitState,
     fitter: &'a Fitter<'a>,
     /// The state's model with the rivals at zero.

@@ -29,7 +29,7 @@ const WORSE: f64 = 0.03;
 const CLEARLY: f64 = 2.0;
 
 /// Errors of the rows that were fitted.
-pub(super) struct FoldErrors {
+pub(crate) struct FoldErrors {
     /// Squared errors, m2, by row.
     squares: BTreeMap<usize, f64>,
     /// Whether they lie along a path.

@@ -7,8 +7,9 @@ mod exchange;
 mod fold_errors;
 mod withdraw;
 
+pub(crate) use alternatives::Alternatives;
 pub(crate) use comparison::ModelComparison;
-pub(crate) use fold_errors::{FOLDS, FoldGain};
+pub(crate) use fold_errors::{FOLDS, FoldErrors, FoldGain};
 
 use super::round::FitState;
 

@@ -186,8 +186,17 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
         let data = recorded(&robot, passing);
         let rows: Vec<usize> = (0..ROWS).collect();
         let (fit, validate) = rows.split_at(FITTED);
-        let question =
-            Question { robot: &robot, data: &data, fit, validate, set: &[0; ROWS], prior_weight: 1.0, without: &[], seed: 1 };
+        let question = Question {
+            robot: &robot,
+            data: &data,
+            fit,
+            validate,
+            set: &[0; ROWS],
+            prior_weight: 1.0,
+            without: &[],
+            own: &[],
+            seed: 1,
+        };
         let (fitter, now) = Fitter::start(&question);
         let problem = WhitenedProblem::new(&now.model, &data, fit.to_vec());
         // So that a payload is proposed at all.

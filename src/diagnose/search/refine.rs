@@ -5,9 +5,6 @@ use crate::diagnose::pool::Beside;
 use crate::effect::{Effect, Hypothesis};
 use std::collections::BTreeSet;
 
-/// Levels of refinement, and how many may bring nothing.
-const LEVELS: i32 = 10;
-const IDLE: usize = 3;
 /// Families of shapes that are refined before candidates are compared.
 const FAMILIES: usize = 5;
 
@@ -38,20 +35,7 @@ impl CauseSearch<'_, '_> {
             }
             let rest: Vec<usize> = set.iter().copied().filter(|k| *k != h).collect();
             let beside = Beside::of(self.pool, &rest);
-            let mut form = self.pool.hypotheses[h].form.clone();
-            let mut most = beside.gains(std::slice::from_ref(&form))[0];
-            let mut idle = 0;
-            for level in 0..LEVELS {
-                let near = form.near(self.survey, level);
-                let gains = beside.gains(&near);
-                match gains.into_iter().zip(near).max_by(|a, b| a.0.total_cmp(&b.0)) {
-                    Some((gain, other)) if gain > most * (1.0 + 1e-9) => (most, form) = (gain, other),
-                    _ => idle += 1,
-                }
-                if idle >= IDLE {
-                    break;
-                }
-            }
+            let form = beside.refined(self.pool.hypotheses[h].form.clone(), self.survey);
             let fine = if form == self.pool.hypotheses[h].form {
                 h
             } else {

@@ -3,8 +3,9 @@
 use super::findings::findings;
 use super::last_round::LastRound;
 use super::probability::weigh;
-use super::statement::{next, not_observable, slower_than_noise};
+use super::statement::{next, not_observable, not_tried, slower_than_noise};
 use super::unseen::by_speed;
+use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
 use crate::diagnose::misfit::{Misfit, TOO_LOUD};
@@ -39,9 +40,12 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let signature = signature(&rest, &last, something_left, misfit.not_carried);
     findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
+    not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(by_speed(&last));
     not_observable.extend(fitter.correlated.map(slower_than_noise));
     let located_after = locate(last.pool, &last.pool.given(&last.set()), last.survey);
+    let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
+    let formulas = search.of_all(&findings);
     let state = last.judged.state;
     let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
     let basis = basis(fitter);
@@ -55,8 +59,9 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         after: ErrorLengths::of(data, &predicted, &misfit.rows),
         held_out: misfit.held_out,
         folds,
-        next_measurements: next(&findings),
+        next_measurements: next(&findings, fitter.question.own),
         findings,
+        formulas,
         withdrawn: last.judged.withdrawn,
         clock: data.has_clock(),
         not_observable,

@@ -42,7 +42,11 @@ fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
     let mut sorted = set.to_vec();
     sorted.sort_unstable();
     let whole = pool.solve(&sorted).gain;
-    let finer = |name| cause(name).map_or(&[] as &[&str], |cause| cause.finer());
+    let finer = |(key, members): (&FindingKey, &Vec<usize>)| {
+        let own = members.iter().map(|i| pool.hypotheses[set[*i]].form.cause()).find(|own| own.name() == key.0);
+        (*key, own.or_else(|| cause(key.0)).map_or(&[] as &[&str], |cause| cause.finer()))
+    };
+    let finer: BTreeMap<FindingKey, &[&str]> = groups.iter().map(finer).collect();
     let gain = |members: &[usize]| {
         let own: Vec<usize> = members.iter().map(|i| set[*i]).collect();
         let rest: Vec<usize> = sorted.iter().copied().filter(|k| !own.contains(k)).collect();
@@ -53,7 +57,7 @@ fn refine(pool: &CachedHypotheses, groups: &mut FindingGroups, set: &[usize]) {
         let main = gains
             .iter()
             .filter(|(main, gain)| {
-                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer(main.0).contains(&small.0);
+                let joins = main.1 == small.1 && *own < REFINEMENT * **gain && finer[main].contains(&small.0);
                 // Both follow the side of the last move.
                 joins || (main.0 == JointLogLag::NAME && small.0 == Backlash::NAME && *own < TRACE * **gain)
             })

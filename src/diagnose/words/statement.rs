@@ -2,17 +2,17 @@
 
 use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Clock, Summary, Survey, cause, figure};
+use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Summary, Survey, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
 pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
-    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
 }
 
 /// The sentence of a finding whose numbers no such effect can have.
 pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: f64) -> String {
-    let text = cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
+    let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
     format!(
         "something unknown acts at {}: {effect} fits best ({text}), but {why} ({} um rms at the tool).",
         summary.place,
@@ -64,6 +64,15 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     out
 }
 
+/// Effects of the user's own that were not tried, since the recording lacks a column.
+pub(super) fn not_tried(survey: &Survey, own: &[&'static DeclaredCause]) -> Vec<String> {
+    let one = |declared: &&'static DeclaredCause| {
+        let lacking = DeclaredForm::lacking(declared, survey)?;
+        Some(format!("{}: the recording has no {lacking}", declared.name()))
+    };
+    own.iter().filter_map(one).collect()
+}
+
 /// What noise that is correlated from point to point hides.
 pub(super) fn slower_than_noise(noise: AutocorrelatedNoise) -> String {
     format!(
@@ -97,11 +106,15 @@ fn masses(survey: &Survey) -> Option<String> {
 const POSES: &str = "more poses, chosen to separate them (`calib poses --run`)";
 
 /// What would tell findings from their rivals, a sentence each.
-pub(super) fn next(findings: &[Finding]) -> Vec<String> {
+pub(super) fn next(findings: &[Finding], own: &[&'static DeclaredCause]) -> Vec<String> {
     let mut out = Vec::new();
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
-            let how = other_means(finding.effect, rival.effect).unwrap_or(POSES);
+            let how = least([finding.effect, rival.effect].into_iter().filter_map(|name| {
+                let declared = own.iter().find(|declared| declared.name() == name);
+                declared.map_or_else(|| cause(name)?.measure(), |declared| declared.measure())
+            }));
+            let how = how.unwrap_or(POSES);
             out.push(format!("{} at {} or {} at {}: {how}", finding.effect, finding.place, rival.effect, rival.place));
         }
     }
@@ -110,6 +123,9 @@ pub(super) fn next(findings: &[Finding]) -> Vec<String> {
 
 /// What is not a pose and may tell two effects apart, where there is such a thing.
 pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
-    let measures = [a, b].into_iter().filter_map(|name| cause(name)?.measure());
+    least([a, b].into_iter().filter_map(|name| cause(name)?.measure()))
+}
+
+fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {
     measures.min_by_key(|measure| measure.rank).map(|measure| measure.advice)
 }

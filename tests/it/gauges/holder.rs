@@ -29,6 +29,7 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
         set: &[0; ROWS],
         prior_weight: 1.0,
         without: &[],
+        own: &[],
         seed: 1,
     };
     diagnose(&question, |_| ())

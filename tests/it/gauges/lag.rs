@@ -44,6 +44,7 @@ fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
         set: &vec![0; all.len()],
         prior_weight: 1.0,
         without: &[],
+        own: &[],
         seed: 1,
     };
     diagnose(&question, |_| ())

@@ -64,6 +64,7 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
         set: &vec![0; all.len()],
         prior_weight: 1.0,
         without: &[],
+        own: &[],
         seed: 1,
     };
     let found = diagnose(&question, |_| ());
@@ -181,6 +182,7 @@ fn near_repeats_count_less_the_known_motion() {
         set: &set,
         prior_weight: 1.0,
         without: &[],
+        own: &[],
         seed: 1,
     };
     let said = diagnose(&question, |_| ());

@@ -200,6 +200,25 @@ fn rivals() -> Rivals {
     }])
 }
 
+fn formulas() -> Forms {
+    let number = |number: &str, value, unit: &str| FormRow {
+        rank: 1,
+        form: 1,
+        number: number.into(),
+        formula: "exp(-((q - centre) / width)^2)".into(),
+        price: 10,
+        folds_rms_mm: 0.021,
+        curve_rms_mm: 0.022,
+        without_rms_mm: 0.055,
+        proposed: true,
+        value,
+        unit: unit.into(),
+        sigma: Some(0.02),
+        declaration: "{}".into(),
+    };
+    Forms(vec![number("c1", 53.2, "arcsec"), number("centre", -0.71, "rad"), number("width", 0.6, "rad")])
+}
+
 fn robot(name: &str) -> Robot {
     let body = |body: i64, name: &str, kind: &str, axis: [f64; 3], point: [f64; 3]| RobotRow {
         body,
@@ -373,6 +392,7 @@ pub fn tables(name: &str) -> ReportReads {
         findings: diagnosed(findings()),
         finding_numbers: diagnosed(numbers()),
         rivals: diagnosed(rivals()),
+        forms: diagnosed(formulas()),
         suspects: Vec::new(),
     }
 }

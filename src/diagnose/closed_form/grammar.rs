@@ -1,0 +1,214 @@
+//! The formulas that are tried for an error without a name: of one variable, or products of functions of two.
+//!
+//! Ranges are those of the kind of variable, not of the recording: a formula of one recording is one of another.
+
+use crate::effect::{EffectDeclaration, Laws, ShapeRange, Starts, Variable};
+use std::collections::BTreeMap;
+
+/// A variable by its name in formulas.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NamedVariable {
+    pub name: String,
+    pub is_angle: bool,
+    /// Over the fitted rows, rounded outwards; of angles a turn to either side.
+    pub range: [f64; 2],
+}
+
+impl NamedVariable {
+    /// Of a law at a joint; `None` of one that has no name in formulas.
+    pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2]) -> Option<Self> {
+        let name = variable.in_formulas(joint)?;
+        let is_angle = matches!(variable, Variable::Angle { .. });
+        let range = if is_angle { [-TURN, TURN] } else { [rounded(low, f64::floor), rounded(high, f64::ceil)] };
+        (range[0] < range[1]).then_some(Self { name, is_angle, range })
+    }
+}
+
+/// rad; no joint of an arm goes further.
+const TURN: f64 = 6.4;
+/// rad, between places at which a search begins.
+const SPACING: f64 = 0.2;
+/// Highest wave number of an angle, and of another variable in turns over its range.
+const ORDER: f64 = 50.0;
+const TURNS: f64 = 8.0;
+
+/// To one digit, outwards.
+fn rounded(value: f64, direction: fn(f64) -> f64) -> f64 {
+    if value == 0.0 {
+        return 0.0;
+    }
+    let scale = libm::pow(10.0, libm::floor(libm::log10(value.abs())));
+    direction(value / scale) * scale
+}
+
+/// A formula before its place is known.
+struct Sketch {
+    label: &'static str,
+    laws: Vec<String>,
+    shape: Vec<(&'static str, ShapeRange)>,
+}
+
+/// Declarations of all formulas at `place` of one variable, or of two.
+pub(super) fn declarations(place: &str, variables: &[NamedVariable]) -> Vec<EffectDeclaration> {
+    let sketches = match variables {
+        [one] => of_one(one),
+        [first, second] => of_two(first, second),
+        _ => Vec::new(),
+    };
+    let of: Vec<String> = variables.iter().map(|variable| variable.name.replace(['(', ')', '.'], "_")).collect();
+    sketches.into_iter().map(|sketch| declaration(place, &of.join("_and_"), sketch)).collect()
+}
+
+fn declaration(place: &str, of: &str, sketch: Sketch) -> EffectDeclaration {
+    let formulas = sketch.laws.join("; ");
+    EffectDeclaration {
+        name: format!("{}_of_{of}", sketch.label),
+        place: place.into(),
+        sentence: Some(format!("{{place}} errs by {{values}} times {formulas}{}", told(&sketch.shape))),
+        law: Laws(sketch.laws),
+        shape: sketch.shape.into_iter().map(|(name, range)| (name.to_string(), range)).collect::<BTreeMap<_, _>>(),
+        unit: Some("rad".into()),
+        ..EffectDeclaration::default()
+    }
+}
+
+/// The shape numbers, to be filled in.
+fn told(shape: &[(&str, ShapeRange)]) -> String {
+    let each: Vec<String> = shape.iter().map(|(name, _)| format!("{name} = {{{name}}}")).collect();
+    if each.is_empty() { String::new() } else { format!(", {}", each.join(", ")) }
+}
+
+fn span(variable: &NamedVariable) -> f64 {
+    variable.range[1] - variable.range[0]
+}
+
+/// Where something happens.
+fn centre(variable: &NamedVariable) -> (&'static str, ShapeRange) {
+    let [from, to] = variable.range;
+    let steps = if variable.is_angle { (span(variable) / SPACING) as usize } else { 12 };
+    let start = (1..steps).map(|k| (1e3 * (from + span(variable) * k as f64 / steps as f64)).round() / 1e3).collect();
+    ("centre", ShapeRange { from, to, start: Starts(start) })
+}
+
+/// Over how much.
+fn width(variable: &NamedVariable) -> (&'static str, ShapeRange) {
+    let shares: &[f64] = if variable.is_angle { &[0.02, 0.06] } else { &[0.05, 0.2] };
+    let start = shares.iter().map(|share| share * span(variable)).collect();
+    ("width", ShapeRange { from: 0.004 * span(variable), to: span(variable), start: Starts(start) })
+}
+
+/// How often.
+fn order(variable: &NamedVariable) -> (&'static str, ShapeRange) {
+    let unit = if variable.is_angle { 1.0 } else { std::f64::consts::TAU / span(variable) };
+    let last = if variable.is_angle { ORDER } else { TURNS };
+    let start = (1..=4 * last as usize).map(|k| 0.25 * k as f64).filter(|k| *k >= 0.5 && *k < last).map(|k| k * unit);
+    ("order", ShapeRange { from: 0.4 * unit, to: last * unit, start: Starts(start.step_by(2).collect()) })
+}
+
+fn of_one(variable: &NamedVariable) -> Vec<Sketch> {
+    let (v, [low, high]) = (&variable.name, variable.range);
+    let bare = |label, laws: &[String]| Sketch { label, laws: laws.to_vec(), shape: Vec::new() };
+    let mut out = vec![
+        bare("line", std::slice::from_ref(v)),
+        bare("square", &[format!("{v}^2")]),
+        bare("cube", &[format!("{v}^3")]),
+        bare("cubic", &[format!("{v}^2"), format!("{v}^3")]),
+        bare("growing_square", &[format!("{v} * abs({v})")]),
+        bare("root", &[format!("sqrt(abs({v}))")]),
+        Sketch { label: "kink", laws: vec![format!("abs({v} - centre)")], shape: vec![centre(variable)] },
+        Sketch { label: "step", laws: vec![format!("step({v} - centre)")], shape: vec![centre(variable)] },
+        Sketch {
+            label: "rise",
+            laws: vec![format!("tanh(({v} - centre) / width)")],
+            shape: vec![centre(variable), width(variable)],
+        },
+        Sketch {
+            label: "bump",
+            laws: vec![format!("exp(-(({v} - centre) / width)^2)")],
+            shape: vec![centre(variable), width(variable)],
+        },
+        Sketch {
+            label: "wave",
+            laws: vec![format!("sin(order * {v})"), format!("cos(order * {v})")],
+            shape: vec![order(variable)],
+        },
+    ];
+    if low < 0.0 && high > 0.0 {
+        out.push(bare("side", &[format!("sign({v})")]));
+    }
+    if !variable.is_angle {
+        out.push(Sketch { label: "decay", laws: vec![format!("exp(-({v} - {low}) / width)")], shape: vec![width(variable)] });
+        out.push(Sketch { label: "rush", laws: vec![format!("exp(({v} - {high}) / width)")], shape: vec![width(variable)] });
+    }
+    out
+}
+
+/// Functions of one factor: a label and their formulas.
+fn factors(variable: &NamedVariable) -> Vec<(&'static str, Vec<String>)> {
+    let v = &variable.name;
+    let mut out = vec![("", vec![v.clone()]), ("square", vec![format!("{v}^2")]), ("size", vec![format!("abs({v})")])];
+    if variable.range[0] < 0.0 && variable.range[1] > 0.0 {
+        out.push(("side", vec![format!("sign({v})")]));
+    }
+    if variable.is_angle {
+        out.push(("turn", vec![format!("sin({v})"), format!("cos({v})")]));
+    }
+    out
+}
+
+fn of_two(first: &NamedVariable, second: &NamedVariable) -> Vec<Sketch> {
+    let products = |a: &[String], b: &[String]| -> Vec<String> {
+        a.iter().flat_map(|a| b.iter().map(move |b| format!("{a} * {b}"))).collect()
+    };
+    let mut out = Vec::new();
+    for (label, a) in factors(first) {
+        for (other, b) in factors(second) {
+            let label = match (label, other) {
+                ("", "") => "product",
+                ("", other) | (other, "") => match other {
+                    "square" => "product_with_square",
+                    "size" => "product_with_size",
+                    "side" => "product_with_side",
+                    _ => "product_with_turn",
+                },
+                ("turn", "turn") => "product_of_turns",
+                _ => "mixed_product",
+            };
+            out.push(Sketch { label, laws: products(&a, &b), shape: Vec::new() });
+        }
+    }
+    for (one, other) in [(first, second), (second, first)] {
+        let (v, w) = (&one.name, &other.name);
+        if one.is_angle {
+            let laws = vec![format!("sin(order * {v}) * {w}"), format!("cos(order * {v}) * {w}")];
+            out.push(Sketch { label: "scaled_wave", laws, shape: vec![order(one)] });
+        }
+        let law = format!("exp(-(({v} - centre) / width)^2) * {w}");
+        out.push(Sketch { label: "scaled_bump", laws: vec![law], shape: vec![centre(one), width(one)] });
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::DeclaredCause;
+
+    #[test]
+    fn every_formula_is_a_declaration_without_a_fault() {
+        let angle = NamedVariable::of(Variable::Angle { joint: 2 }, 2, [-1.0, 1.0]).expect("a name");
+        let load = NamedVariable::of(Variable::Load { joint: 2 }, 2, [-113.0, 87.0]).expect("a name");
+        let other = NamedVariable::of(Variable::Angle { joint: 4 }, 2, [0.0, 1.0]).expect("a name");
+        assert_eq!([&angle.name, &load.name, &other.name], ["q", "load", "q5"]);
+        assert_eq!(load.range, [-200.0, 90.0]);
+        for variables in [vec![angle.clone()], vec![load.clone()], vec![angle.clone(), load], vec![angle, other]] {
+            let all = declarations("joint 3", &variables);
+            assert!(all.len() > 10);
+            for declaration in all {
+                if let Err(faults) = DeclaredCause::of(&declaration) {
+                    panic!("{declaration:?}: {faults:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Formulas for errors without a name: small ones that do what a free curve does, judged by folds of the rows to fit.
+//!
+//! Every formula of a grammar is fitted in place of the finding's curves, its shape numbers refined; price (parts and coefficients) and
+//! error on folds make a Pareto front of at most three. Rows that are held out for validation take no part. Each is a declaration of an
+//! effect of one's own, ready to be written.
+
+mod front;
+mod grammar;
+mod shape_sigma;
+
+use super::judge::{Alternatives, FoldErrors};
+use super::pool::{Beside, CachedHypotheses};
+use super::round::{EstimatedCause, FitState, Fitter};
+use super::types::{ClosedForm, Finding};
+use crate::effect::{
+    DeclaredCause, DeclaredForm, Effect, Form, JointTable, Motion, ParameterEstimate, Place, Survey, Variable, people,
+};
+use crate::estimate::ParameterStatus;
+use front::{Priced, front};
+use grammar::{NamedVariable, declarations};
+use shape_sigma::shape_sigmas;
+
+/// What formulas are looked for in: the fitted model, its causes' positions in the pool, and the pool.
+pub(super) struct FormulaSearch<'a, 'b> {
+    pub state: &'b FitState,
+    pub set: &'b [usize],
+    pub pool: &'b CachedHypotheses<'a>,
+    pub survey: &'b Survey<'a>,
+    pub fitter: &'b Fitter<'b>,
+}
+
+/// Starts of a formula's shape numbers that are refined.
+const STARTS: usize = 4;
+
+/// A formula with its shape numbers where they fit best.
+struct Candidate {
+    cause: &'static DeclaredCause,
+    form: Form,
+    price: usize,
+}
+
+impl FormulaSearch<'_, '_> {
+    /// Formulas for findings, those of each cheapest first; none where it has a name, or is no function of one or two variables.
+    pub fn of_all(&self, findings: &[Finding]) -> Vec<ClosedForm> {
+        findings.iter().enumerate().filter_map(|(at, finding)| self.forms(at, finding)).flatten().collect()
+    }
+
+    fn forms(&self, at: usize, finding: &Finding) -> Option<Vec<ClosedForm>> {
+        let nameless = |form: &Form| form.cause().is_nameless() || form.is(&JointTable);
+        if finding.forms.is_empty() || !finding.forms.iter().all(nameless) {
+            return None;
+        }
+        let members: Vec<usize> = (0..self.set.len()).filter(|i| finding.forms.contains(&self.state.causes[*i].form)).collect();
+        let (place, variables) = self.variables(finding)?;
+        let mut rest: Vec<usize> = (0..self.set.len()).filter(|i| !members.contains(i)).map(|i| self.set[i]).collect();
+        rest.sort_unstable();
+        let beside = Beside::of(self.pool, &rest);
+        let candidates: Vec<Candidate> = declarations(&place, &variables)
+            .iter()
+            .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &beside))
+            .collect();
+        let rivals: Vec<EstimatedCause> = candidates.iter().map(|candidate| self.at_zero(&candidate.form)).collect();
+        let alternatives = Alternatives::of(self.state, self.fitter, &rivals)?;
+        let judge = alternatives.judge()?;
+        let without = judge(&members, None)?.rms();
+        let curve = FoldErrors::of(self.state, self.fitter)?.rms();
+        let priced = |(k, candidate): (usize, &Candidate)| Priced {
+            price: candidate.price,
+            error: judge(&members, Some(k)).map_or(f64::NAN, |errors| errors.rms()),
+        };
+        let priced: Vec<Priced> = candidates.iter().enumerate().map(priced).collect();
+        let (shown, chosen) = front(&priced, [without, curve])?;
+        let one = |(position, k): (usize, &usize)| ClosedForm {
+            finding: at,
+            declaration: candidates[*k].cause.declaration().clone(),
+            price: priced[*k].price,
+            folds: priced[*k].error,
+            curve,
+            without,
+            chosen: Some(position) == chosen,
+            numbers: self.numbers(&candidates[*k], &variables, (&members, &beside)),
+        };
+        Some(shown.iter().enumerate().map(one).collect())
+    }
+
+    /// The place as a declaration has it, and the variables, where they are one or two.
+    fn variables(&self, finding: &Finding) -> Option<(String, Vec<NamedVariable>)> {
+        let mut joint = None;
+        let mut variables: Vec<Variable> = Vec::new();
+        for form in &finding.forms {
+            let term = form.term()?;
+            let Motion::Joint { joint: own } = term.motion() else { return None };
+            joint = Some(own);
+            for variable in term.law().variables() {
+                if !variables.contains(&variable) {
+                    variables.push(variable);
+                }
+            }
+        }
+        let joint = joint?;
+        let named = |of: &Variable| NamedVariable::of(*of, joint, self.range(*of)?);
+        let named: Vec<NamedVariable> = variables.iter().map(named).collect::<Option<_>>()?;
+        let anywhere = self.survey.robot.is_revolute(joint) && variables.iter().all(|of| of.is_of(joint));
+        let place = if anywhere { "joint".into() } else { Place::Joint(joint).to_string() };
+        (1..=2).contains(&named.len()).then_some((place, named))
+    }
+
+    /// Lowest and highest value over the fitted rows.
+    fn range(&self, of: Variable) -> Option<[f64; 2]> {
+        let survey = self.survey;
+        let value = |(i, row): (usize, &usize)| {
+            Some(match of {
+                Variable::Angle { joint } => survey.data.q(*row)[joint],
+                Variable::Load { joint } => survey.torque[i * survey.joints() + joint],
+                Variable::Approach { joint } => survey.data.direction(*row, joint),
+                Variable::Move { joint } => survey.data.last_move(*row, joint),
+                Variable::Velocity { joint } => survey.data.velocity(*row, joint),
+                Variable::Temperature => survey.data.temperature(*row)?,
+                Variable::Time => survey.data.time(*row),
+                Variable::Payload => survey.data.payload[*row],
+                _ => return None,
+            })
+        };
+        let values: Option<Vec<f64>> = survey.rows.iter().enumerate().map(value).collect();
+        values?.into_iter().fold(None, |range: Option<[f64; 2]>, value| {
+            Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
+        })
+    }
+
+    /// A declared law at the place of the finding, its shape numbers where they fit best.
+    fn candidate(&self, cause: &'static DeclaredCause, place: Place, beside: &Beside) -> Option<Candidate> {
+        let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter().map(|hypothesis| hypothesis.form);
+        let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
+        let gains = beside.gains(&forms);
+        let mut starts: Vec<(f64, Form)> = gains.into_iter().zip(forms).collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // The best start need not lead to the best shape.
+        let ends: Vec<Form> = starts.into_iter().take(STARTS).map(|(_, form)| beside.refined(form, self.survey)).collect();
+        let gains = beside.gains(&ends);
+        let (_, form) = gains.into_iter().zip(ends).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Candidate { cause, form, price: cause.price() })
+    }
+
+    fn at_zero(&self, form: &Form) -> EstimatedCause {
+        let count = form.parameters(&self.state.model.robot).len();
+        EstimatedCause { form: form.clone(), coefficients: vec![0.0; count], priors: Vec::new() }
+    }
+
+    /// Shape numbers, then coefficients as the whole model has them with the formula in place of the curves.
+    fn numbers(
+        &self,
+        candidate: &Candidate,
+        variables: &[NamedVariable],
+        (members, beside): (&[usize], &Beside),
+    ) -> Vec<ParameterEstimate> {
+        let Candidate { form, .. } = candidate;
+        let sigmas = shape_sigmas(form, beside);
+        let shape = form.shape_numbers().into_iter().zip(sigmas);
+        let mut out: Vec<ParameterEstimate> = shape
+            .map(|((name, value), sigma)| ParameterEstimate { unit: unit(&name, variables), name, form: 0, value, sigma })
+            .collect();
+        let others = self.state.causes.iter().enumerate().filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone());
+        let fitted = self.fitter.fit(&self.state.model, others.chain([self.at_zero(form)]).collect());
+        let Some(range) = fitted.ranges.last().cloned() else { return out };
+        for (k, number) in range.zip(1..) {
+            let spec = &fitted.model.stack.specs()[k];
+            let (unit, symbol) = people(spec.unit);
+            let sigma = match fitted.fitted.statuses[k] {
+                ParameterStatus::Free(sigma) => Some(unit.from_si(sigma)),
+                _ => None,
+            };
+            let value = unit.from_si(fitted.model.x[k]);
+            out.push(ParameterEstimate { name: format!("c{number}"), form: 0, value, unit: symbol, sigma });
+        }
+        out
+    }
+}
+
+/// The unit of a shape number: that of the variable, or turns of it; in SI where it is no angle.
+fn unit(name: &str, variables: &[NamedVariable]) -> &'static str {
+    match (name, variables.iter().all(|variable| variable.is_angle)) {
+        ("order", true) => "1",
+        (_, true) => "rad",
+        _ => "SI",
+    }
+}
