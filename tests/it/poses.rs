@@ -185,7 +185,7 @@ fn what_cannot_be_proposed_is_said() {
         Err(fault) => fault,
     };
     let few = DesignRequest { count: 5, candidates: 100, ..wish(Aim::Information) };
-    assert!(fault(&site(&robot), &GEOMETRY, few).contains("5 poses cannot tell 27 parameters: take at least 9"));
+    assert!(fault(&site(&robot), &GEOMETRY, few).contains("5 poses cannot determine 27 parameters: take at least 9"));
     let mut nowhere = site(&robot);
     nowhere.floor = 9.0;
     assert!(fault(&nowhere, &GEOMETRY, wish(Aim::Information)).contains("no pose of"));
