@@ -37,6 +37,11 @@ pub trait Placed: Effect + Any {
     fn free_curve(&self) -> std::ops::Range<usize> {
         0..0
     }
+    /// A parameter, by its number, that is held to a size known beforehand (one sigma, SI), so that it carries on no further than that
+    /// where the rows do not determine it.
+    fn held(&self) -> Option<(usize, f64)> {
+        None
+    }
     /// The law, where it is one at a place.
     fn term(&self) -> Option<&Term> {
         None

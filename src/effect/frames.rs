@@ -30,13 +30,11 @@ pub(super) fn laws(survey: &Survey) -> Vec<(Motion, Law, usize, f64)> {
     for joint in revolute().filter(|joint| joint + 1 < joints) {
         for turning in [true, false] {
             let motion = Motion::Axis { joint, about: None, turning };
-            let slow =
-                slow(survey).into_iter().map(|(of, [low, high])| Law::new(of, Basis::Linear { zero: low, per: high - low }));
             let loaded = survey
                 .is_loaded(joint)
                 .then(|| Law::new(Variable::Load { joint }, Basis::Linear { zero: 0.0, per: survey.load(joint) }));
             let side = survey.both_directions(joint).then(|| Law::of(Variable::Approach { joint }));
-            out.extend(slow.chain(loaded).chain(side).map(|law| (motion, law, 8, RARER)));
+            out.extend(loaded.into_iter().chain(side).map(|law| (motion, law, 4, RARER)));
         }
     }
     out

@@ -41,6 +41,8 @@ pub struct BentWindup {
     law: HardeningLaw,
 }
 
+/// What a wind-up lacks in proportion at its bend, rad (one sigma): 200 arcsec.
+const LARGE: f64 = 1e-3;
 /// Sines of a free curve.
 const CURVE: usize = 6;
 /// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
@@ -225,6 +227,16 @@ impl Placed for BentWindup {
 
     fn free_curve(&self) -> std::ops::Range<usize> {
         if let HardeningLaw::Curve { .. } = self.law { 1..1 + CURVE } else { 0..0 }
+    }
+
+    fn held(&self) -> Option<(usize, f64)> {
+        match self.law {
+            HardeningLaw::Saturating { at_nm }
+            | HardeningLaw::SoftZone { at_nm }
+            | HardeningLaw::Knee { at_nm }
+            | HardeningLaw::Power { at_nm, .. } => Some((1, LARGE / at_nm)),
+            HardeningLaw::Curve { .. } => None,
+        }
     }
 
     fn called(&self, p: &[f64], survey: &Survey) -> &'static str {

@@ -46,8 +46,8 @@ impl EstimatedCause {
     /// What keeps the coefficients of a free curve small where the data cannot tell, as its slow part, which is nearly geometry, or
     /// between sparse points: most of them are of one size (empirical Bayes), and none is larger than is plausible.
     pub fn shrunk(form: Form, robot: &RobotModel, coefficients: Vec<f64>) -> Self {
-        let curve = form.free_curve();
-        if curve.is_empty() {
+        let (curve, held) = (form.free_curve(), form.held());
+        if curve.is_empty() && held.is_none() {
             return Self { form, coefficients, priors: Vec::new() };
         }
         let mut sizes: Vec<f64> = coefficients[curve.clone()].iter().map(|value| value.abs()).collect();
@@ -55,8 +55,10 @@ impl EstimatedCause {
         let typical = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let share = |k: usize| if k < curve.start + SLOW { GEOMETRY } else { 1.0 };
         let of_curve = |k: usize, plausible: f64| (share(k) * plausible.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
-        let sigma = |k: usize, spec: ParameterSpec| {
-            if curve.contains(&k) { of_curve(k, spec.prior_sigma) } else { spec.prior_sigma }
+        let sigma = |k: usize, spec: ParameterSpec| match held {
+            Some((number, sigma)) if number == k => sigma,
+            _ if curve.contains(&k) => of_curve(k, spec.prior_sigma),
+            _ => spec.prior_sigma,
         };
         let specs = form.parameters(robot).into_iter().enumerate();
         let priors = specs.map(|(k, spec)| Prior { mean: 0.0, sigma: sigma(k, spec) }).collect();

@@ -102,8 +102,8 @@ mod tests {
         assert_eq!(rows.next(2, 20.0), Ok((2, 20.0)));
         assert_eq!(rows.next(2, 30.0), Err((2, 2)));
         rows.begin(100.0);
-        assert_eq!(rows.next(1, 5.0), Ok((3, 120.0)));
-        assert_eq!(rows.next(2, 6.0), Ok((4, 121.0)));
+        assert_eq!(rows.next(1, 5.0), Ok((3, 130.0)));
+        assert_eq!(rows.next(2, 6.0), Ok((4, 131.0)));
         rows.begin(100.0);
         assert_eq!(rows.next(9, 500.0), Ok((9, 500.0)));
         rows.begin(0.0);
