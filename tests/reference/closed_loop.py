@@ -14,9 +14,9 @@ random    25 poses within the ranges of the first recording and above the same f
 are measured by `calib simulate record` on the same concealed robot, an hour after the first recording, with its tracker, its noise, its warmth, its
 friction and the columns that its log has; each is appended by `later:` of `ingest`, and everything is diagnosed again. Marks, by the sealed truth:
 
-decided    neither of the two (finding, rival) is a rival above 0.05 of the other any more, and those of them are findings that are true
-wrong      the same, but a finding of them is not true, or a true one is missing
-undecided  one is still a rival of the other above 0.05; or neither is a finding, and one is a rival of something else
+decided    neither of the two (finding, rival) is a rival above 0.05 of the other any more, and exactly those of the two that are true are findings
+wrong      the same, but one of the two is a finding and not true, or true and no finding
+undecided  one of the two is still a rival of the other above 0.05; or neither is a finding, and one is a rival of something else
 
 An effect that the seal accepts in place of a concealed one counts as true where it is named, and is not missed where it is not.
 """
@@ -124,12 +124,13 @@ def measure(arguments, folder, case, truth, blocks, seed):
 
 
 def proposed(arguments, folder, case, truth, command):
-    """The proposed poses as blocks."""
+    """The proposed poses as blocks, the CPU seconds, and the separation that they promise."""
     poses = folder / "poses.csv"
     floor = ROOM[truth["robot"]][0]
-    text, cpu = calib(arguments, *command[1:], "--count", arguments.count, "--floor", floor, "--out", poses, "--json")
+    text, cpu = calib(arguments, *command, "--count", arguments.count, "--floor", floor, "--out", poses, "--json")
+    promised = [{key: part[key] for key in ("recorded", "random", "proposed")} for part in json.loads(text)["separation"]]
     if not poses.exists():
-        return None, cpu
+        return None, cpu, promised
     joints = [title for title in rows(poses)[0] if title.startswith("q")]
     # Where the log says no directions they are read from the way between the poses: then the arm drives straight.
     sides = [f"dir{j}" for j in range(1, len(joints) + 1)] if "direction" not in truth["hidden_columns"] else []
@@ -137,7 +138,7 @@ def proposed(arguments, folder, case, truth, command):
         {"joints_deg": [float(row[j]) for j in joints], "direction": [float(row[d]) for d in sides], "payload_kg": float(row["payload_kg"])}
         for row in rows(poses)
     ]
-    return [{"usage": "fit", "given": given}], cpu
+    return [{"usage": "fit", "given": given}], cpu, promised
 
 
 def drawn(arguments, case):
@@ -199,7 +200,9 @@ def one(job):
             place = folder / f"{k}-{arm}"
             place.mkdir(exist_ok=True)
             try:
-                blocks, cpu = proposed(arguments, place, case, truth, command) if arm == "proposed" else (drawn(arguments, case), 0.0)
+                blocks, cpu = drawn(arguments, case), 0.0
+                if arm == "proposed":
+                    blocks, cpu, asked["separation"] = proposed(arguments, place, case, truth, command)
                 if blocks is None:
                     asked[arm] = {"mark": "none proposed"}
                     continue
