@@ -7,14 +7,14 @@ use crate::diff::{self, Detail, DiffOptions, TableDiff};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::{Store, TableRef};
-use crate::summary::run_diff;
+use crate::summary::{rival_changes, run_diff};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
 /// Compare two tables or two runs: which rows changed, by how much, in the column's unit and in sigmas.
 ///
 /// Keys, tolerances and what is an angle come from the tables' schema. Rows are the same, within tolerance, changed, in one
-/// table only, or have a key that is not theirs alone.
+/// table only, or have a key that is not theirs alone. Of two runs with a diagnosis it is said which rivals of a finding B decided.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DiffArguments {
@@ -108,15 +108,17 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
         ..DiffOptions::default()
     };
     let diff = compare_runs(&store, &a, &b, &options)?;
+    let rivals = rival_changes(&store, &diff, [&a, &b])?;
     if arguments.json {
         let mut value = serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
         value["same"] = diff.is_same().into();
+        value["rivals"] = serde_json::to_value(&rivals).map_err(|error| Error::Bug(error.to_string()))?;
         emit_json(&value)?;
     } else {
-        emit(&run_diff(&diff, arguments.stat))?;
+        emit(&run_diff(&diff, &rivals, arguments.stat))?;
     }
     if let Some(path) = &arguments.html {
-        let text = run_diff(&diff, true);
+        let text = run_diff(&diff, &rivals, true);
         let notes: Vec<String> = text.lines().filter(|line| !line.is_empty()).map(String::from).collect();
         let tables: Vec<(String, TableDiff)> =
             diff.tables.iter().filter_map(|table| Some((table.name.clone(), table.diff.clone()?))).collect();

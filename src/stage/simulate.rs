@@ -6,7 +6,7 @@ use crate::robot::{Instrument, START, SigmaSource};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
-use crate::twin::plan::{Block, Climate, Poses};
+use crate::twin::plan::{Block, Climate, Poses, given};
 use crate::twin::recorder::{Experiment, Motors, Shot};
 use crate::twin::tracker::Tracker;
 use crate::twin::true_value::TrueValue;
@@ -90,8 +90,14 @@ impl Stage for Simulate {
     fn check(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
         let mut fault = |place: &str, message: &str| faults.push(Fault::new(place, message));
-        if self.blocks.iter().all(|block| block.points == 0) {
+        if self.blocks.iter().all(|block| block.count() == 0) {
             fault("blocks", "expected at least one block with points, e.g. [{usage: fit, points: 50}]");
+        }
+        for (place, pose) in given(&self.blocks) {
+            pose.faults().iter().for_each(|(at, message)| fault(&format!("{place}.{at}"), message));
+        }
+        for (index, _) in self.blocks.iter().enumerate().filter(|(_, block)| self.motion.is_some() && !block.given.is_empty()) {
+            fault(&format!("blocks[{index}].given"), "poses are given to an arm that stands; leave them or `motion` out");
         }
         for (index, block) in self.blocks.iter().enumerate() {
             if !(block.payload_kg.is_finite() && block.payload_kg >= 0.0) {
@@ -106,7 +112,10 @@ impl Stage for Simulate {
         if !(self.tracker.coverage > 0.0 && self.tracker.noise_um >= 0.0 && self.tracker.noise_um_per_m >= 0.0) {
             fault("tracker", "expected noise_um and noise_um_per_m of 0 or more, and a coverage above 0, e.g. 2");
         }
-        let Climate { pace_s: pace, warm_up_h, swing_h, .. } = self.climate;
+        let Climate { pace_s: pace, begin_s, warm_up_h, swing_h, .. } = self.climate;
+        if !(begin_s >= 0.0 && begin_s.is_finite()) {
+            fault("climate.begin_s", "expected a time of 0 or more, s");
+        }
         if !(pace[0] > 0.0 && pace[0] <= pace[1] && pace[1].is_finite() && warm_up_h > 0.0 && swing_h > 0.0) {
             fault("climate", "expected pace_s as [shortest, longest] above 0, and warm_up_h and swing_h above 0");
         }
@@ -145,7 +154,7 @@ impl Stage for Simulate {
             climate: &self.climate,
             seed: self.seed.unwrap_or(context.seed),
         };
-        let points: usize = self.blocks.iter().map(|block| block.points).sum();
+        let points: usize = self.blocks.iter().map(Block::count).sum();
         context.services.begin("measuring the twin", Some(points as u64), "points");
         let mut done = 0;
         let shots = match &self.motion {
@@ -177,8 +186,11 @@ impl Simulate {
     /// Settings that this robot cannot have.
     fn against(&self, robot: &RobotDescription) -> Vec<Fault> {
         let joints = robot.joints.len();
-        let mut faults: Vec<Fault> =
-            self.truth.faults(robot).into_iter().map(|(at, what)| Fault::new(format!("truth.{at}"), what)).collect();
+        let of_truth = self.truth.faults(robot).into_iter().map(|(at, what)| Fault::new(format!("truth.{at}"), what));
+        let of_poses = given(&self.blocks).flat_map(|(place, pose)| {
+            pose.against(robot).into_iter().map(move |(at, what)| Fault::new(format!("{place}.{at}"), what))
+        });
+        let mut faults: Vec<Fault> = of_truth.chain(of_poses).collect();
         for (index, effect) in self.effects.iter().enumerate() {
             faults.extend(effect.fault(joints).map(|what| Fault::new(format!("effects[{index}]"), what)));
             if self.motion.is_none() && effect.moves_only() {
@@ -235,7 +247,7 @@ impl Simulate {
             position_sigma: Some(shots.iter().map(|shot| [figures.sigma(&shot.position.into()); 3]).collect()),
             sigma_source: Some(vec![source; shots.len()]),
             time: Some(shots.iter().map(|shot| shot.time_s).collect()),
-            payload: Some(shots.iter().map(|shot| self.blocks[shot.block].payload_kg).collect()),
+            payload: Some(shots.iter().map(|shot| shot.payload_kg).collect()),
             temperature: Some(shots.iter().map(|shot| shot.temperature_c).collect()),
             current: self.motion.is_none().then(|| shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
             velocity: self

@@ -1,5 +1,6 @@
 //! The difference of two runs as a short text: what was put in differently, and what came out of it, table by table.
 
+use super::rival_changes::{RivalChange, rival_words};
 use crate::audit::{RunDiff, TableChange};
 use crate::diff::{ColumnDiff, TableDiff, headline, short};
 use crate::error::counted;
@@ -9,8 +10,8 @@ const TABLES: usize = 6;
 /// Settings and files that are told one by one.
 const CAUSES: usize = 5;
 
-/// Two runs compared, as text; with `stat` every table of which rows differ.
-pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
+/// Two runs compared, as text, with the rivals that are gone or new; with `stat` every table of which rows differ.
+pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
     let told = |letter: char, told: &crate::audit::RunSummary| {
         format!("{letter}  {}  {}  {:.16}\n", told.run, told.pipeline, told.started)
     };
@@ -40,6 +41,7 @@ pub fn run_diff(diff: &RunDiff, stat: bool) -> String {
         |table: &TableChange| ["parameters", "statistics", "prediction"].iter().position(|kind| *kind == table.kind).unwrap_or(3);
     differing.sort_by_key(|table| rank(table));
     let (told, rest) = differing.split_at(if stat { differing.len() } else { differing.len().min(TABLES) });
+    text.push_str(&rival_words(rivals));
     text.push('\n');
     let width = told.iter().map(|table| table.name.len()).max().unwrap_or(0);
     for table in told {

@@ -9,6 +9,7 @@ pub mod conceal;
 pub mod effect;
 pub mod equilibrium;
 pub mod folder;
+pub mod given;
 pub mod matrix;
 pub mod memory;
 pub mod motion;

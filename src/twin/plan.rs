@@ -4,6 +4,7 @@
 //! (Mitchell's best candidate), so that points spread over the workspace instead of crowding where many postures reach.
 
 use super::arm::Arm;
+use super::given::GivenPose;
 use super::matrix::{self, Vector};
 use super::motion::Motion;
 use super::noise::{Noise, Purpose};
@@ -32,17 +33,35 @@ impl Default for Poses {
     }
 }
 
-/// A run of points with one load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A run of points: poses that are given, then poses that are drawn.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
     /// The label of its rows in the column `usage`, e.g. `fit`.
     pub usage: String,
-    /// How many.
+    /// Poses that are drawn.
+    #[serde(default)]
     pub points: usize,
     /// Mass at the flange, kg.
     #[serde(default)]
     pub payload_kg: f64,
+    /// Poses in the order of measurement, e.g. those of `calib poses`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub given: Vec<GivenPose>,
+}
+
+impl Block {
+    /// Points, given and drawn.
+    pub fn count(&self) -> usize {
+        self.given.len() + self.points
+    }
+}
+
+/// Given poses of all blocks, with their places.
+pub fn given(blocks: &[Block]) -> impl Iterator<Item = (String, &GivenPose)> {
+    blocks.iter().enumerate().flat_map(|(block, all)| {
+        all.given.iter().enumerate().map(move |(pose, given)| (format!("blocks[{block}].given[{pose}]"), given))
+    })
 }
 
 /// The clock and the temperature of the arm.
@@ -51,6 +70,9 @@ pub struct Block {
 pub struct Climate {
     /// Shortest and longest time from one point to the next, s.
     pub pace_s: [f64; 2],
+    /// The clock at the start, s: a later measurement of the same robot goes on with the time and the warmth of an earlier one.
+    #[serde(skip_serializing_if = "at_once")]
+    pub begin_s: f64,
     /// Temperature at the start, C.
     pub start_c: f64,
     /// Rise of the warm arm over the cold one, K.
@@ -73,13 +95,19 @@ fn no_swing(kelvin: &f64) -> bool {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn at_once(seconds: &f64) -> bool {
+    *seconds == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
 fn usual_swing(hours: &f64) -> bool {
     *hours == SWING_H
 }
 
 impl Default for Climate {
     fn default() -> Self {
-        Self { pace_s: [15.0, 25.0], start_c: 20.0, rise_k: 0.0, warm_up_h: 1.5, swing_k: 0.0, swing_h: SWING_H }
+        let (pace_s, begin_s) = ([15.0, 25.0], 0.0);
+        Self { pace_s, begin_s, start_c: 20.0, rise_k: 0.0, warm_up_h: 1.5, swing_k: 0.0, swing_h: SWING_H }
     }
 }
 
@@ -127,12 +155,24 @@ pub fn plan(
     climate: &Climate,
     seed: u64,
 ) -> Result<Vec<Point>, String> {
-    let ranges = ranges(robot, poses)?;
+    // Nothing is drawn where all poses are given: then the robot needs no limits.
+    let ranges = if blocks.iter().all(|block| block.points == 0) { Vec::new() } else { ranges(robot, poses)? };
     let mut draw = Noise::new(seed, Purpose::Poses);
     let mut clock = Noise::new(seed, Purpose::Clock);
-    let (mut out, mut time, mut before) = (Vec::new(), 0.0, vec![0.0; ranges.len()]);
+    let (mut out, mut time, mut before): (Vec<Point>, f64, _) = (Vec::new(), climate.begin_s, vec![0.0; robot.joints.len()]);
+    let mut tick = |q: Vec<f64>, block: usize, payload_kg: f64| {
+        time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
+        let before = std::mem::replace(&mut before, q.clone());
+        Point { block, q, before, direction: Vec::new(), time_s: time, temperature_c: climate.temperature(time), payload_kg }
+    };
     for (number, block) in blocks.iter().enumerate() {
-        let mut taken: Vec<Vector> = Vec::with_capacity(block.points);
+        let mut taken: Vec<Vector> = Vec::with_capacity(block.count());
+        for pose in &block.given {
+            let (q, short) = pose.postures(robot);
+            taken.push(arm.posture(&q, &Motion::none(arm.links.len())).tool);
+            let straight = tick(q, number, pose.payload_kg.unwrap_or(block.payload_kg));
+            out.push(Point { before: short.unwrap_or_else(|| straight.before.clone()), ..straight });
+        }
         for _ in 0..block.points {
             let mut best: Option<(f64, Vec<f64>, Vector)> = None;
             for _ in 0..poses.candidates.max(1) {
@@ -144,13 +184,10 @@ pub fn plan(
             }
             let Some((_, q, tool)) = best else { continue };
             taken.push(tool);
-            time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
-            let from = std::mem::replace(&mut before, q.clone());
-            let (direction, temperature_c) = (direction(&q, &from), climate.temperature(time));
-            let payload_kg = block.payload_kg;
-            out.push(Point { block: number, q, before: from, direction, time_s: time, temperature_c, payload_kg });
+            out.push(tick(q, number, block.payload_kg));
         }
     }
+    out.iter_mut().for_each(|point| point.direction = direction(&point.q, &point.before));
     Ok(out)
 }
 

@@ -65,6 +65,8 @@ pub struct Shot {
     pub time_s: f64,
     /// C.
     pub temperature_c: f64,
+    /// Declared mass at the flange, kg.
+    pub payload_kg: f64,
     /// Logged currents, A.
     pub current: Vec<f64>,
     /// Tracker frame, m, and its standard deviation per axis.
@@ -94,7 +96,9 @@ impl Experiment<'_> {
         }
         let later: f64 = effects.iter().map(Physical::later).sum();
         let times = (0..rows).map(|row| row as f64 / way.rate_hz);
-        let course = times.map(|time_s| (path.at(time_s + later).0, time_s, self.climate.temperature(time_s)));
+        let begin_s = self.climate.begin_s;
+        let clock = |since_s: f64| (begin_s + since_s, self.climate.temperature(begin_s + since_s));
+        let course = times.map(|since_s| (path.at(since_s + later).0, clock(since_s).0, clock(since_s).1));
         let mut memories = effect::recall(&effects, &memory::along(course));
         let base = self.tracker.base();
         let mut beam = Beam::new(self.seed);
@@ -106,9 +110,9 @@ impl Experiment<'_> {
             self.blocks.iter().enumerate().flat_map(|(number, block)| std::iter::repeat_n((number, block), block.points));
         let mut shots = Vec::with_capacity(rows);
         for (row, (block, load)) in blocks.enumerate() {
-            let time_s = row as f64 / way.rate_hz;
-            let (mut q, logged) = path.at(time_s);
-            let (command, velocity) = path.at(time_s + later);
+            let since_s = row as f64 / way.rate_hz;
+            let (mut q, logged) = path.at(since_s);
+            let (command, velocity) = path.at(since_s + later);
             let mut drive = self.truth.drive(self.robot, &command);
             for (((position, astray), sigma), link) in
                 drive.iter_mut().zip(&mut astray).zip(self.repeatability_arcsec).zip(&arm.links)
@@ -119,7 +123,7 @@ impl Experiment<'_> {
             for (side, speed) in direction.iter_mut().zip(&velocity).filter(|(_, speed)| **speed != 0.0) {
                 *side = speed.signum();
             }
-            let temperature_c = self.climate.temperature(time_s);
+            let (time_s, temperature_c) = clock(since_s);
             let payload_kg = load.payload_kg;
             let memory = std::mem::take(&mut memories[row]);
             let direction = direction.clone();
@@ -136,6 +140,7 @@ impl Experiment<'_> {
                 direction: row.direction,
                 time_s,
                 temperature_c,
+                payload_kg,
                 current: Vec::new(),
                 position: self.tracker.measure(seen, &mut beam),
                 sigma: self.tracker.sigma(seen),
@@ -183,6 +188,7 @@ impl Experiment<'_> {
                 direction: row.direction,
                 time_s,
                 temperature_c,
+                payload_kg,
                 velocity: Vec::new(),
             });
             tick();

@@ -339,3 +339,71 @@ fn a_workspace_without_a_pose_is_refused_with_what_to_widen() {
     let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
     assert!(error.to_string().contains("poses.floor_mm"), "{error}");
 }
+
+/// Given poses come first and as they are, each from the side that is asked for; the load is the pose's or the block's.
+#[test]
+fn given_poses_are_measured_from_the_side_that_is_asked_for() {
+    let text = "
+truth: {offset_deg: [0, 0, 0, 0, 0, 0]}
+effects: [{backlash: {joint: 2, gap_arcsec: 20}}]
+tracker: {noise_um: 0, noise_um_per_m: 0}
+poses: {range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]], floor_mm: 300, clearance_mm: 1000}
+climate: {begin_s: 7200}
+blocks:
+  - usage: fit
+    payload_kg: 210
+    points: 2
+    given:
+      - {joints_deg: [10, 0, 0, 0, 0, 0], direction: [-1, 1, 1, 0, 1, 1]}
+      - {joints_deg: [10, 0, 0, 0, 0, 0], direction: [-1, -1, 1, 0, 1, 1], payload_kg: 0}
+      - {joints_deg: [20, -10, 0, 0, 0, 5]}
+";
+    let settings: Simulate = serde_saphyr::from_str(text).expect("good settings");
+    assert!(settings.check().is_empty());
+    let recording = simulate(&settings, 3).expect("runs").recording;
+    assert_eq!(recording.rows(), 5);
+    let side = |row: usize| recording.direction.as_ref().expect("directions")[6 * row..6 * row + 6].to_vec();
+    assert_eq!(side(0), [-1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
+    assert_eq!(side(1), [-1.0, -1.0, 1.0, 0.0, 1.0, 1.0]);
+    // Straight from the pose before.
+    assert_eq!(side(2), [1.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(recording.payload.as_ref().expect("loads")[..4], [210.0, 0.0, 210.0, 210.0]);
+    assert!((recording.q(0)[0] - 10f64.to_radians()).abs() < 1e-15 && recording.point_id[2] == "fit-0003");
+    assert!(recording.time.as_ref().expect("a clock").iter().all(|time| *time > 7200.0));
+    // Joint 2 trails by 10 arcsec on either side; the tool is 1542 mm before its axis and 1340 mm above it.
+    let [up, down] = [0, 1].map(|row| recording.position[row]);
+    let moved = (0..3).map(|axis| (up[axis] - down[axis]).powi(2)).sum::<f64>().sqrt();
+    let expected = 20.0 * ARCSEC * 1.542f64.hypot(1.340);
+    assert!((moved / expected - 1.0).abs() < 1e-6, "{moved} m instead of {expected} m");
+}
+
+#[test]
+fn given_poses_that_cannot_be_are_named_all_at_once() {
+    let text = "
+climate: {begin_s: -1}
+motion: {rate_hz: 100}
+blocks:
+  - {usage: fit, points: 5}
+  - usage: more
+    given:
+      - {joints_deg: []}
+      - {joints_deg: [0, 0, 0, 0, 0, 0], direction: [2, 0, 0, 0, 0, 0], payload_kg: -1}
+";
+    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let places: Vec<String> = settings.check().into_iter().map(|fault| fault.place).collect();
+    let at = |pose: usize, what: &str| format!("blocks[1].given[{pose}].{what}");
+    let expected =
+        [at(0, "joints_deg"), at(1, "direction"), at(1, "payload_kg"), "blocks[1].given".into(), "climate.begin_s".into()];
+    assert_eq!(places, expected);
+    let text = "blocks: [{usage: fit, given: [{joints_deg: [0, 500, 0, 0, 0, 0], direction: [1]}, {joints_deg: [0, 0]}]}]";
+    let settings: Simulate = serde_saphyr::from_str(text).expect("well formed");
+    let Err(error) = simulate(&settings, 1) else { panic!("must not run") };
+    let message = error.to_string();
+    for said in [
+        "simulate.with.blocks[0].given[0].direction: has 1 numbers, the robot 6 joints",
+        "simulate.with.blocks[0].given[0].joints_deg: joint 2 is at 500 deg; allowed: ",
+        "simulate.with.blocks[0].given[1].joints_deg: has 2 numbers, the robot 6 joints",
+    ] {
+        assert!(message.contains(said), "{said} is missing in\n{message}");
+    }
+}

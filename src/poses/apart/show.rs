@@ -87,7 +87,8 @@ impl PoseAnswer for Apart<'_> {
             if let Some(temperature) = self.circumstances.temperature {
                 text.push_str(&format!(", the arm at {temperature:.1} C"));
             }
-            text.push_str("; put the rows behind the recording's and diagnose again\n");
+            text.push_str("; append the files under `later` of the stage `ingest` and diagnose again;\n");
+            text.push_str(&format!("what that decided is said by: calib diff {} NEW_RUN\n", self.run));
             text.push_str(&closing(self.request));
         }
         text

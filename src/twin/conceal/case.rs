@@ -51,6 +51,10 @@ pub struct Case {
     pub climate: Climate,
     /// Effects, each with how visible it is.
     pub concealed: Vec<Concealed>,
+    /// Friction of the joints, which currents show and positions do not, and the motors.
+    pub friction: Vec<Physical>,
+    /// As their currents are logged.
+    pub motors: Motors,
     /// Names and places that are right too, since the data cannot separate them.
     pub accepted: Vec<(&'static str, String)>,
     /// Columns that the recording lacks.
@@ -133,7 +137,9 @@ impl Case {
 
         let (payload_kg, warmth): (Vec<f64>, Vec<f64>) =
             points.iter().map(|point| (point.payload_kg, point.temperature_c)).unzip();
-        let (effects, motors) = acting(&robot, &bench, &concealed, &mut draw);
+        let (friction, motors) = drives(&robot, &bench, &mut draw);
+        let acting = concealed.iter().flat_map(|one| one.cause.physical.clone());
+        let effects: Vec<Physical> = acting.chain(friction.iter().cloned()).collect();
         let play = vec![play_rad / ARCSEC; robot.joints.len()];
         let poses = Poses::default();
         let experiment = Experiment {
@@ -170,6 +176,8 @@ impl Case {
             play_rad,
             climate,
             concealed,
+            friction,
+            motors,
             hidden,
             tampered,
             shots,
@@ -198,13 +206,13 @@ impl Case {
     }
 }
 
-/// What is concealed, with friction in half of the cases, and the motors that show it.
-fn acting(robot: &RobotDescription, bench: &Bench, concealed: &[Concealed], draw: &mut Noise) -> (Vec<Physical>, Motors) {
-    let mut effects: Vec<Physical> = concealed.iter().flat_map(|one| one.cause.physical.clone()).collect();
-    let friction = if draw.chance(0.5) { 0.02 } else { 0.0 };
+/// Friction, in half of the cases, and the motors that show it.
+fn drives(robot: &RobotDescription, bench: &Bench, draw: &mut Noise) -> (Vec<Physical>, Motors) {
+    let share = if draw.chance(0.5) { 0.02 } else { 0.0 };
+    let mut friction = Vec::with_capacity(bench.peak.len());
     for (joint, peak) in bench.peak.iter().enumerate() {
-        let torque_nm = friction * draw.uniform(0.2, 1.0) * peak;
-        effects.push(Physical::HoldingFriction(HoldingFriction { joint: joint + 1, torque_nm }));
+        let torque_nm = share * draw.uniform(0.2, 1.0) * peak;
+        friction.push(Physical::HoldingFriction(HoldingFriction { joint: joint + 1, torque_nm }));
     }
     let largest = robot
         .joints
@@ -212,7 +220,7 @@ fn acting(robot: &RobotDescription, bench: &Bench, concealed: &[Concealed], draw
         .zip(&bench.peak)
         .map(|(joint, peak)| peak / (joint.reduction_ratio.unwrap_or(1.0) * joint.motor_constant.unwrap_or(1.0)));
     let motors = Motors { sign: Vec::new(), noise_a: 0.003 * largest.fold(0.0, f64::max) };
-    (effects, motors)
+    (friction, motors)
 }
 
 /// Manufacturing errors everywhere.

@@ -70,9 +70,12 @@ impl Case {
                 "joint_repeatability_rad": self.play_rad,
                 "scatter": self.tracker.scatter,
             },
+            // The whole robot in the settings of the stage `simulate`, effects apart: it can be measured again.
             "tracker": self.tracker,
             "climate": self.climate,
             "true": self.truth,
+            "motors": self.motors,
+            "friction": self.friction,
         }))
     }
 

@@ -60,7 +60,7 @@ impl Cell {
     pub fn points(&self, count: usize, payload_kg: &[f64], seed: u64) -> Vec<Point> {
         let blocks: Vec<Block> = payload_kg
             .iter()
-            .map(|kg| Block { usage: "fit".into(), points: count / payload_kg.len(), payload_kg: *kg })
+            .map(|kg| Block { usage: "fit".into(), points: count / payload_kg.len(), payload_kg: *kg, given: vec![] })
             .collect();
         let arm = Arm::new(&self.robot, &self.truth);
         plan(&self.robot, &arm, &self.poses, &blocks, &self.climate, seed).expect("poses are allowed")

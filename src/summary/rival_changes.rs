@@ -1,0 +1,215 @@
+//! What two runs say about the rivals of their findings: which of them later measurements decided, and how.
+
+use crate::audit::{RunAddress, RunDiff};
+use crate::error::Result;
+use crate::pipeline::{Manifest, StageReport};
+use crate::stage::{Diagnose, Stage};
+use crate::store::Store;
+use crate::table::{FindingRow, Findings, Rivals, Table};
+use serde::Serialize;
+
+/// Less probable than this, a rival is excluded.
+const OPEN: f64 = 0.05;
+
+/// A finding of one of two runs and an explanation that one of them could not exclude.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RivalChange {
+    /// The diagnosis.
+    pub stage: String,
+    /// What was found.
+    pub finding: Cause,
+    /// What fitted as well, in one of the runs.
+    pub rival: Cause,
+    /// What the later run makes of both.
+    pub outcome: Outcome,
+    /// Probability of the rival, or of the finding where the rival took its place; null where it is not among the rivals.
+    pub before: Option<f64>,
+    /// The same in the later run; `None` where it is gone.
+    pub now: Option<f64>,
+}
+
+/// An effect at a place, as tables have them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Cause {
+    pub effect: String,
+    #[serde(rename = "where")]
+    pub place: String,
+}
+
+/// What run B says of a finding and its rival in run A.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The finding stays, the rival is excluded.
+    Confirmed,
+    /// The rival is the finding now, and what was found before is excluded.
+    Reversed,
+    /// One of the two is found, and the other is not excluded.
+    Open,
+    /// Both are findings.
+    Both,
+    /// Neither is a finding.
+    Neither,
+    /// A finding of run B has a rival that run A excluded.
+    New,
+}
+
+impl std::fmt::Display for Cause {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} at {}", self.effect, self.place)
+    }
+}
+
+/// The findings of a diagnosis, and the rivals of each with their probabilities.
+struct Said(Vec<(Cause, Vec<(Cause, Option<f64>)>)>);
+
+impl Said {
+    /// None where a table was not written or has left the store.
+    fn read(stage: &StageReport, store: &Store) -> Result<Option<Self>> {
+        let (findings, rivals): (Option<Findings>, Option<Rivals>) = (table(stage, store)?, table(stage, store)?);
+        let (Some(findings), Some(rivals)) = (findings, rivals) else { return Ok(None) };
+        let finding = |row: &FindingRow| {
+            let own = rivals.0.iter().filter(|rival| rival.rank == row.rank);
+            let own = own.map(|rival| (cause(&rival.effect, &rival.place), rival.probability));
+            (cause(&row.effect, &row.place), own.collect())
+        };
+        Ok(Some(Self(findings.0.iter().map(finding).collect())))
+    }
+
+    fn finds(&self, cause: &Cause) -> bool {
+        self.0.iter().any(|(finding, _)| finding == cause)
+    }
+
+    /// Findings with the rivals that are not excluded, and their probabilities.
+    fn open(&self) -> impl Iterator<Item = (&Cause, &Cause, Option<f64>)> {
+        let pairs = self.0.iter().flat_map(|(finding, own)| own.iter().map(move |(rival, value)| (finding, rival, *value)));
+        pairs.filter(|(_, _, value)| is_open(*value))
+    }
+
+    /// The probability of a rival of a finding, if it is listed.
+    fn rival(&self, finding: &Cause, rival: &Cause) -> Option<Option<f64>> {
+        let own = self.0.iter().filter(|(cause, _)| cause == finding).flat_map(|(_, own)| own);
+        own.into_iter().find(|(cause, _)| cause == rival).map(|(_, value)| *value)
+    }
+}
+
+/// A rival that is listed without a probability is not excluded.
+fn is_open(probability: Option<f64>) -> bool {
+    probability.is_none_or(|value| value >= OPEN)
+}
+
+fn cause(effect: &str, place: &str) -> Cause {
+    Cause { effect: effect.into(), place: place.into() }
+}
+
+/// A table of a stage; none where it was not written or has left the store.
+fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
+    let Some(own) = stage.outputs.iter().find(|output| output.kind == T::KIND) else { return Ok(None) };
+    if !store.object(&own.table)?.exists() {
+        return Ok(None);
+    }
+    T::from_frame(&store.load(&own.table)?).map(Some)
+}
+
+fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
+    let change = |finding: &Cause, rival: &Cause, outcome, before, now| {
+        let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
+        RivalChange { stage, finding, rival, outcome, before, now }
+    };
+    let mut out: Vec<RivalChange> = Vec::new();
+    for (finding, rival, before) in a.open() {
+        let (stays, comes) = (b.finds(finding), b.finds(rival));
+        let listed = if stays { b.rival(finding, rival) } else { b.rival(rival, finding) };
+        let outcome = match (stays, comes) {
+            (true, true) => Outcome::Both,
+            (false, false) => Outcome::Neither,
+            _ if listed.is_some_and(is_open) => Outcome::Open,
+            (true, false) => Outcome::Confirmed,
+            (false, true) => Outcome::Reversed,
+        };
+        out.push(change(finding, rival, outcome, before, listed.flatten()));
+    }
+    for (finding, rival, now) in b.open() {
+        let known = |one: &RivalChange| [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival));
+        if !out.iter().any(known) {
+            out.push(change(finding, rival, Outcome::New, a.rival(finding, rival).flatten(), now));
+        }
+    }
+    out
+}
+
+/// What the diagnoses of two compared runs say about rivals, stage by stage.
+pub fn rival_changes(store: &Store, diff: &RunDiff, of: [&RunAddress; 2]) -> Result<Vec<RivalChange>> {
+    let (a, b) = (Manifest::of(store, &diff.a.run)?, Manifest::of(store, &diff.b.run)?);
+    let asked = |id: &String| of.iter().all(|place| place.port.is_none() && place.stage.as_ref().is_none_or(|stage| stage == id));
+    let mut out = Vec::new();
+    for now in b.stages.iter().filter(|stage| stage.uses == Diagnose::NAME && asked(&stage.id)) {
+        let Some(before) = a.stage(&now.id).filter(|stage| stage.uses == Diagnose::NAME) else { continue };
+        if let (Some(before), Some(said)) = (Said::read(before, store)?, Said::read(now, store)?) {
+            out.extend(compare(&now.id, &before, &said));
+        }
+    }
+    Ok(out)
+}
+
+/// A line each.
+pub fn rival_words(changes: &[RivalChange]) -> String {
+    let number = |value: Option<f64>| value.map_or_else(|| "not listed".into(), |value| format!("{value:.2}"));
+    let line = |change: &RivalChange| {
+        let RivalChange { stage, finding, rival, outcome, before, now } = change;
+        let (was, is) = (number(*before), number(*now));
+        match outcome {
+            Outcome::Confirmed => format!("{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"),
+            Outcome::Reversed => {
+                format!("{stage}: decided: {rival}, not {finding} as in A (the rival's probability was {was} there)\n")
+            }
+            Outcome::Open => format!("{stage}: still open: {finding} or {rival} (the rival's probability {was} -> {is})\n"),
+            Outcome::Both => format!("{stage}: {finding} and {rival} are both findings in B\n"),
+            Outcome::Neither => format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n"),
+            Outcome::New => format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n"),
+        }
+    };
+    changes.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(findings: &[(&str, &[(&str, f64)])]) -> Said {
+        let named = |text: &str| text.split_once('@').map(|(effect, place)| cause(effect, place)).expect("EFFECT@PLACE");
+        let rivals = |own: &[(&str, f64)]| own.iter().map(|(name, value)| (named(name), Some(*value))).collect();
+        Said(findings.iter().map(|(name, own)| (named(name), rivals(own))).collect())
+    }
+
+    #[test]
+    fn every_rival_that_was_open_is_confirmed_reversed_or_still_open() {
+        let before = said(&[
+            ("joint_compliance@joint 2", &[("joint_hardening@joint 2", 0.31), ("link_mass@link 2", 0.02)]),
+            ("backlash@joint 3", &[("joint_log_lag@joint 3", 0.2)]),
+            ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.4)]),
+            ("link_mass@link 4", &[("link_mass@link 5", 0.3)]),
+            ("tool_shift@tool", &[("base_shift@base", 0.1)]),
+        ]);
+        let now = said(&[
+            ("joint_compliance@joint 2", &[("joint_hardening@joint 2", 0.01), ("link_mass@link 2", 0.06)]),
+            ("joint_log_lag@joint 3", &[]),
+            ("gear_cyclic@joint 1", &[("cable_drag@joint 1", 0.07)]),
+            ("link_mass@link 4", &[]),
+            ("link_mass@link 5", &[]),
+        ]);
+        let found = compare("diagnose", &before, &now);
+        use Outcome::{Both, Confirmed, Neither, New, Open, Reversed};
+        let outcomes: Vec<Outcome> = found.iter().map(|change| change.outcome).collect();
+        assert_eq!(outcomes, [Confirmed, Reversed, Open, Both, Neither, New]);
+        let text = rival_words(&found);
+        for line in [
+            "diagnose: decided: joint_compliance at joint 2, not joint_hardening at joint 2 (its probability 0.31 -> 0.01)",
+            "diagnose: decided: joint_log_lag at joint 3, not backlash at joint 3 as in A (the rival's probability was 0.20 there)",
+            "diagnose: still open: gear_cyclic at joint 1 or cable_drag at joint 1 (the rival's probability 0.40 -> 0.07)",
+            "diagnose: new rival: joint_compliance at joint 2 or link_mass at link 2 (probability 0.02 -> 0.06)",
+        ] {
+            assert!(text.contains(line), "{line} is missing in\n{text}");
+        }
+    }
+}
