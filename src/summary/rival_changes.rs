@@ -17,11 +17,11 @@ pub struct RivalChange {
     /// The diagnosis.
     pub stage: String,
     /// What was found.
-    pub finding: Cause,
+    pub finding: CauseAtPlace,
     /// What fitted as well, in one of the runs.
-    pub rival: Cause,
+    pub rival: CauseAtPlace,
     /// What the later run makes of both.
-    pub outcome: Outcome,
+    pub outcome: RivalOutcome,
     /// Probability of the rival, or of the finding where the rival took its place; null where it is not among the rivals.
     pub before: Option<f64>,
     /// The same in the later run; `None` where it is gone.
@@ -30,7 +30,7 @@ pub struct RivalChange {
 
 /// An effect at a place, as tables have them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Cause {
+pub struct CauseAtPlace {
     pub effect: String,
     #[serde(rename = "where")]
     pub place: String,
@@ -39,7 +39,7 @@ pub struct Cause {
 /// What run B says of a finding and its rival in run A.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum RivalOutcome {
     /// The finding stays, the rival is excluded.
     Confirmed,
     /// The rival is the finding now, and what was found before is excluded.
@@ -54,14 +54,17 @@ pub enum Outcome {
     New,
 }
 
-impl std::fmt::Display for Cause {
+impl std::fmt::Display for CauseAtPlace {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} at {}", self.effect, self.place)
     }
 }
 
 /// The findings of a diagnosis, and the rivals of each with their probabilities.
-struct Said(Vec<(Cause, Vec<(Cause, Option<f64>)>)>);
+struct Said(Vec<(CauseAtPlace, Vec<Listed>)>);
+
+/// A rival and its probability.
+type Listed = (CauseAtPlace, Option<f64>);
 
 impl Said {
     /// None where a table was not written or has left the store.
@@ -76,20 +79,20 @@ impl Said {
         Ok(Some(Self(findings.0.iter().map(finding).collect())))
     }
 
-    fn finds(&self, cause: &Cause) -> bool {
+    fn finds(&self, cause: &CauseAtPlace) -> bool {
         self.0.iter().any(|(finding, _)| finding == cause)
     }
 
     /// Findings with the rivals that are not excluded, and their probabilities.
-    fn open(&self) -> impl Iterator<Item = (&Cause, &Cause, Option<f64>)> {
+    fn open(&self) -> impl Iterator<Item = (&CauseAtPlace, &CauseAtPlace, Option<f64>)> {
         let pairs = self.0.iter().flat_map(|(finding, own)| own.iter().map(move |(rival, value)| (finding, rival, *value)));
         pairs.filter(|(_, _, value)| is_open(*value))
     }
 
-    /// The probability of a rival of a finding, if it is listed.
-    fn rival(&self, finding: &Cause, rival: &Cause) -> Option<Option<f64>> {
+    /// A rival of a finding, if it is listed.
+    fn rival(&self, finding: &CauseAtPlace, rival: &CauseAtPlace) -> Option<&Listed> {
         let own = self.0.iter().filter(|(cause, _)| cause == finding).flat_map(|(_, own)| own);
-        own.into_iter().find(|(cause, _)| cause == rival).map(|(_, value)| *value)
+        own.into_iter().find(|(cause, _)| cause == rival)
     }
 }
 
@@ -98,8 +101,8 @@ fn is_open(probability: Option<f64>) -> bool {
     probability.is_none_or(|value| value >= OPEN)
 }
 
-fn cause(effect: &str, place: &str) -> Cause {
-    Cause { effect: effect.into(), place: place.into() }
+fn cause(effect: &str, place: &str) -> CauseAtPlace {
+    CauseAtPlace { effect: effect.into(), place: place.into() }
 }
 
 /// A table of a stage; none where it was not written or has left the store.
@@ -112,7 +115,7 @@ fn table<T: Table>(stage: &StageReport, store: &Store) -> Result<Option<T>> {
 }
 
 fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
-    let change = |finding: &Cause, rival: &Cause, outcome, before, now| {
+    let change = |finding: &CauseAtPlace, rival: &CauseAtPlace, outcome, before, now| {
         let (stage, finding, rival) = (stage.to_string(), finding.clone(), rival.clone());
         RivalChange { stage, finding, rival, outcome, before, now }
     };
@@ -121,18 +124,18 @@ fn compare(stage: &str, a: &Said, b: &Said) -> Vec<RivalChange> {
         let (stays, comes) = (b.finds(finding), b.finds(rival));
         let listed = if stays { b.rival(finding, rival) } else { b.rival(rival, finding) };
         let outcome = match (stays, comes) {
-            (true, true) => Outcome::Both,
-            (false, false) => Outcome::Neither,
-            _ if listed.is_some_and(is_open) => Outcome::Open,
-            (true, false) => Outcome::Confirmed,
-            (false, true) => Outcome::Reversed,
+            (true, true) => RivalOutcome::Both,
+            (false, false) => RivalOutcome::Neither,
+            _ if listed.is_some_and(|(_, value)| is_open(*value)) => RivalOutcome::Open,
+            (true, false) => RivalOutcome::Confirmed,
+            (false, true) => RivalOutcome::Reversed,
         };
-        out.push(change(finding, rival, outcome, before, listed.flatten()));
+        out.push(change(finding, rival, outcome, before, listed.and_then(|(_, value)| *value)));
     }
     for (finding, rival, now) in b.open() {
         let known = |one: &RivalChange| [(&one.finding, &one.rival), (&one.rival, &one.finding)].contains(&(finding, rival));
         if !out.iter().any(known) {
-            out.push(change(finding, rival, Outcome::New, a.rival(finding, rival).flatten(), now));
+            out.push(change(finding, rival, RivalOutcome::New, a.rival(finding, rival).and_then(|(_, value)| *value), now));
         }
     }
     out
@@ -159,14 +162,16 @@ pub fn rival_words(changes: &[RivalChange]) -> String {
         let RivalChange { stage, finding, rival, outcome, before, now } = change;
         let (was, is) = (number(*before), number(*now));
         match outcome {
-            Outcome::Confirmed => format!("{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"),
-            Outcome::Reversed => {
+            RivalOutcome::Confirmed => format!("{stage}: decided: {finding}, not {rival} (its probability {was} -> {is})\n"),
+            RivalOutcome::Reversed => {
                 format!("{stage}: decided: {rival}, not {finding} as in A (the rival's probability was {was} there)\n")
             }
-            Outcome::Open => format!("{stage}: still open: {finding} or {rival} (the rival's probability {was} -> {is})\n"),
-            Outcome::Both => format!("{stage}: {finding} and {rival} are both findings in B\n"),
-            Outcome::Neither => format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n"),
-            Outcome::New => format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n"),
+            RivalOutcome::Open => {
+                format!("{stage}: still open: {finding} or {rival} (probability of the less probable one {was} -> {is})\n")
+            }
+            RivalOutcome::Both => format!("{stage}: {finding} and {rival} are both findings in B\n"),
+            RivalOutcome::Neither => format!("{stage}: neither {finding} nor its rival {rival} is a finding in B\n"),
+            RivalOutcome::New => format!("{stage}: new rival: {finding} or {rival} (probability {was} -> {is})\n"),
         }
     };
     changes.iter().map(line).collect()
@@ -199,14 +204,14 @@ mod tests {
             ("link_mass@link 5", &[]),
         ]);
         let found = compare("diagnose", &before, &now);
-        use Outcome::{Both, Confirmed, Neither, New, Open, Reversed};
-        let outcomes: Vec<Outcome> = found.iter().map(|change| change.outcome).collect();
+        use RivalOutcome::{Both, Confirmed, Neither, New, Open, Reversed};
+        let outcomes: Vec<RivalOutcome> = found.iter().map(|change| change.outcome).collect();
         assert_eq!(outcomes, [Confirmed, Reversed, Open, Both, Neither, New]);
         let text = rival_words(&found);
         for line in [
             "diagnose: decided: joint_compliance at joint 2, not joint_hardening at joint 2 (its probability 0.31 -> 0.01)",
             "diagnose: decided: joint_log_lag at joint 3, not backlash at joint 3 as in A (the rival's probability was 0.20 there)",
-            "diagnose: still open: gear_cyclic at joint 1 or cable_drag at joint 1 (the rival's probability 0.40 -> 0.07)",
+            "diagnose: still open: gear_cyclic at joint 1 or cable_drag at joint 1 (probability of the less probable one 0.40 -> 0.07)",
             "diagnose: new rival: joint_compliance at joint 2 or link_mass at link 2 (probability 0.02 -> 0.06)",
         ] {
             assert!(text.contains(line), "{line} is missing in\n{text}");
