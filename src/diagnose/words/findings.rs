@@ -50,11 +50,7 @@ struct Whole {
 fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members: &[usize]) -> Finding {
     let (pool, state) = (last.pool, &last.judged.state);
     let own: Vec<usize> = members.iter().map(|i| last.judged.set[*i]).collect();
-    let mut rest: Vec<usize> = whole.set.iter().copied().filter(|k| !own.contains(k)).collect();
-    if !pool.bic(&rest).is_finite() {
-        // Without the last joint that yields, the torque model moves nothing.
-        rest.retain(|k| !pool.of_torque_model[*k]);
-    }
+    let rest = without(pool, &whole.set, &own);
     let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
     let mut rivals = rivals(pool, &rest, &own, whole.bic, (effect, place));
     exact(effect, &forms, &mut rivals);
@@ -118,6 +114,19 @@ fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
             }
         })
     })
+}
+
+/// The other causes of a set that make sense alone: a product only beside the law that it is made of, the torque model only beside a
+/// joint that yields.
+fn without(pool: &CachedHypotheses, set: &[usize], own: &[usize]) -> Vec<usize> {
+    let others: Vec<usize> = set.iter().copied().filter(|k| !own.contains(k)).collect();
+    let made_of = |k: usize, law: usize| follows(&pool.hypotheses[k].form, &pool.hypotheses[law].form).is_some();
+    let whole = |k: &usize| !pool.hypotheses[*k].inherits || others.iter().any(|law| made_of(*k, *law));
+    let mut rest: Vec<usize> = others.iter().copied().filter(whole).collect();
+    if !pool.bic(&rest).is_finite() {
+        rest.retain(|k| !pool.of_torque_model[*k]);
+    }
+    rest
 }
 
 /// What the size of a named cause follows although its name claims a constant, and what the criterion loses where it is one.

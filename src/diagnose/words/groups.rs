@@ -22,8 +22,8 @@ pub(crate) fn groups(last: &FitState, set: &[usize], pool: &CachedHypotheses, su
         let values = &last.model.x[last.ranges[i].clone()];
         groups.entry((form.called(values, survey), form.place())).or_default().push(i);
     }
-    refine(pool, &mut groups, set);
     products(pool, &mut groups, set);
+    refine(pool, &mut groups, set);
     both_angles(pool, &mut groups, set);
     wobbles(pool, &mut groups, set);
     holders(pool, &mut groups, set, survey);
