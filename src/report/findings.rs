@@ -145,7 +145,7 @@ fn chance(p: f64) -> String {
 
 fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
     let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
-    let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank);
+    let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank && rival.is_inseparable());
     let share = |p: Option<f64>| p.map(|p| format!("{p:.2}"));
     let evidence = [
         (

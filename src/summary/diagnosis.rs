@@ -220,7 +220,13 @@ impl DiagnosisSummary {
                 let words = formula_in_words(rows);
                 text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm on unseen poses{proposed})\n"));
             }
-            let rivals: Vec<String> = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank).map(rival_words).collect();
+            let rivals: Vec<String> = self
+                .rivals
+                .0
+                .iter()
+                .filter(|rival| rival.rank == finding.rank && rival.is_inseparable())
+                .map(rival_words)
+                .collect();
             if !rivals.is_empty() {
                 text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }

@@ -60,6 +60,16 @@ crate::table::rows! { "rivals",
     }
 }
 
+impl RivalRow {
+    /// Whether it is more than the nearest name of a finding that has none: one that the data exclude.
+    pub fn is_inseparable(&self) -> bool {
+        self.probability.is_none_or(|probability| probability >= EXCLUDED)
+    }
+}
+
+/// Less probable than this, a name is excluded.
+const EXCLUDED: f64 = 0.005;
+
 /// Whether more poses may separate an effect of these tables from others.
 pub fn is_separable_by_poses(effect: &str) -> bool {
     cause(effect).is_none_or(|cause| cause.is_separable_by_poses())
