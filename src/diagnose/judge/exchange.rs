@@ -96,7 +96,7 @@ impl Contested {
     fn of(name: (&'static str, Place), set: &[usize], pool: &CachedHypotheses) -> Self {
         let form = |k: usize| &pool.hypotheses[k].form;
         let named: Vec<usize> = set.iter().copied().filter(|k| named(pool, *k) == name).collect();
-        // A product goes with the law that it is made of.
+        // A product is contested together with the law that it is made of.
         let contested = |k: usize| named.contains(&k) || named.iter().any(|own| follows(form(k), form(*own)).is_some());
         let members: Vec<usize> = (0..set.len()).filter(|i| contested(set[*i])).collect();
         let (own, rest): (Vec<usize>, Vec<usize>) = set.iter().copied().partition(|k| contested(*k));

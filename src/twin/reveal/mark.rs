@@ -82,7 +82,7 @@ impl HeldOut {
 pub struct Case {
     /// Of the recording.
     pub name: String,
-    /// What it conceals, in a word.
+    /// What it conceals: null, single, pair or open.
     pub content: String,
     /// Of its effect.
     pub family: String,
