@@ -30,9 +30,20 @@ pub fn follows(product: &Form, named: &Form) -> Option<Variable> {
     let (product, named) = (product.term()?, named.term()?);
     let by = product.law().times?.of;
     let [own, first] = [product, named].map(|term| term.law().first);
+    if named.law().times.is_some() {
+        return None;
+    }
     let same = product.motion() == named.motion() && own.of.to_string() == first.of.to_string();
     let alike = std::mem::discriminant(&own.basis) == std::mem::discriminant(&first.basis);
     (same && alike && product.cause().is_nameless() && !named.cause().is_nameless()).then_some(by)
+}
+
+/// Whether a form with a name is the law that a product without one would be, whatever the course in its second variable.
+pub fn is_named_product(named: &Form, product: &Form) -> bool {
+    let (Some(named), Some(product)) = (named.term(), product.term()) else { return false };
+    let second = |term: &Term| term.law().times.map(|factor| factor.of);
+    let same = named.motion() == product.motion() && named.law().first == product.law().first;
+    same && second(named) == second(product) && !named.cause().is_nameless()
 }
 
 /// What the size of an error at a place may follow.

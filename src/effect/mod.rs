@@ -79,7 +79,7 @@ pub use declared::{DeclarationFault, DeclaredCause, DeclaredForm, EffectDeclarat
 pub use deflection::{Deflection, Direction};
 pub use form::{Form, Placed};
 pub use gear_cyclic::GearCyclic;
-pub use heredity::{follows, products};
+pub use heredity::{follows, is_named_product, products};
 pub use joint_compliance::JointCompliance;
 pub use joint_hardening::JointHardening;
 

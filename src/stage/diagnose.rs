@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
 use crate::effect::CAUSES;
-use crate::error::{Error, Fault, Result};
+use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
 use crate::stage::own_effects::own_effects;
@@ -78,7 +78,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -92,8 +92,9 @@ impl Stage for Diagnose {
         }
         let tried = || CAUSES.iter().filter(|cause| !cause.is_nameless()).map(|cause| cause.name());
         for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
+            let near = nearest(name, tried()).map_or_else(|| ".".into(), |near| format!("; did you mean `{near}`?"));
             let allowed = tried().collect::<Vec<_>>().join(", ");
-            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause; allowed: {allowed}")));
+            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{near} Allowed: {allowed}")));
         }
         faults
     }

@@ -7,7 +7,7 @@ mod refine;
 pub(crate) use gate::SIGNIFICANT;
 
 use super::pool::{CachedHypotheses, Conditional};
-use crate::effect::{Form, Hypothesis, JointCompliance, Survey, follows, products};
+use crate::effect::{Form, Hypothesis, JointCompliance, Survey, follows, is_named_product, products};
 use gate::gate;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -135,7 +135,9 @@ impl<'a, 'b> CauseSearch<'a, 'b> {
     fn multiply(&mut self, set: &[usize]) {
         let new: Vec<usize> = set.iter().copied().filter(|h| self.multiplied.insert(*h)).collect();
         let all: Vec<Hypothesis> = new.iter().flat_map(|h| products(&self.pool.hypotheses[*h].form, self.survey)).collect();
-        let fresh = |product: &Hypothesis| !self.pool.hypotheses.iter().any(|other| other.form == product.form);
+        // What the list has a name for is asked under its name.
+        let same = |other: &Form, product: &Form| other == product || is_named_product(other, product);
+        let fresh = |product: &Hypothesis| !self.pool.hypotheses.iter().any(|other| same(&other.form, &product.form));
         let fresh: Vec<Hypothesis> = all.into_iter().filter(fresh).collect();
         if !fresh.is_empty() {
             self.pool.add(fresh);

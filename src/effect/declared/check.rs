@@ -153,7 +153,8 @@ impl DeclarationFaults {
             match word {
                 Some(word) if words().any(|known| known == word) => (),
                 Some(word) => {
-                    let near = nearest(word, words()).map(|near| format!("; did you mean `{{{near}}}`?")).unwrap_or_default();
+                    let near =
+                        nearest(word, words()).map(|near| format!("; did you mean `{{{near}}}`?")).unwrap_or_else(|| ".".into());
                     let allowed = words().map(|word| format!("{{{word}}}")).collect::<Vec<_>>().join(", ");
                     self.add("sentence", format!("nothing is known of `{{{word}}}`{near} Allowed: {allowed}"));
                 }

@@ -156,7 +156,7 @@ impl FormulaReader<'_> {
             let mut all: Vec<&str> = known.collect();
             all.extend(self.shape.iter().map(String::as_str));
             let near = nearest(&name, all);
-            let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+            let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_else(|| ".".into());
             let functions: Vec<&str> = Function::NAMED.iter().map(|(name, _)| *name).collect();
             let shape = match self.shape {
                 [] => "none".into(),
