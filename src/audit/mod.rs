@@ -4,12 +4,16 @@ mod diagnosis;
 mod explain;
 mod keep;
 mod lineage;
+#[cfg(feature = "query")]
 mod query;
 mod runs;
+mod tables;
 
 pub use diagnosis::{diagnosis, the_stage};
 pub use explain::{Explanation, explain};
 pub use keep::kept_actions;
 pub use lineage::{LineageNode, Provenance, lineage};
-pub use query::{QueryColumn, QueryResult, QueryTable, QueryTables, QueryValue, query};
+#[cfg(feature = "query")]
+pub use query::{QueryResult, QueryValue, query};
 pub use runs::{RunAddress, RunDiff, RunSummary, SettingChange, TableChange, compare_runs};
+pub use tables::{QueryColumn, QueryTable, QueryTables};

@@ -37,6 +37,9 @@ pub(super) struct DiagnoseArguments {
     /// The finding whose formula is written, by its number [default: the first that has one]
     #[arg(long, value_name = "N", requires = "export_effect")]
     finding: Option<i64>,
+    /// Prints all of the diagnosis: where, probabilities of places, numbers, formulas, every rival, what cannot be observed and why
+    #[arg(long, conflicts_with = "json")]
+    details: bool,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -48,7 +51,7 @@ pub(super) struct DiagnoseArguments {
 const EXAMPLES: &str = "Examples:
   calib diagnose pipelines/case/pipeline.yaml --set case=recordings/robot-7
   calib diagnose pipeline.yaml --json > diagnosis.json
-  calib diagnose HEAD
+  calib diagnose HEAD --details
   calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
@@ -88,7 +91,10 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         write_new(file, &told.effect_file(arguments.finding)?)?;
     }
     let store = arguments.means.store_again();
-    if arguments.json { emit_json(&told.document(&store)) } else { emit(&told.text(&store)) }
+    match arguments.json {
+        true => emit_json(&told.document(&store)),
+        false => emit(&if arguments.details { told.text(&store) } else { told.short(&store) }),
+    }
 }
 
 /// Writes a file that is not there yet.

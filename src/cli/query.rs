@@ -2,13 +2,12 @@
 
 use super::surroundings::open_store;
 use super::{emit, emit_json};
-use crate::audit::{QueryTable, QueryTables, query};
+use crate::audit::{QueryTable, QueryTables};
 use crate::error::{Error, Result};
 use crate::pipeline::{Manifest, find_run};
 use crate::store::Store;
 use crate::summary;
 use clap::Args;
-use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// Ask the tables of a run in SQL; without SQL, list them with their columns.
@@ -60,12 +59,25 @@ pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
     if !sql.is_empty() && !sql.contains(char::is_whitespace) && !arguments.csv {
         return columns(&store, &[tables.find(sql)?], arguments.json);
     }
-    let answer = query(&store, &tables, sql)?;
+    answer(arguments, &store, &tables, sql)
+}
+
+#[cfg(feature = "query")]
+fn answer(arguments: &QueryArguments, store: &Store, tables: &QueryTables, sql: &str) -> Result<()> {
+    let answer = crate::audit::query(store, tables, sql)?;
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&summary::csv(&answer)?),
         (_, true) => emit(&summary::json(&answer)?),
         _ => emit(&summary::grid(&answer, if arguments.rows == 0 { usize::MAX } else { arguments.rows }, width())),
     }
+}
+
+#[cfg(not(feature = "query"))]
+fn answer(_: &QueryArguments, _: &Store, _: &QueryTables, _: &str) -> Result<()> {
+    Err(Error::spec(
+        "SQL",
+        "this calib was built without it; build it with its default features, or ask the Parquet files that `calib show` names",
+    ))
 }
 
 /// The tables with their columns.
@@ -74,8 +86,9 @@ fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
 }
 
 /// Columns of the terminal, where stdout is one.
+#[cfg(feature = "query")]
 fn width() -> Option<usize> {
     let out = std::io::stdout();
-    let size = out.is_terminal().then(|| terminal_size::terminal_size_of(&out)).flatten();
+    let size = std::io::IsTerminal::is_terminal(&out).then(|| terminal_size::terminal_size_of(&out)).flatten();
     size.map(|(width, _)| usize::from(width.0))
 }

@@ -6,7 +6,7 @@ use crate::error::{Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
 use crate::store::Store;
-use crate::summary;
+use crate::summary::{self, labelled};
 use crate::table::Withdrawn;
 use clap::Args;
 use serde_json::json;
@@ -35,6 +35,9 @@ pub(super) struct RunArguments {
     /// Runs up to and with this stage
     #[arg(long, value_name = "STAGE")]
     until: Option<String>,
+    /// Prints the errors of every step and set, cross-validated and beside reference figures, too
+    #[arg(long, conflicts_with = "json")]
+    details: bool,
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
     #[arg(long, value_name = "STAGE", num_args = 0..=1, default_missing_value = "")]
     force: Option<Vec<String>>,
@@ -71,35 +74,35 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     if shared.json {
         return emit_json(&document(&outcome, &store)?);
     }
-    let standing = standing_of(&outcome.manifest, &store)?;
-    let mut text = summary::statistics(&outcome, standing.as_ref(), &store)?;
-    text.push_str(&summary::corrections(&outcome, &store)?);
-    text.push_str(&summary::searches(&outcome, &store)?);
-    text.push_str(&summary::rejected(&outcome));
-    text.push_str(&summary::headline(&outcome, standing.as_ref(), &store)?);
-    text.push_str(
-        &wrong_setup_of(&outcome.manifest, &store)?.map_or_else(String::new, |wrong| format!("not accepted: {wrong}\n")),
-    );
-    for path in &outcome.documents {
-        text.push_str(&format!("report: {}\n", path.display()));
+    let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
+    let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store)?;
+    let mut text = String::new();
+    if arguments.details || short.is_none() {
+        text.push_str(&summary::statistics(&outcome, standing.as_ref(), &store)?);
+        text.push_str(&summary::corrections(&outcome, &store)?);
+        text.push_str(&summary::searches(&outcome, &store)?);
     }
-    text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64()));
+    text.push_str(short.as_deref().unwrap_or_default());
+    text.push_str(&summary::rejected(&outcome));
+    for path in &outcome.documents {
+        text.push_str(&labelled("report", &path.display().to_string()));
+    }
+    let more = if arguments.details || short.is_none() { "" } else { "; --details prints every step and set" };
+    text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64(), more));
     emit(&text)
 }
 
-fn closing(outcome: &CompletedRun, seconds: f64) -> String {
+/// What was done; `more` is said behind it.
+fn closing(outcome: &CompletedRun, seconds: f64, more: &str) -> String {
     let stages = &outcome.manifest.stages;
     let count = |status| stages.iter().filter(|stage| stage.status == status).count();
     if outcome.nothing_done() {
-        return format!("nothing to do: {} cached ({seconds:.1} s)\n", counted(stages.len(), "stage"));
+        return labelled("done", &format!("nothing to do: {} cached ({seconds:.1} s){more}", counted(stages.len(), "stage")));
     }
     let (executed, cached, not_run) = (count(StageStatus::Executed), count(StageStatus::Cached), count(StageStatus::NotRun));
     let not_run = if not_run > 0 { format!(", {not_run} not selected") } else { String::new() };
-    format!(
-        "done: {} run, {cached} cached{not_run} ({seconds:.1} s), run {}\n",
-        counted(executed, "stage"),
-        outcome.manifest.run_id
-    )
+    let (executed, run) = (counted(executed, "stage"), &outcome.manifest.run_id);
+    labelled("done", &format!("{executed} run, {cached} cached{not_run} ({seconds:.1} s), run {run}{more}"))
 }
 
 fn forecast_lines(forecasts: &[Forecast]) -> String {

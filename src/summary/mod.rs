@@ -4,7 +4,11 @@ mod columns;
 mod corrections;
 mod diagnosis;
 mod explanation;
+#[cfg(feature = "query")]
 mod grid;
+mod in_short;
+mod labelled;
+#[cfg(feature = "query")]
 mod lines;
 mod own_effect;
 mod plan;
@@ -18,11 +22,15 @@ pub use columns::{columns, columns_json};
 pub use corrections::{corrections, corrections_json};
 pub use diagnosis::DiagnosisSummary;
 pub use explanation::explanation;
+#[cfg(feature = "query")]
 pub use grid::grid;
+pub use in_short::in_short;
+pub use labelled::labelled;
+#[cfg(feature = "query")]
 pub use lines::{csv, json};
 pub use plan::graph;
 pub use rival_changes::{RivalChange, rival_changes};
 pub use run::{run, stage, status};
 pub use run_diff::run_diff;
 pub use searches::{searches, searches_json};
-pub use statistics::{headline, rejected, rejected_rows, statistics, statistics_json};
+pub use statistics::{rejected, rejected_rows, statistics, statistics_json};

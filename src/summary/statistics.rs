@@ -1,13 +1,14 @@
 //! The result of a run as text and as JSON: errors step by step, rejected rows.
 
-use crate::error::Result;
+use super::labelled;
+use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
-use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{Standing, Statistics, StatisticsRow, Table};
 use serde_json::json;
 
-fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
+/// The rows of all tables `statistics` of a run.
+pub(super) fn rows(outcome: &CompletedRun, store: &Store) -> Result<Vec<StatisticsRow>> {
     let mut rows = Vec::new();
     for output in outcome.tables(Statistics::KIND) {
         rows.extend(Statistics::from_frame(&store.load(&output.table)?)?.0);
@@ -41,33 +42,6 @@ pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &S
     }
     text.push_str(&folds(&rows));
     text.push_str(&references(&rows));
-    Ok(text)
-}
-
-/// What the model that stands makes of the held-out set with most points, in a line, where it was diagnosed; a line more for every
-/// step that was worse.
-pub fn headline(outcome: &CompletedRun, standing: Option<&Standing>, store: &Store) -> Result<String> {
-    let Some(standing) = standing else { return Ok(String::new()) };
-    let mut text: String = standing.warnings().map(|warning| format!("{warning}\n")).collect();
-    if !standing.withdrawn.is_empty() {
-        text.push_str(&format!("`calib compensate` and `calib export` take the step `{}`\n", standing.model));
-    }
-    if !outcome.manifest.stages.iter().any(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty()) {
-        return Ok(text);
-    }
-    let rows = rows(outcome, store)?;
-    let own = rows.iter().filter(|row| row.held_out && row.step == standing.step);
-    let Some(after) = own.max_by_key(|row| row.points) else { return Ok(text) };
-    let earlier = rows.iter().filter(|row| row.held_out && row.set == after.set && row.order < after.order);
-    let before = earlier.min_by_key(|row| row.order).map_or_else(String::new, |row| {
-        format!("mean {:.4} mm, max {:.4} mm after `{}`, now ", row.mean_mm, row.max_mm, row.step)
-    });
-    let diagnosed = outcome.manifest.stage(&standing.model).is_some_and(|stage| stage.uses == Diagnose::NAME);
-    let model = if diagnosed { "the diagnosed model" } else { "the model that stands" };
-    text.push_str(&format!(
-        "{model}, {} held-out points of set {}: {before}mean {:.4} mm, max {:.4} mm after `{}`\n",
-        after.points, after.set, after.mean_mm, after.max_mm, after.step
-    ));
     Ok(text)
 }
 
@@ -188,7 +162,7 @@ pub fn rejected_rows(outcome: &CompletedRun) -> u64 {
 pub fn rejected(outcome: &CompletedRun) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
         let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
-        format!("rejected rows: {}, each with its reason in {path}\n", output.table.rows)
+        labelled("rejected", &format!("{}, each with its reason in {path}", counted(output.table.rows, "row")))
     };
     outcome.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()
 }

@@ -8,15 +8,14 @@ mod fault;
 mod order;
 mod size;
 mod statement;
-mod tables;
 
 pub use answer::{QueryResult, QueryValue};
-pub use tables::{QueryColumn, QueryTable, QueryTables};
 
 use polars::prelude::{DataFrame, LazyFrame, PlRefPath, PolarsResult, ScanArgsParquet};
 use polars::sql::SQLContext;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use super::tables::{QueryTable, QueryTables};
 use crate::error::{Error, Result};
 use crate::store::Store;
 use statement::Statement;
@@ -44,15 +43,11 @@ fn collect(mut context: SQLContext, sql: &str) -> PolarsResult<DataFrame> {
 
 /// A table of the store, not yet read; of a store in a bucket its file is fetched first.
 fn scan(store: &Store, table: &QueryTable) -> Result<LazyFrame> {
-    let path = store.object(&table.table)?;
-    let gone = |why: String| Error::store(path.display().to_string(), format!("table {}: {why}", table.name));
-    if !path.is_file() {
-        return Err(gone("its file is no longer in the store; run the pipeline again and it is made anew".into()));
-    }
+    let file = table.file(store)?;
     // An object's name is a hash: what looks like a pattern is part of the folder's name.
     let options = ScanArgsParquet { glob: false, ..ScanArgsParquet::default() };
-    let frame = PlRefPath::try_from_path(&path).and_then(|path| LazyFrame::scan_parquet(path, options));
-    frame.map_err(|error| gone(format!("cannot be read: {error}")))
+    let frame = PlRefPath::try_from_path(&file).and_then(|path| LazyFrame::scan_parquet(path, options));
+    frame.map_err(|error| table.fault(&file, format!("cannot be read: {error}")))
 }
 
 fn names(frame: &mut LazyFrame) -> PolarsResult<Vec<String>> {

@@ -3,7 +3,7 @@
 use sqlparser::ast::{Ident, JoinOperator, ObjectName, ObjectNamePart, Query, SetExpr, TableFactor, TableWithJoins};
 use std::collections::BTreeMap;
 
-use super::tables::QueryTables;
+use crate::audit::tables::QueryTables;
 use crate::error::{Error, Result};
 
 /// Rows that a product of tables may have; at a dozen columns it is some gigabytes.

@@ -6,7 +6,7 @@ use sqlparser::parser::Parser;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
-use super::tables::{QueryTable, QueryTables};
+use crate::audit::tables::{QueryTable, QueryTables};
 use crate::error::{Error, Result};
 
 /// What polars is asked.

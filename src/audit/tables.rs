@@ -1,9 +1,12 @@
 //! The tables of a run, by the names that SQL knows them by, with their columns.
 
 use serde::Serialize;
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result, nearest};
 use crate::pipeline::Manifest;
+use crate::raw::parquet;
 use crate::store::schema::{self, ColumnType, TableSchema};
 use crate::store::{Store, TableRef};
 
@@ -107,9 +110,24 @@ impl QueryTable {
 
     /// The columns that its file has.
     pub fn columns(&self, store: &Store) -> Result<Vec<QueryColumn>> {
-        let mut frame = super::scan(store, self)?;
-        let names = super::names(&mut frame).map_err(|error| Error::store(&self.name, error.to_string()))?;
-        Ok(names.into_iter().map(|name| self.column(name)).collect())
+        let path = self.file(store)?;
+        let file = File::open(&path).map_err(|error| error.to_string()).and_then(|file| parquet(file, 1));
+        let file = file.map_err(|error| self.fault(&path, format!("cannot be read: {error}")))?;
+        Ok(file.schema.fields().iter().map(|field| self.column(field.name().clone())).collect())
+    }
+
+    /// Where its file is; of a store in a bucket it is fetched first. Fails where it has left the store.
+    pub(super) fn file(&self, store: &Store) -> Result<PathBuf> {
+        let path = store.object(&self.table)?;
+        match path.is_file() {
+            true => Ok(path),
+            false => Err(self.fault(&path, "its file is no longer in the store; run the pipeline again to make it again")),
+        }
+    }
+
+    /// What is wrong with its file.
+    pub(super) fn fault(&self, path: &Path, why: impl std::fmt::Display) -> Error {
+        Error::store(path.display().to_string(), format!("table {}: {why}", self.name))
     }
 
     fn column(&self, name: String) -> QueryColumn {

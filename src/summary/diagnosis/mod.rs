@@ -1,5 +1,7 @@
 //! A diagnosis from its tables, as text and as JSON.
 
+mod in_short;
+
 use super::own_effect::declared_in_yaml;
 use crate::error::{Error, Result};
 use crate::pipeline::StageReport;
@@ -179,7 +181,7 @@ impl DiagnosisSummary {
         self.located(by).iter().map(one).collect()
     }
 
-    /// The diagnosis as `calib diagnose` prints it; `store` is the `--store` of the commands that it proposes.
+    /// All of the diagnosis, as `calib diagnose --details` prints it; `store` is the `--store` of the commands that it proposes.
     pub fn text(&self, store: &str) -> String {
         let v = &self.verdict;
         let mm = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3}"));
@@ -220,13 +222,7 @@ impl DiagnosisSummary {
                 let words = formula_in_words(rows);
                 text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm on unseen poses{proposed})\n"));
             }
-            let rivals: Vec<String> = self
-                .rivals
-                .0
-                .iter()
-                .filter(|rival| rival.rank == finding.rank && rival.is_inseparable())
-                .map(rival_words)
-                .collect();
+            let rivals: Vec<String> = self.rivals_of(finding).map(rival_words).collect();
             if !rivals.is_empty() {
                 text.push_str(&format!("   these data cannot separate it from: {}\n", rivals.join(", ")));
             }

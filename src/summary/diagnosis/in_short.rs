@@ -1,0 +1,91 @@
+//! A diagnosis in a few lines: the verdict, a line a finding, what to measure next.
+
+use super::{DiagnosisSummary, rival_words};
+use crate::error::counted;
+use crate::summary::labelled;
+use crate::table::{FindingRow, RivalRow, is_separable_by_poses};
+
+/// Findings that a run names in its one line.
+const NAMED: usize = 3;
+
+impl DiagnosisSummary {
+    /// The verdict and what it rests on, in one sentence.
+    pub fn verdict(&self) -> String {
+        let verdict = self.verdict.verdict.replace('_', " ");
+        match &self.verdict.statement {
+            Some(statement) => format!("{verdict}: {statement}"),
+            None => verdict,
+        }
+    }
+
+    /// The largest findings by name, place and size; nothing where nothing was found.
+    pub fn largest(&self) -> Option<String> {
+        let mut all: Vec<&FindingRow> = self.findings.0.iter().collect();
+        all.sort_by(|a, b| b.effect_rms_mm.unwrap_or(0.0).total_cmp(&a.effect_rms_mm.unwrap_or(0.0)));
+        let size = |mm: f64| format!(" ({:.0} um rms)", 1000.0 * mm);
+        let named =
+            |row: &&FindingRow| format!("{} at {}{}", row.effect, row.place, row.effect_rms_mm.map_or_else(String::new, size));
+        let named: Vec<String> = all.iter().take(NAMED).map(named).collect();
+        let more = all.len().saturating_sub(NAMED);
+        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+        (!named.is_empty()).then(|| format!("{}{more}", named.join(", ")))
+    }
+
+    /// What `calib diagnose` prints unless all is asked for; `store` is the `--store` of the commands that it proposes.
+    pub fn short(&self, store: &str) -> String {
+        let v = &self.verdict;
+        let mut text = labelled("verdict", &self.verdict());
+        let change = |before: Option<f64>, after: Option<f64>| Some(format!("{:.3} -> {:.3} mm", before?, after?));
+        if let (Some(mean), Some(max)) = (change(v.before_mean_mm, v.after_mean_mm), change(v.before_max_mm, v.after_max_mm)) {
+            let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
+            text.push_str(&labelled("error", &format!("mean {mean}, max {max}, {rows}; noise {:.3} mm rms", v.noise_floor_mm)));
+        }
+        for finding in &self.findings.0 {
+            text.push_str(&labelled(&format!("{:>3}.", finding.rank), &self.finding_in_a_line(finding)));
+        }
+        for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
+            text.push_str(&labelled("withdrawn", line));
+        }
+        let unseen: Vec<&str> =
+            v.not_observable.lines().map(|line| line.split_once(": ").map_or(line, |(what, _)| what)).collect();
+        if !unseen.is_empty() {
+            text.push_str(&labelled("unseen", &format!("{}: these data cannot show it", unseen.join(", "))));
+        }
+        text.push_str(&self.next_in_short(store));
+        text + &labelled("more", "--details prints places, numbers, formulas, reasons and every rival")
+    }
+
+    fn finding_in_a_line(&self, finding: &FindingRow) -> String {
+        let statement = finding.statement.trim_end_matches('.');
+        let Some(probability) = finding.probability else { return statement.into() };
+        let rivals: String = self.rivals_of(finding).map(|rival| format!(", of {}", rival_words(rival))).collect();
+        format!("{statement}; probability of {} {probability:.2}{rivals}", finding.effect)
+    }
+
+    /// The rivals of a finding that these data do not exclude.
+    pub(super) fn rivals_of<'a>(&'a self, finding: &'a FindingRow) -> impl Iterator<Item = &'a RivalRow> {
+        self.rivals.0.iter().filter(|rival| rival.rank == finding.rank && rival.is_inseparable())
+    }
+
+    /// What decides the least certain finding, and what decides others, counted.
+    fn next_in_short(&self, store: &str) -> String {
+        let lines = self.next(store).unwrap_or_default();
+        let undecided = self.findings.0.iter().filter(|finding| {
+            is_separable_by_poses(&finding.effect) && self.rivals_of(finding).any(|rival| is_separable_by_poses(&rival.effect))
+        });
+        let least = undecided.min_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
+        let about = least.map_or_else(Vec::new, |finding| {
+            [format!("{} at {} or ", finding.effect, finding.place), format!("poses for finding {} or ", finding.rank)].into()
+        });
+        let mut shown: Vec<&String> =
+            about.iter().filter_map(|start| lines.iter().find(|line| line.starts_with(start))).collect();
+        if shown.is_empty() {
+            shown.extend(lines.first());
+        }
+        let mut text: String = shown.iter().map(|line| labelled("next", line)).collect();
+        if lines.len() > shown.len() {
+            text.push_str(&labelled("", &format!("{}: --details", counted(lines.len() - shown.len(), "more proposal"))));
+        }
+        text
+    }
+}

@@ -1,0 +1,64 @@
+//! A run in the few lines that matter: the error before and after, the noise, the verdict, the findings.
+
+use super::statistics::rows;
+use super::{DiagnosisSummary, labelled};
+use crate::error::Result;
+use crate::pipeline::CompletedRun;
+use crate::stage::{Diagnose, Stage};
+use crate::store::Store;
+use crate::table::{Standing, StatisticsRow};
+
+/// Of the set with most points that the step which stands was not fitted to, else of the one that it was fitted to; nothing where no stage
+/// stated errors. `wrong` is what is wrong with the set-up.
+pub fn in_short(
+    outcome: &CompletedRun,
+    standing: Option<&Standing>,
+    wrong: Option<&str>,
+    store: &Store,
+) -> Result<Option<String>> {
+    let rows = rows(outcome, store)?;
+    let last = || rows.iter().max_by_key(|row| row.order).map(|row| row.step.as_str());
+    let Some(step) = standing.map(|stands| stands.step.as_str()).or_else(last) else { return Ok(None) };
+    let own = rows.iter().filter(|row| row.step == step && row.reference.is_none());
+    let Some(after) = own.max_by_key(|row| (row.held_out, row.points)) else { return Ok(None) };
+    let earlier = rows.iter().filter(|row| row.set == after.set && row.order < after.order);
+    let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
+    let mut text = before.map_or_else(String::new, |row| labelled("before", &error(row)));
+    text.push_str(&labelled("after", &error(after)));
+    text.push_str(&labelled("noise", &noise(after)));
+    for warning in standing.iter().flat_map(|stands| stands.warnings()) {
+        text.push_str(&labelled("warning", &warning));
+    }
+    if let Some(standing) = standing.filter(|stands| !stands.withdrawn.is_empty()) {
+        text.push_str(&labelled("", &format!("`calib compensate` and `calib export` take the step `{}`", standing.model)));
+    }
+    let diagnosed = outcome.manifest.stages.iter().rfind(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
+    match (wrong, diagnosed) {
+        (Some(wrong), _) => text.push_str(&labelled("verdict", &format!("not accepted: {wrong}"))),
+        (None, Some(stage)) => {
+            let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
+            text.push_str(&labelled("verdict", &told.verdict()));
+            text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));
+        }
+        (None, None) => (),
+    }
+    Ok(Some(text))
+}
+
+fn error(row: &StatisticsRow) -> String {
+    let rows = match row.held_out {
+        true => format!("{} held-out points of set {}", row.points, row.set),
+        false => format!("{} points of set {}, to which it was fitted: flattered", row.points, row.set),
+    };
+    format!("mean {:.4} mm, max {:.4} mm after `{}`, {rows}", row.mean_mm, row.max_mm, row.step)
+}
+
+fn noise(row: &StatisticsRow) -> String {
+    let basis = match row.noise_basis.as_deref() {
+        Some("inferred") => ", inferred: the recording states none, and no `instrument` is stated in `ingest`",
+        Some("repeats") => ", by repeated measurements",
+        Some(_) => ", by the instrument's statement",
+        None => "",
+    };
+    format!("{:.4} mm rms is expected of these measurements alone{basis}", row.noise_rms_mm)
+}
