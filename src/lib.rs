@@ -134,31 +134,13 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub mod error;
-pub mod statistics;
-pub mod units;
+pub use calib_numerics::{compensate, diagnose, effect, error, estimate, observation, robot, spatial, statistics, units, yaml};
 
 pub mod raw;
 pub mod shell;
-pub mod yaml;
-
-pub mod spatial;
-
-pub mod robot;
-
-pub mod effect;
-
-pub mod observation;
-
-pub mod estimate;
-
-pub mod compensate;
-
 pub mod program;
 
 pub mod targets;
-
-pub mod diagnose;
 
 pub mod twin;
 

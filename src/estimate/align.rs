@@ -27,7 +27,7 @@ pub fn align(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Pose {
 }
 
 /// Returns the pose that brings `model` to `measured`, wrong points aside; three points or more.
-pub(crate) fn align_points(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
+pub fn align_points(model: &[Vector3<f64>], measured: &[Vector3<f64>]) -> Pose {
     let mut used: Vec<usize> = Vec::new();
     let mut pose = best_start(model, measured);
     for _ in 0..10 {

@@ -11,7 +11,7 @@ const FARTHEST: usize = 20;
 const CHANCE: f64 = 3.0;
 
 /// How many rows in a row count as one, from `each` numbers a row in the order of recording; at least 1.
-pub(crate) fn autocorrelation_time(residual: &[f64], each: usize) -> f64 {
+pub fn autocorrelation_time(residual: &[f64], each: usize) -> f64 {
     let rows = residual.len() / each.max(1);
     let square: f64 = residual.iter().map(|value| value * value).sum();
     if rows < FARTHEST || square == 0.0 {

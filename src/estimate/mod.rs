@@ -32,8 +32,8 @@ mod triangle;
 
 pub(crate) use crate::observation::Weight;
 pub use align::align;
-pub(crate) use align::align_points;
-pub(crate) use autocorrelation::autocorrelation_time;
+pub use align::align_points;
+pub use autocorrelation::autocorrelation_time;
 pub use change::{ParameterChange, changes};
 pub use covariance::Covariance;
 pub(crate) use fisher::tail;

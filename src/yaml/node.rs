@@ -29,7 +29,8 @@ pub struct Node {
     pub raw: Option<String>,
     /// Given on the command line: a relative path starts at the working directory.
     pub overridden: bool,
-    pub(crate) bytes: Option<(u64, u64)>,
+    /// First byte and length in the text; nothing of what is in no text.
+    pub bytes: Option<(u64, u64)>,
 }
 
 /// What YAML can hold, keys in the order of the text.

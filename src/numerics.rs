@@ -1,0 +1,23 @@
+//! The numerics of calib: no files, no frames, no terminal. The crate `calib` hands its modules on and has the map.
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod error;
+pub mod statistics;
+pub mod units;
+pub mod yaml;
+
+pub mod spatial;
+
+pub mod robot;
+
+pub mod effect;
+
+pub mod observation;
+
+pub mod estimate;
+
+pub mod compensate;
+
+pub mod diagnose;
