@@ -2,7 +2,8 @@
 //!
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
-//! has no files and no frames; **columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! has no files and no frames: a crate of its own, `calib-numerics`, rooted in `src/numerics.rs` and handed on here, so that the compiler
+//! keeps it so. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
@@ -134,15 +135,15 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub use calib_numerics::{compensate, diagnose, effect, error, estimate, observation, robot, spatial, statistics, units, yaml};
+pub use calib_numerics::{
+    compensate, diagnose, effect, error, estimate, observation, robot, spatial, statistics, twin, units, yaml,
+};
 
+pub mod program;
 pub mod raw;
 pub mod shell;
-pub mod program;
 
 pub mod targets;
-
-pub mod twin;
 
 pub mod store;
 

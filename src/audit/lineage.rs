@@ -62,9 +62,10 @@ pub fn lineage(store: &Store, start: &str) -> Result<LineageNode> {
     match found.as_slice() {
         [hash] => Ok(trace(hash, &makers, &mut BTreeSet::new())),
         [] => Err(Error::spec(format!("table {start}"), "no action in the store made it: is it another store's? (--store DIR)")),
-        several => {
-            Err(Error::spec(format!("table {start}"), format!("{} tables begin so; give more of the hash", several.len())))
-        }
+        several => Err(Error::spec(
+            format!("table {start}"),
+            format!("the hashes of {} tables begin like this; give more of the hash", several.len()),
+        )),
     }
 }
 

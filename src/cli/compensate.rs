@@ -143,7 +143,7 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
         faults.push(Fault::new("--direction", format!("expected 1 or -1, found {direction}")));
     }
     if arguments.out.as_ref().is_some_and(|out| same_file(out, &arguments.targets)) {
-        faults.push(Fault::new("--out", "is the file of the targets: write beside it"));
+        faults.push(Fault::new("--out", "is the targets file itself: name another file"));
     }
     if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
 }
@@ -223,7 +223,7 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
     };
     let columnar = is_parquet(out);
     if columnar != is_parquet(&arguments.targets) {
-        let message = "text stays text and Parquet stays Parquet: give --out the ending of the targets";
+        let message = "must have the format of the targets (text or Parquet): give it the same file ending";
         return Err(Error::spec("--out", message));
     }
     whole(out, |file| convert(&arguments.targets, file, columnar, layout, corrector))

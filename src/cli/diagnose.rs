@@ -77,7 +77,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
         DiagnosisSummary::read(&outcome.manifest.run_id, stage, &store)?
     } else {
         if arguments.means.overrides() {
-            return Err(Error::spec("--set", "nothing of a run can be set again; give its pipeline instead"));
+            return Err(Error::spec("--set", "a finished run cannot be changed; give its pipeline instead"));
         }
         let name = arguments.what.to_string_lossy();
         let (run, step) = match name.split_once('/') {

@@ -42,9 +42,9 @@ pub(super) fn main(arguments: &GcArguments) -> Result<()> {
     if arguments.json {
         return emit_json(&serde_json::to_value(&sweep).map_err(|error| Error::Bug(error.to_string()))?);
     }
-    let verb = if arguments.dry_run { "would take away" } else { "took away" };
+    let verb = if arguments.dry_run { "would remove" } else { "removed" };
     let mut text = format!(
-        "{verb} {} and {}, {:.1} MB; left: {}\n",
+        "{verb} {} and {}, {:.1} MB; kept: {}\n",
         counted(sweep.objects, "table"),
         counted(sweep.actions, "action record"),
         sweep.bytes as f64 / 1e6,
@@ -52,7 +52,7 @@ pub(super) fn main(arguments: &GcArguments) -> Result<()> {
     );
     if sweep.young > 0 {
         text.push_str(&format!(
-            "younger than {}, and left though nothing keeps them: {}\n",
+            "kept only because younger than {}: {}\n",
             counted(arguments.grace_hours, "hour"),
             counted(sweep.young, "file")
         ));

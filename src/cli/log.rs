@@ -18,7 +18,7 @@ use std::path::PathBuf;
   calib log
   calib log --pipeline sr210d --limit 5
 
-Other verbs take a run as its id, the beginning or end of one, a tag, HEAD for the\nlast complete one, HEAD~2 for the complete one two before it.")]
+Other commands take a run by its id, the beginning or end of its id, a tag, HEAD for the\nlast complete run, or HEAD~2 for the complete run two before that.")]
 pub(super) struct LogArguments {
     /// Runs of this pipeline only
     #[arg(long, value_name = "NAME")]

@@ -169,7 +169,7 @@ fn check(arguments: &PosesArguments) -> Result<()> {
         }
         let chosen = |name: &String| arguments.effects.is_empty() || arguments.effects.contains(name);
         for name in [a, b].into_iter().filter(|name| !chosen(name)) {
-            faults.push(Fault::new("--effects", format!("`{name}` is to be separated but is not among them")));
+            faults.push(Fault::new("--effects", format!("`{name}` is named by --separate but not here: add it")));
         }
     }
     for mass in arguments.payload.iter().filter(|mass| !(mass.is_finite() && **mass >= 0.0)) {

@@ -40,7 +40,7 @@ pub(super) fn man(arguments: &ManArguments) -> Result<()> {
         Some(verb) => {
             let verbs: Vec<String> = whole.get_subcommands().map(|verb| verb.get_name().to_string()).collect();
             let found = whole.get_subcommands().find(|known| known.get_name() == verb);
-            let unknown = || Error::spec("man", format!("no verb `{verb}`; allowed: {}", verbs.join(", ")));
+            let unknown = || Error::spec("man", format!("no command `{verb}`; allowed: {}", verbs.join(", ")));
             found.ok_or_else(unknown)?.clone()
         }
     };

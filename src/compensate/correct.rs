@@ -126,7 +126,7 @@ impl CorrectionTotals {
     /// What the correction does, in a line.
     pub fn summary(&self) -> String {
         format!(
-            "{}; uncorrected error {:.3} mm on average, {:.3} mm at most; left by the model: {:.1e} mm at most\n",
+            "{}; uncorrected error {:.3} mm on average, {:.3} mm at most; residual under the model: {:.1e} mm at most\n",
             counted(self.targets, "target"),
             self.uncorrected_sum / self.targets.max(1) as f64 * 1e3,
             self.uncorrected_max * 1e3,
@@ -138,7 +138,7 @@ impl CorrectionTotals {
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let all = [
             (self.not_reached, "could not be reached and have no joints"),
-            (self.turned, "are reached but for their orientation: the wrist is stretched"),
+            (self.turned, "are reached in position but not in orientation: the wrist is singular there"),
             (self.beyond_limits, "leave the joint limits"),
             (self.beyond_measured, "are outside of what was measured: the model extrapolates there"),
         ];

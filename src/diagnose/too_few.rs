@@ -13,6 +13,7 @@ pub(crate) fn not_asked(question: &Question) -> Diagnosis {
     let options = FitOptions { rows: question.fit, candidates: &candidates };
     let diagnosis = unasked(question, VerdictKind::NotAsked, fit_screened(&start, question.data, &options, question.set));
     let rows = question.fit.len();
-    let too_few = format!("what is missing: {rows} rows were fitted, at least {FEWEST} are needed to separate it from geometry");
+    let too_few =
+        format!("what the simulation lacks: {rows} rows were fitted, at least {FEWEST} are needed to separate it from geometry");
     Diagnosis { after: diagnosis.before, not_observable: vec![too_few], ..diagnosis }
 }

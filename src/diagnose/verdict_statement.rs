@@ -58,17 +58,17 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
     let inferred = ground.basis == NoiseBasis::Inferred;
     match verdict {
         VerdictKind::NothingMissing if inferred => format!("nothing found; {}", ground.of_noise()),
-        VerdictKind::NothingMissing => format!("nothing found; what is left is {}", ground.of_noise()),
-        VerdictKind::Explained if inferred => format!("what was found explains the error but for noise; {}", ground.of_noise()),
-        VerdictKind::Explained => format!("what was found explains the error; what is left is {}", ground.of_noise()),
+        VerdictKind::NothingMissing => format!("nothing found; the residual agrees with {}", ground.of_noise()),
+        VerdictKind::Explained if inferred => format!("the findings explain the error except for noise; {}", ground.of_noise()),
+        VerdictKind::Explained => format!("the findings explain the error; the residual agrees with {}", ground.of_noise()),
         VerdictKind::Unexplained if inferred => {
-            format!("the findings do not explain all: {} um are left; {}", um(ground.left), ground.of_noise())
+            format!("the findings do not explain everything: {} um remain; {}", um(ground.left), ground.of_noise())
         }
         VerdictKind::Unexplained => {
-            format!("the findings do not explain all: {} um are left, against {}", um(ground.left), ground.of_noise())
+            format!("the findings do not explain everything: {} um remain, against {}", um(ground.left), ground.of_noise())
         }
         VerdictKind::WrongSetup => "the set-up is wrong: correct it first; no physical cause was tested".into(),
-        VerdictKind::NotAsked => "too few rows were fitted to ask what the simulation lacks".into(),
+        VerdictKind::NotAsked => "too few rows were fitted to determine what the simulation lacks".into(),
     }
 }
 

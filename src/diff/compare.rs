@@ -118,7 +118,7 @@ fn schema_findings(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Resul
     let (Some((kind_a, version_a)), Some((kind_b, version_b))) = (&a.table, &b.table) else { return Ok(Vec::new()) };
     if kind_a != kind_b && options.key.is_empty() {
         let message =
-            format!("A is a table of {kind_a}, B of {kind_b}: not to be compared, unless you say by which columns (--key)");
+            format!("A is a table of {kind_a}, B of {kind_b}: not comparable unless --key names the columns that identify rows");
         return Err(Error::spec(b.path.display().to_string(), message));
     }
     if kind_a != kind_b {

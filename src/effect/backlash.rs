@@ -116,21 +116,24 @@ impl Cause for Backlash {
         let times = |term: &Term| term.law().times.map(|factor| factor.of);
         match summary.terms(Self::NAME).next().and_then(times) {
             Some(Variable::Load { .. }) => {
-                return format!("{place} yields otherwise from either side: half the difference is {}", summary.value());
+                return format!(
+                    "the compliance of {place} depends on the direction of approach: half the difference is {}",
+                    summary.value()
+                );
             }
-            Some(_) => return format!("the lost motion of {place} grows, to half a gap of {} in the end", summary.size()),
+            Some(_) => return format!("the lost motion of {place} grows, to a half-gap of {} in the end", summary.size()),
             None => {}
         }
         let by = match summary.terms(Self::NAME).next().map(|term| term.law().first.of) {
             Some(Variable::Load { .. }) => "to the side that the load pushes it".to_string(),
             Some(Variable::Push { friction_nm, .. }) => {
                 let friction = figure(friction_nm.abs(), 0);
-                format!("by the direction from which it came, above about {friction} Nm to the side that the load pushes it")
+                format!("by the direction of approach, and above about {friction} Nm to the side to which the load pushes it")
             }
-            Some(_) => "by the direction from which it came".to_string(),
+            Some(_) => "by the direction of approach".to_string(),
             None => return format!("{place} has lost motion to the side that its load pushes it"),
         };
-        format!("{place} has lost motion: half a gap of {} {by}", summary.size())
+        format!("{place} has lost motion: a half-gap of {} {by}", summary.size())
     }
 
     fn finer(&self) -> &'static [&'static str] {

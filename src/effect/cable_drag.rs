@@ -28,7 +28,9 @@ impl Cause for CableDrag {
         let place = summary.place;
         match summary.terms(Unknown::NAME).next() {
             Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law, summary.clock)),
-            None => format!("something pulls on {place} by its angle, e.g. a hose package, and is missing from the torque model"),
+            None => format!(
+                "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
+            ),
         }
     }
 

@@ -57,7 +57,7 @@ impl Cause for JointCompliance {
                 own.value, own.unit
             ),
             None => format!(
-                "{place} winds up under gravity, {weight}; how stiff it is cannot be separated from their weight, which the robot file does \
+                "{place} winds up under gravity, {weight}; its stiffness cannot be separated from the links' weight, which the robot file does \
                  not give"
             ),
         }

@@ -47,7 +47,7 @@ impl Cause for JointLogLag {
         &CauseDescription {
             name: "joint_log_lag",
             place: "recording",
-            formula: "joints were logged a share of the last move too early; of a moving arm d = c dq/dt of every joint, its clock and the tracker's c apart",
+            formula: "joints were logged a fraction of the last move too early; of a moving arm d = c dq/dt of every joint, c between its clock and the tracker's",
             size: "0.1 to 5 % of the move; 0.5 to 20 ms",
             confounded: "backlash; viscous_windup where one joint moves alone",
             needs: "rows in the order of measurement; joint velocities",
@@ -70,8 +70,8 @@ impl Cause for JointLogLag {
                 let (how, when) = if n.value < 0.0 { ("early", "before") } else { ("late", "after") };
                 let ms = figure(n.value.abs(), 2);
                 format!(
-                    "the tracker's clock is {ms} ms {how} against the controller's: points were measured that much {when} the joints \
-                     beside them"
+                    "the tracker's clock is {ms} ms {how} relative to the controller's: points were measured that long {when} the joints \
+                     of their rows"
                 )
             }
             Some(n) if summary.form::<Lag>().is_some_and(|lag| lag.by == Behind::Synchronous) => format!(

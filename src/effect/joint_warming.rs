@@ -38,7 +38,7 @@ impl Cause for JointWarming {
         &CauseDescription {
             name: Self::NAME,
             place: "joint",
-            formula: "d = w, w q or w t, w: temperature above the first, warm-up, or work of late",
+            formula: "d = w, w q or w t, w: temperature above the first, warm-up, or recent work",
             size: "1 to 50 arcsec",
             confounded: "tracker_drift and base_shift (joint 1), thermal_growth",
             needs: "temperature or time",
@@ -100,15 +100,12 @@ impl Cause for JointWarming {
             };
             match (term.law().first.of, term.basis()) {
                 (Variable::Work { cooling, .. }, _) => {
-                    format!(
-                        "{what} at its hardest work, which it forgets with a time constant of {}",
-                        summary.clock.span(cooling)
-                    )
+                    format!("{what} at its hardest work, decaying with a time constant of {}", summary.clock.span(cooling))
                 }
                 (_, Basis::Settling { constant, .. }) => {
                     format!("{what} in the end with a time constant of {}", summary.clock.span(constant))
                 }
-                (Variable::Lagging { lag }, _) => format!("{what} for each kelvin, {} behind", summary.clock.span(lag)),
+                (Variable::Lagging { lag }, _) => format!("{what} per kelvin, lagging by {}", summary.clock.span(lag)),
                 _ => format!("{what} for each kelvin"),
             }
         });

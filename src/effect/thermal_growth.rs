@@ -69,7 +69,7 @@ impl Cause for ThermalGrowth {
             ),
             (Some(_), Some(n)) => {
                 let lag = summary.terms(self.name()).find_map(|term| match term.law().first.of {
-                    Variable::Lagging { lag } => Some(format!(", {} behind", summary.clock.span(lag))),
+                    Variable::Lagging { lag } => Some(format!(", lagging by {}", summary.clock.span(lag))),
                     _ => None,
                 });
                 format!("{place} grows by {} um/m for each kelvin{}", figure(n.value * 1e6, 1), lag.unwrap_or_default())

@@ -340,9 +340,9 @@ pub(super) fn described(term: &Term, clock: Clock) -> String {
         }
         (Basis::Sign, Variable::Gravity { axis }) => {
             let name = ["x", "y", "z"].get(axis.unwrap_or(2)).unwrap_or(&"z");
-            format!("other on either side of its {name}: which one hangs down decides, as where a seat has play")
+            format!("differs by which side of its {name} points down, as when a seat has play")
         }
-        (_, Variable::Gravity { .. }) => "depends on the direction in which it hangs, as where a mounting yields".into(),
+        (_, Variable::Gravity { .. }) => "depends on the direction of gravity, as when a mounting yields".into(),
         (Basis::Settling { .. }, _) | (_, Variable::Temperature | Variable::Lagging { .. }) => match term.law().times {
             Some(times) => format!("depends on the warm-up and on {}", clock.named(times.of)),
             None => "depends on the warm-up".into(),

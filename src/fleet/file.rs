@@ -208,7 +208,7 @@ impl FleetFile {
         }
         if let Some(previous) = &self.previous {
             if !(previous.alpha > 0.0 && previous.alpha < 1.0) {
-                fault("previous.alpha", "expected a chance between 0 and 1, e.g. 0.05".into());
+                fault("previous.alpha", "expected a significance level between 0 and 1, e.g. 0.05".into());
             }
             if previous.fleet == self.name {
                 fault("previous.fleet", "is this fleet itself; give every campaign a name of its own".into());

@@ -78,7 +78,7 @@ impl IdentifiedModel {
         let wrong = wrong_setup_of(manifest, store)?;
         if let (None, Some(wrong)) = (step, &wrong) {
             let message = format!(
-                "no model of it is good for anything: {wrong}. Mend it and run again, or take a step on purpose with --step"
+                "none of its models is usable: {wrong}. Correct that and run again, or choose a step explicitly with --step"
             );
             return Err(Error::data(run, message));
         }
@@ -184,7 +184,7 @@ fn load(store: &Store, table: &TableRef, manifest: &Manifest) -> Result<Frame> {
     let path = store.object(table)?;
     if !store.is_whole(table)? {
         let message = format!(
-            "is not the table that run {} wrote: it is damaged or was taken away. `calib run {}` makes it anew",
+            "is not the table that run {} wrote: it is damaged or was removed. `calib run {}` restores it",
             manifest.run_id, manifest.pipeline.file
         );
         return Err(Error::data(path.display().to_string(), message));
@@ -200,8 +200,8 @@ impl Files {
             (true, _) => {}
             (false, true) => warnings.push(format!("{place} carries no content hash: its numbers cannot be verified")),
             (false, false) => {
-                let message = "carries no content hash, as a file has that another program wrote: whether its numbers were changed since they were \
-                               identified cannot be told, and they move a robot. Take the file that calib wrote (`tables/` in the store), or say \
+                let message = "carries no content hash, so another program wrote it: calib cannot tell whether its numbers were changed since they were \
+                               identified, and they will move a robot. Take the file that calib wrote (`tables/` in the store), or give \
                                --unchecked";
                 return Err(Error::data(place, message));
             }

@@ -201,7 +201,7 @@ impl ExaminedFile {
         let ways: Vec<&PointColumns> = found.ways.iter().filter(|way| numeric(way)).collect();
         let Some(best) = ways.first() else {
             if let Some(wanted) = found.wanted {
-                self.remarks.push(format!("only the wanted point is there: {}", quoted(&self.shown(&wanted))));
+                self.remarks.push(format!("only a target is there, no measured point: {}", quoted(&self.shown(&wanted))));
             }
             return;
         };
@@ -329,7 +329,7 @@ impl ExaminedFile {
         for column in columns.iter().filter(|column| !running.contains(column) && !clocks.contains(column)) {
             let name = quoted(&self.sheet.names[*column]);
             self.remarks.push(format!(
-                "{name} is no time that can be read: s or ms as numbers that do not fall, 08:15:03, or 2026-11-22T08:15:03"
+                "{name} cannot be read as time; allowed: s or ms as numbers that never decrease, 08:15:03, or 2026-11-22T08:15:03"
             ));
         }
         let Some((unit, said)) = running.first().and_then(|column| unit(*column)) else {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// What `calib init` writes behind lines to look at, and what is to be done there.
 const MARKS: [(&str, &str); 2] =
-    [("REPLACE", "put your own there and delete the mark"), ("CHECK", "look whether it is so and delete the mark")];
+    [("REPLACE", "put your own there and delete the mark"), ("CHECK", "check that it is right and delete the mark")];
 
 /// Warnings where lines are left that `calib init` marked.
 pub fn marked(path: &Path) -> String {

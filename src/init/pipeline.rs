@@ -23,11 +23,13 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
     let name: String = name.unwrap_or_default().chars().filter(|c| c.is_ascii_alphanumeric() || "_-".contains(*c)).collect();
     let name = if name.is_empty() { "cell".into() } else { name };
     let mut out = format!(
-        "# A calibration, step by step. `calib check` tells every fault with its line, `calib run` does what is not already done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
+        "# A calibration, step by step. `calib check` reports every fault with its line, `calib run` computes what is not yet done.\ncalib: 1\nname: {name}\nseed: 1                 # everything random derives from it\n\nstages:\n"
     );
     let urdf = request.urdf.as_ref().map(|path| format!(", urdf: {}", from_folder(request.folder, path)));
     out.push_str(&format!("  - uses: robot\n    with: {{file: robot.yaml{}}}\n\n", urdf.unwrap_or_default()));
-    out.push_str("  # Which column holds what, in which unit. Nothing is guessed when this runs: what stands here counts.\n");
+    out.push_str(
+        "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n",
+    );
     out.push_str("  - uses: ingest\n    with:\n      files:\n");
     if found.is_empty() {
         out.push_str(EMPTY);
@@ -217,7 +219,7 @@ const STAGES: &str = "
 
   - uses: report
     with:
-      # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is kept
+      # limits: {mean_mm: 0.3, max_mm: 0.8}      # what you accept; the report says whether it is met
       # identity: {operator: REPLACE, robot serial: REPLACE, tracker: REPLACE, date: REPLACE}     # stands on the report as given
       title: null                              # the heading; null: the robot's name
 ";

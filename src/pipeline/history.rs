@@ -37,7 +37,7 @@ pub fn find_run(store: &Store, text: &str) -> Result<String> {
             let hint = nearest(text, tags.keys().map(String::as_str)).map(|near| format!("; did you mean the tag `{near}`?"));
             nothing(format!("no such run or tag{} `calib log` lists them", hint.unwrap_or_else(|| ";".into())))
         }
-        several => nothing(format!("{} runs begin or end so; give more of the id", several.len())),
+        several => nothing(format!("the ids of {} runs begin or end like this; give more of the id", several.len())),
     }
 }
 

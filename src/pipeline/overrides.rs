@@ -104,7 +104,7 @@ fn unknown(target: &str, names: &BTreeSet<String>, ids: &[String]) -> String {
     let hint = nearest(head, candidates).map(|name| format!("; did you mean `{name}{rest}`?"));
     let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
     format!(
-        "nothing of that name to set{} Allowed: {}",
+        "no variable or setting of that name{} Allowed: {}",
         hint.unwrap_or_else(|| ".".into()),
         list(&mut names.iter().cloned().chain(["seed".into()]).chain(ids.iter().map(|id| format!("{id}.SETTING"))))
     )

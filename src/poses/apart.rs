@@ -57,7 +57,8 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let forms: Vec<Form> =
         serde_json::from_str(&finding.forms).map_err(|error| Error::store(&place, format!("its findings: {error}")))?;
     if forms.is_empty() {
-        let message = format!("finding {}, {}, is a fault of the recording: no pose mends it", finding.rank, finding.effect);
+        let message =
+            format!("finding {}, {}, is a fault of the recording: correct it there, no pose helps", finding.rank, finding.effect);
         return Err(Error::spec(place, message));
     }
     let robot = read::<Robot>(store, &stage)?.to_description()?;
@@ -81,7 +82,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
     let listed = rivals.0.iter().any(|row| row.rank == finding.rank && row.effect == rival.0 && is_at(&row.place, rival.1));
     if cause(&rival.0).is_none() && !model.stack.effects().any(|(effect, _)| effect.name() == rival.0) {
         let message =
-            format!("`{}` is an effect of your own, and a run keeps of these what it found: it was not found here", rival.0);
+            format!("`{}` is a declared effect; a run keeps only those that it found, and it did not find this one", rival.0);
         return Err(Error::spec("--separate", message));
     }
     let mut tried = None;
@@ -185,7 +186,7 @@ fn pair(place: &str, findings: &Findings, rivals: &Rivals, names: &[String]) -> 
             name(first, &told)?;
         }
         let many = if fitting.is_empty() { "no finding" } else { "several findings" };
-        return Err(Error::spec("--separate", format!("`{first}` is {many} of {place}; it has {}", list.join(", "))));
+        return Err(Error::spec("--separate", format!("`{first}` matches {many} of {place}; its findings: {}", list.join(", "))));
     };
     let Some(second) = names.get(1) else {
         let rival = closest(found).ok_or_else(|| name_one(found))?;

@@ -61,7 +61,7 @@ pub fn proposal<'a>(
     };
     for name in pair {
         if let Some((_, reason)) = left_out.iter().find(|(left, _)| left == name) {
-            return Err(Error::spec("--separate", format!("`{name}` cannot be told: {reason}")));
+            return Err(Error::spec("--separate", format!("`{name}` cannot be separated: {reason}")));
         }
     }
     let mut recording = against.map(|path| recorded::recording(path, &imported)).transpose()?;

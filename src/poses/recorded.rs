@@ -32,7 +32,7 @@ pub(super) fn recording(path: &Path, robot: &RobotDescription) -> Result<(Measur
     let warning = (!vouched).then(|| format!("{label} carries no content hash: its content cannot be verified"));
     let prismatic: Vec<bool> = robot.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     if table.prismatic != prismatic {
-        let message = format!("has {} joints of other number or kind than the robot file's {}", table.joints, prismatic.len());
+        let message = format!("has {} joints, not the number or kind of the robot file's {}", table.joints, prismatic.len());
         return Err(Error::data(label, message));
     }
     if table.rows() == 0 {

@@ -86,7 +86,7 @@ fn text(work: &PoseProposal) -> String {
     }
     text.push_str(&separation(work));
     text.push_str(&format!(
-        "\nof an error by direction of approach, {:.0} % of every joint's stays visible with the directions given\n",
+        "\nof an error by direction of approach, at least {:.0} % of every joint's stays observable with the directions given\n",
         1e2 * proposal.approach_seen
     ));
     text.push_str(&closing(work.request));
@@ -115,7 +115,10 @@ fn separation(work: &PoseProposal) -> String {
             text.push_str(&format!("  {name:28}  {:>9.2e} {unit}  (random {:.2e})\n", size(*sigma), size(*random)));
         }
         for parameter in &part.imitated {
-            text.push_str(&format!("  {:28}  at no size: others do the same at every pose\n", work.parameters[*parameter].0));
+            text.push_str(&format!(
+                "  {:28}  at no size: others have the same effect at every pose\n",
+                work.parameters[*parameter].0
+            ));
         }
     }
     text

@@ -132,7 +132,7 @@ impl ErrorsSection {
             let allowed: Vec<&str> = last.iter().map(|row| row.set.as_str()).collect();
             return Err(Error::spec(
                 "with.set",
-                format!("`{wished}` is no set held out after the step that stands; allowed: {}", allowed.join(", ")),
+                format!("`{wished}` is not a held-out set of the step that the run uses; allowed: {}", allowed.join(", ")),
             ));
         }
         last.sort_by_key(|row| (wished != Some(&row.set), -row.points, row.set.clone()));

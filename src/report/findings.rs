@@ -57,7 +57,7 @@ impl FindingsSection {
         let suspects = tables.suspects.iter().flat_map(|table| &table.0).filter(|row| row.step == verdict.step);
         let wrong = wrong_setup(tables).is_some();
         let (before, after) = match wrong {
-            true => ("as it is set up", "without what is wrong"),
+            true => ("before: as set up", "after: set-up corrected"),
             false => ("before: geometry, zeros and ratios identified", "after: with the findings"),
         };
         Some(Self {
@@ -99,8 +99,8 @@ fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
     let facts = [
         ("noise of one point, rms", Some(noise)),
         ("left over at fitted rows, rms", Some(format!("{} mm", mm(verdict.leftover_rms_mm)))),
-        ("chance that what is left is noise", verdict.p_after.map(|p| significant(p, 2))),
-        ("chance that what the simulation leaves is noise", verdict.p_before.map(|p| significant(p, 2))),
+        ("chance of such a final residual from noise alone", verdict.p_after.map(|p| significant(p, 2))),
+        ("chance of such a residual of the simulation from noise alone", verdict.p_before.map(|p| significant(p, 2))),
         ("repeatability of the joints", verdict.p_after.map(|_| format!("{} arcsec", significant(repeatability, 2)))),
         ("rows fitted", Some(count(verdict.points))),
     ];
@@ -109,10 +109,10 @@ fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
 
 fn sentence(verdict: &VerdictRow, tables: &Tables) -> String {
     let said = match verdict.verdict.as_str() {
-        "explained" => "What was found brings the error of held-out points down to the noise.",
+        "explained" => "The findings bring the error of held-out points down to the noise.",
         "nothing_missing" => "These data show nothing that the simulation lacks.",
-        "not_asked" => "Too few rows were fitted to ask what the simulation lacks.",
-        _ => "Something is left that the findings do not explain.",
+        "not_asked" => "Too few rows were fitted to determine what the simulation lacks.",
+        _ => "The findings do not explain the whole error.",
     };
     let said = match &verdict.statement {
         Some(statement) => sentence_case(statement),
@@ -151,17 +151,17 @@ fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
         (
             "probability of the name",
             share(row.probability),
-            "that it is this effect at this place; what is missing to 1 is below",
+            "that it is this effect at this place; the rest, up to 1, is listed below",
         ),
         ("of the place", share(row.place_probability), "that it acts at this place, whatever it is"),
         ("of none", share(row.none_probability), "that it is neither this effect nor any of its rivals"),
-        ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per number over what is left; about 1 for noise"),
+        ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per parameter over the residual variance; about 1 for noise"),
         ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
-        ("BIC", row.delta_bic.map(|v| significant(v, 3)), "how much worse the criterion is without it; above 10 is strong"),
+        ("BIC", row.delta_bic.map(|v| significant(v, 3)), "increase of the BIC without the finding; above 10 is strong"),
         (
-            "gain on unseen poses",
+            "cross-validated gain",
             row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))),
-            "rms of poses under fits without them, without the finding minus with it",
+            "cross-validated rms without the finding minus that with it",
         ),
         ("size", row.effect_rms_mm.map(|v| format!("{} mm", mm(v))), "rms of the whole effect at the tool"),
     ];
@@ -197,7 +197,7 @@ fn formula(rows: &[FormRow]) -> String {
     let errors = rows.first().map(|row| {
         let proposed = if row.proposed { ", proposed" } else { "" };
         let [with, curve, without] = [row.folds_rms_mm, row.curve_rms_mm, row.without_rms_mm].map(mm);
-        format!(" ({} parts{proposed}; {with} mm on unseen poses, {curve} mm with the curve, {without} mm without)", row.price)
+        format!(" ({} parts{proposed}; {with} mm cross-validated, {curve} mm with the curve, {without} mm without)", row.price)
     });
     format!("{words}{}", errors.unwrap_or_default())
 }
@@ -262,6 +262,6 @@ fn pictures(finding: &FindingRow, curve: &[&CurveRow]) -> Vec<(String, String)> 
                 "Without the finding: residual {what} (grey; pale: fitted rows), the fitted effect (blue) and two standard deviations of it."
             ),
         ),
-        (draw("With the finding", false), "With it, on the same scale: what is left.".into()),
+        (draw("With the finding", false), "With the finding, on the same scale: the remaining residual.".into()),
     ]
 }

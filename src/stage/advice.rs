@@ -22,7 +22,7 @@ pub fn advice(
         let redundant = matches!(fitted.statuses[*k], ParameterStatus::Redundant(_));
         let sentence = match measure(remedy, last) {
             Some(measure) => format!("{measure} would show it"),
-            None if redundant => "no measured point ever can: they are one and the same to it".into(),
+            None if redundant => "no measured point can: they move every point in the same way".into(),
             None => continue,
         };
         sentences.insert(model.stack.specs()[*k].name.clone(), sentence);

@@ -115,7 +115,8 @@ impl Stage for Diagnose {
         if let Some(simulated) = &reads.recording.simulated {
             corrected = Corrected::OutsideSimulation;
             let robot = RobotModel::new(reads.robot.to_description()?);
-            let message = "three rows to fit with sim_x, sim_y, sim_z and a measured point are needed to lay one over the other";
+            let message =
+                "aligning simulation and recording needs three rows to fit with sim_x, sim_y, sim_z and a measured point";
             data = against_simulation(&robot, &data, simulated, &asked).ok_or_else(|| Error::data("table recording", message))?;
             context.services.note("the mismatch is measured minus simulated (sim_x, sim_y, sim_z)".into());
             context.services.warn("parameters correct that simulation: they are not the robot file's".into());

@@ -48,9 +48,9 @@ impl FoldSetting {
             Self::EachPose if poses > MOST_POSES => {
                 Err(format!("{poses} poses are too many to leave out one by one; allowed: up to {MOST_POSES}, or folds: 5"))
             }
-            Self::EachPose => leave_one_out(whole).map(Some).ok_or_else(|| few("more rows than a third of the parameters without any pose")),
+            Self::EachPose => leave_one_out(whole).map(Some).ok_or_else(|| few("more rows than a third of the parameters with any one pose left out")),
             Self::Parts(parts) => cross_validate(whole, parts, seed).map(Some).ok_or_else(|| {
-                few(&format!("two poses for each of {parts} folds and more values than parameters without any fold, fewer folds, or folds: n"))
+                few(&format!("two poses for each of {parts} folds and more values than parameters with any fold left out; fewer folds; or folds: n"))
             }),
         }
     }

@@ -212,7 +212,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     let noise_axis = noise / 3f64.sqrt();
     if fitted.excess_sigma > noise_axis {
         services.note(format!(
-            "{:.3} mm per axis is left beyond {} {:.3} mm: this model does not explain it",
+            "{:.3} mm per axis of residual beyond {} noise of {:.3} mm: this model does not explain it",
             fitted.excess_sigma * 1e3,
             if fitting.data.noise_basis == NoiseBasis::Inferred { "the inferred" } else { "the instrument's" },
             noise_axis * 1e3
@@ -220,7 +220,7 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     }
     if let Some(turn) = fitted.excess_sigma_angle.filter(|turn| *turn > ASKEW) {
         services.warn(format!(
-            "measured orientations are {:.1} deg off the model's beyond their noise: is their convention in `ingest` the file's?",
+            "measured orientations are {:.1} deg off the model's beyond their noise: does `ingest` name the convention of the file?",
             turn.to_degrees()
         ));
     }

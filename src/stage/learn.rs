@@ -224,7 +224,7 @@ impl Stage for Learn {
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {
         let LearnReads { robot, recording, split, parameters, prediction } = reads;
         if !prediction.0.iter().map(|row| row.sequence).eq(recording.sequence.iter().copied()) {
-            return Err(Error::data("table prediction", "it belongs to another recording than the one beside it"));
+            return Err(Error::data("table prediction", "does not belong to this recording: their sequence numbers differ"));
         }
         let arm = robot.zip(parameters).map(|(robot, parameters)| {
             Ok::<ScrewArm, Error>(ScrewArm::of(&RobotModel::new(robot.to_description()?), &parameters.base_pose()))
@@ -299,10 +299,10 @@ impl Learn {
         }
         let contest = self.contest(rows, arm, prismatic, context);
         services.begin("comparing corrections", Some(fits(&contest) as u64), "fits");
-        let comparison = compare(samples, &contest, |done, what| services.advance(done as u64, what));
+        let comparison = compare(samples, &contest, &|done, what| services.advance(done as u64, what));
         let kept = &comparison.judged[comparison.chosen];
         services.begin("learning", Some(self.generations as u64 + 1), "generations");
-        let learnt = learn(samples, &contest, kept, |generation| {
+        let learnt = learn(samples, &contest, kept, &mut |generation| {
             services.advance(generation.index as u64 + 1, &format!("best {:.4}", generation.best));
         });
         let corrections = told::table(context.id, &contest, &comparison, learnt.is_some());

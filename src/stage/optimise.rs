@@ -178,8 +178,7 @@ impl Optimise {
             seed,
             jobs: 1,
         };
-        let function = |x: &[f64]| problem.function.value(x);
-        method.minimise(self.population, &function, &problem.function.bounds(problem.dimensions), &budget, |_, _| {})
+        problem.function.search(problem.dimensions, method, self.population, &budget)
     }
 
     fn row(&self, step: &str, problem: &BenchmarkProblem, method: Algorithm, outcomes: &[SwarmResult]) -> SearchesRow {

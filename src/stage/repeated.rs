@@ -65,9 +65,9 @@ pub fn note(context: &Context, repeated: &Repeated) {
     );
     if let Some((ratio, chance)) = lack_of_fit {
         line += &if *chance < UNLIKELY {
-            format!("; what is left between poses is {ratio:.1} times that in squares: this model lacks something")
+            format!("; the residual between poses is {ratio:.1} times that in mean square: this model lacks something")
         } else {
-            format!("; what is left between poses is no more than that (F {ratio:.2}, chance {chance:.2}): nothing is missing")
+            format!("; the residual between poses is no larger (F {ratio:.2}, p {chance:.2}): no lack of fit shows")
         };
     }
     context.services.note(line);

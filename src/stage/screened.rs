@@ -42,7 +42,7 @@ const NAMED: usize = 4;
 pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
     if let Some(offset) = screening.apart {
         context.services.warn(format!(
-            "most points belong to the joints {offset:+} rows away: the two logs have slipped, join them anew before anything else"
+            "most points belong to the joints {offset:+} rows away: the two logs are misaligned: join them again before anything else"
         ));
     }
     let id = |row: usize| recording.point_id[row].as_str();

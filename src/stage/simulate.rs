@@ -97,7 +97,7 @@ impl Stage for Simulate {
             pose.faults().iter().for_each(|(at, message)| fault(&format!("{place}.{at}"), message));
         }
         for (index, _) in self.blocks.iter().enumerate().filter(|(_, block)| self.motion.is_some() && !block.given.is_empty()) {
-            fault(&format!("blocks[{index}].given"), "poses are given to an arm that stands; leave them or `motion` out");
+            fault(&format!("blocks[{index}].given"), "given poses need an arm at rest; leave out `given` or `motion`");
         }
         for (index, block) in self.blocks.iter().enumerate() {
             if !(block.payload_kg.is_finite() && block.payload_kg >= 0.0) {

@@ -323,7 +323,7 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
         if wanted > left as u64 {
             return Err(Error::data(
                 "split",
-                format!("set `{}` wants {}, {left} of {rows} are left", stretch.set, counted(wanted, "row")),
+                format!("set `{}` takes {}, but only {left} of {rows} remain", stretch.set, counted(wanted, "row")),
             ));
         }
         dealt.resize(dealt.len() + wanted as usize, stretch.set.clone());

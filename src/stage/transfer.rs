@@ -53,7 +53,10 @@ impl Stage for Transfer {
         let earlier = reads.parameters.of_the_arm()?;
         let left = reads.parameters.0.len() - earlier.0.len();
         if left > 0 {
-            context.services.note(format!("left behind, being of the first measurement alone: {}", counted(left, "parameter")));
+            context.services.note(format!(
+                "not carried over, since they belong to the first measurement only: {}",
+                counted(left, "parameter")
+            ));
         }
         // Another recording has another clock: steps have happened, and the arm is warm. What lags follows the time between rows.
         let start = (0..data.rows()).map(|row| data.time(row)).fold(f64::INFINITY, f64::min);
@@ -142,7 +145,7 @@ fn compare(context: &Context, data: &Measurements, judges: &[usize], [whole, geo
     let (whole, geometry) = (rms(whole), rms(geometry));
     if whole > WORSE * geometry {
         context.services.warn(format!(
-            "the carried model leaves {whole:.3} mm rms on this recording, its geometry alone {geometry:.3} mm: what was found besides \
+            "the carried model leaves {whole:.3} mm rms on this recording, its geometry alone {geometry:.3} mm: what was identified besides it \
              does not hold here"
         ));
     }

@@ -30,7 +30,7 @@ pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[
         return None;
     }
     let (given, windup) = match joints.len() - bare {
-        0 => ("no link masses".to_string(), "is found without its stiffness at best"),
+        0 => ("no link masses".to_string(), "shows at best as an angle, without a stiffness"),
         some => (format!("mass and centre of {some} of {} links alone", joints.len()), "cannot be computed"),
     };
     let loaded = rows.iter().filter(|row| data.payload[**row] > 0.0).count();
@@ -38,10 +38,10 @@ pub(super) fn weightless_links(robot: &RobotModel, data: &Measurements, rows: &[
         0 => String::new(),
         _ => format!(" ({} of {} carry a payload)", counted(loaded, "row"), rows.len()),
     };
-    let missing = format!("the robot file gives {given}, and weight turns joints of these poses{load}");
+    let missing = format!("the robot file gives {given}, yet gravity loads joints in these poses{load}");
     let warning = format!(
         "{missing}: wind-up under the arm's own weight {windup}, bending and counterbalances cannot be computed, and what they do may be \
-         called by another name (gear, hose). Fill in `links` of the robot file"
+         attributed to another cause (gear, hose). Fill in `links` of the robot file"
     );
     Some(WeightlessLinks { missing, warning })
 }

@@ -90,7 +90,7 @@ fn loose<R: ChunkReader + 'static>(place: &str, source: R, kind: Option<&str>) -
     let carried = decoded.said(CONTENT_HASH);
     if carried.is_some_and(|carried| decoded.table_hash(kind, version).is_none_or(|found| found.as_str() != carried)) {
         let message = format!(
-            "its content is not what calib wrote: the hash that it carries (`{CONTENT_HASH}`) is of other numbers. Take the file again \
+            "its content is not what calib wrote: the hash that it carries (`{CONTENT_HASH}`) does not match its numbers. Take the file again \
              from the store that it comes from, where `calib run` writes it anew"
         );
         return Err(Error::data(place, message));
@@ -116,9 +116,7 @@ fn of_the_data(place: &str, error: Error) -> Error {
 fn set_aside(path: &Path, why: &str) -> Error {
     let place = path.display().to_string();
     match fs::rename(path, path.with_extension("damaged")) {
-        Ok(()) => {
-            Error::store(place, format!("damaged: {why}; it was set aside, run again and the stage that made it makes it anew"))
-        }
+        Ok(()) => Error::store(place, format!("damaged: {why}; it was set aside; run again to restore it")),
         Err(e) => Error::store(place, format!("damaged: {why}; delete it and run again ({e})")),
     }
 }

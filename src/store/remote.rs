@@ -140,7 +140,10 @@ impl Store {
             }
             thread::sleep(PAUSE);
         }
-        Err(Error::store(format!("{}/{key}", remote.bucket.name()), "is there and is not: run again, finished stages are kept"))
+        Err(Error::store(
+            format!("{}/{key}", remote.bucket.name()),
+            "exists but cannot be read: run again, finished stages are kept",
+        ))
     }
 
     /// Takes a file of the bucket away.

@@ -102,8 +102,10 @@ impl S3 {
         );
         let place = format!("{}/{key}", self.name);
         if text.contains("NoSuchBucket") {
-            let message =
-                format!("there is no bucket `{}`; make it first (aws s3 mb s3://{}), or mend the name", self.bucket, self.bucket);
+            let message = format!(
+                "there is no bucket `{}`; make it first (aws s3 mb s3://{}), or correct the name",
+                self.bucket, self.bucket
+            );
             return Error::spec(&self.name, message);
         }
         if self.keyless && !matches!(error, object_store::Error::NotFound { .. }) {

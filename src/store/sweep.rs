@@ -39,7 +39,7 @@ impl Store {
         if self.in_bucket() {
             return Err(Error::spec(
                 self.name(),
-                "what lies in a bucket is not swept: copy the store to a folder, sweep that and copy it back",
+                "a store in a bucket cannot be swept: copy it to a folder, run calib gc there and copy it back",
             ));
         }
         if !dry_run && workspace::in_use(&self.root().join("tmp")) {

@@ -19,7 +19,7 @@ impl Store {
     fn tag_path(&self, name: &str) -> Result<PathBuf> {
         let name = component(name)?;
         if name.starts_with("HEAD") || name.ends_with(".json") {
-            return Err(Error::spec(format!("tag {name}"), "a tag is no HEAD and no file name"));
+            return Err(Error::spec(format!("tag {name}"), "a tag must not begin with HEAD or end in .json"));
         }
         Ok(self.root().join("tags").join(format!("{name}.json")))
     }

@@ -169,11 +169,11 @@ impl Store {
         for (run, previous) in links.iter().filter(|(_, previous)| !previous.is_null()) {
             let (before, sealed) = (previous["run"].as_str().unwrap_or_default(), previous["sealed"].as_str());
             let why = match seals.get(before) {
-                None => format!("the run {before} before it is gone"),
+                None => format!("the preceding run {before} is missing"),
                 // A broken seal is a fault of its own already.
                 Some(None) => continue,
                 Some(Some(found)) if Some(found.as_str()) == sealed => continue,
-                Some(Some(_)) => format!("the manifest of the run {before} before it is another one than when this run began"),
+                Some(Some(_)) => format!("the manifest of the preceding run {before} has changed since this run began"),
             };
             found.faults.push(Fault::new(format!("run {run}"), why));
         }

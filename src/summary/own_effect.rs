@@ -10,7 +10,7 @@ pub(super) fn declared_in_yaml(declaration: &str, told: &str) -> Result<String> 
     let declared: EffectDeclaration = serde_json::from_str(declaration).map_err(unreadable)?;
     let mut lines = vec![
         format!("# {told}."),
-        "# `with: {effects: [this file]}` below `uses: diagnose` tries it; give it the name of what it is.".into(),
+        "# `with: {effects: [this file]}` below `uses: diagnose` tries it; rename it once its cause is known.".into(),
         "calib_effect: 1".into(),
         format!("name: {}", json(&declared.name)),
         format!("place: {}", json(&declared.place)),

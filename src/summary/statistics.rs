@@ -56,7 +56,7 @@ fn folds(rows: &[StatisticsRow]) -> String {
     };
     let (step, set) = (width(|row| &row.step, "step".len()), width(|row| &row.set, "set".len()));
     let mut text = format!(
-        "training points, each under a fit without it (cross-validated), error in mm: parts drawn at random | contiguous parts\n  \
+        "training points, each under a fit without it (cross-validated), error in mm: random folds | contiguous folds\n  \
          {:step$}  {:set$}  {:>8}  {:>8}  {:>8}  {:>8} | {:>8}  {:>8}  {:>8}\n",
         "step", "set", "mean", "max", "rms", "expected", "mean", "max", "rms"
     );

@@ -62,7 +62,7 @@ impl Observability {
         let rank = fitted.singular.len();
         if rank > 0 && rank < fitted.singular_all.len() {
             let gap = fitted.singular_all[rank - 1] / fitted.singular_all[rank];
-            push("gap", 0, gap, "fall of the candidates' singular values behind the last free one");
+            push("gap", 0, gap, "ratio of the last free singular value to the next one");
         }
         push(
             "unmodelled_mm",
@@ -100,7 +100,7 @@ impl Observability {
                 UNFOLDED,
                 0,
                 poses as f64,
-                "poses: not of a number for the folds that were asked for, so that nothing was cross-validated",
+                "poses: not enough, or too many, for the folds that were asked for, so that nothing was cross-validated",
             );
         }
         push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
@@ -126,7 +126,7 @@ fn of_repeats(repeated: &Repeated, push: &mut dyn FnMut(&str, f64, &str)) {
     push("repeat_noise_mm", repeated.noise * 1e3, floor);
     push("repeat_freedom", repeated.freedom as f64, "degrees of freedom of repeat_noise_mm");
     if let Some((ratio, chance)) = repeated.lack_of_fit {
-        push("lack_of_fit_F", ratio, "mean square of what is left between poses over that within: 1 for a complete model");
+        push("lack_of_fit_F", ratio, "mean square of the residual between poses over that within: 1 for a complete model");
         push("lack_of_fit_p", chance, "chance of a larger F under a complete model");
     }
 }

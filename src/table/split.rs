@@ -18,7 +18,7 @@ impl Split {
     pub fn rows(&self, recording: &Recording, sets: &[String]) -> Result<Vec<usize>> {
         let same = self.0.len() == recording.rows() && self.0.iter().zip(&recording.sequence).all(|(row, s)| row.sequence == *s);
         if !same {
-            return Err(Error::data("table split", "it belongs to another recording than the one beside it"));
+            return Err(Error::data("table split", "does not belong to this recording: their sequence numbers differ"));
         }
         for set in sets {
             if !self.0.iter().any(|row| row.set == *set) {

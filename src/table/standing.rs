@@ -77,7 +77,7 @@ impl fmt::Display for Withdrawn {
         let Self { step, rms_mm, than, than_rms_mm, points } = self;
         write!(
             f,
-            "`{step}` is withdrawn, `{than}` stands: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} points, predicted by fits without them"
+            "`{step}` is withdrawn and `{than}` used instead: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} points, predicted by fits without them"
         )
     }
 }
@@ -87,7 +87,7 @@ impl fmt::Display for Contradicted {
         let Withdrawn { step, rms_mm, than, than_rms_mm, points } = &self.0;
         write!(
             f,
-            "the {points} held-out points contradict the choice of `{step}`: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}`. They judge and choose nothing: something differs there that the fitted points do not show"
+            "the {points} held-out points contradict the choice of `{step}`: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}`. Held-out points judge a step and never choose one: something differs there that the fitted points do not show"
         )
     }
 }

@@ -71,7 +71,7 @@ fn remark(suspect: &Suspect, partner: Option<&str>) -> String {
         }
         SuspectKind::UnitSlip(factor) => format!("the point is {}: another unit?", slip(factor)),
         SuspectKind::Zero => "the point is the tracker's origin: a lost beam?".into(),
-        SuspectKind::Outlier => format!("{far}, and nowhere else that this recording explains"),
+        SuspectKind::Outlier => format!("{far}, and no mistake of the recording explains where it is"),
         SuspectKind::Event => {
             format!("{far}, like its neighbours: something happened that the model does not know, so the row is kept")
         }

@@ -51,7 +51,7 @@ impl TargetColumns {
         for (index, name) in header.iter().enumerate() {
             match role(name, robot, units) {
                 Ok(Some(role)) if roles.iter().any(|(_, known)| same(known, &role)) => {
-                    faults.push(Fault::new(place, format!("column `{name}` says again what another column says")));
+                    faults.push(Fault::new(place, format!("column `{name}` repeats what another column gives")));
                 }
                 Ok(Some(role)) => roles.push((index, role)),
                 Ok(None) => {}

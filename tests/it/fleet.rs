@@ -138,7 +138,7 @@ fn a_sweep_leaves_what_the_records_of_a_fleet_need() {
     std::fs::remove_dir_all(store.join("fleets")).unwrap();
     let (result, _) = output(calib(&["gc", "--keep-runs", "1", "--grace-hours", "0", "--store"]).arg(&store));
     let text = String::from_utf8_lossy(&result.stdout).into_owned();
-    assert!(text.starts_with("took away ") && !text.starts_with("took away 0 tables"), "{text}");
+    assert!(text.starts_with("removed ") && !text.starts_with("removed 0 tables"), "{text}");
 }
 
 #[test]

@@ -126,7 +126,7 @@ fn a_smooth_remainder_is_learnt_and_the_noise_is_not() {
     let noise = 0.25e-3;
     let training = arm(200, 1.0, noise, 10);
     let unseen = arm(400, 1.0, noise, 90);
-    let (correction, course) = train(&training, &recipe(6), |_| {});
+    let (correction, course) = train(&training, &recipe(6), &mut |_| {});
     let held_out = mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None);
     let seen = mean_error(&training, Some(&correction)) / mean_error(&training, None);
     println!("held-out ratio {held_out:.3}, training ratio {seen:.3}");
@@ -197,15 +197,15 @@ fn training_is_the_same_on_one_thread_and_on_three() {
         TrainingStart::Swarm(Algorithm::Bso),
         TrainingStart::Swarm(Algorithm::Abc),
     ] {
-        let on = |jobs| train(&samples, &Recipe { jobs, start, ..recipe(6) }, |_| {});
+        let on = |jobs| train(&samples, &Recipe { jobs, start, ..recipe(6) }, &mut |_| {});
         assert_eq!(on(1), on(3), "{start:?}");
     }
     let tool = sr210d();
     let cheap = Recipe { generations: 5, iterations: 40, ..recipe(6) };
     let judged = |jobs| {
         let contest = contest(Some(&tool), &ALL, &Recipe { jobs, ..cheap.clone() }, 3);
-        let comparison = compare(&samples, &contest, |_, _| {});
-        let learnt: Vec<_> = comparison.judged.iter().map(|judged| learn(&samples, &contest, judged, |_| {})).collect();
+        let comparison = compare(&samples, &contest, &|_, _| {});
+        let learnt: Vec<_> = comparison.judged.iter().map(|judged| learn(&samples, &contest, judged, &mut |_| {})).collect();
         (comparison, learnt)
     };
     assert_eq!(judged(1), judged(3));
@@ -217,12 +217,12 @@ fn joint_curves_find_waves_that_no_other_rival_can_see() {
     let (training, unseen) = (waves(300, &tool, 20e-6, 1), waves(300, &tool, 20e-6, 2));
     let cheap = Recipe { generations: 5, iterations: 60, ..recipe(6) };
     let contest = contest(Some(&tool), &ALL, &cheap, 4);
-    let comparison = compare(&training, &contest, |_, _| {});
+    let comparison = compare(&training, &contest, &|_, _| {});
     let before = mean_error(&unseen, None);
     let best = &comparison.judged[comparison.chosen];
     assert_eq!(best.rival, Some(Rival::Curves));
     assert!(ALL.iter().all(|rival| *rival == Rival::Curves || error(&comparison, *rival) > 1.2 * best.mean()));
-    let (correction, _) = learn(&training, &contest, best, |_| {}).unwrap();
+    let (correction, _) = learn(&training, &contest, best, &mut |_| {}).unwrap();
     let after = mean_error(&unseen, Some(&correction));
     // Noise alone is 1.596 * 20 um.
     assert!(after > 30e-6 && after < 45e-6 && after < 0.3 * before, "{before} {after}");
@@ -240,8 +240,8 @@ fn a_joint_curve_does_not_swing_where_no_row_was_and_says_its_doubt() {
     let visited: Vec<usize> = (0..all.rows()).filter(|row| !in_gap(&all.sources[*row])).collect();
     let training = all.pick(&visited);
     let contest = contest(Some(&tool), &[Rival::Curves], &recipe(6), 4);
-    let comparison = compare(&training, &contest, |_, _| {});
-    let (correction, _) = learn(&training, &contest, &comparison.judged[comparison.chosen], |_| {}).unwrap();
+    let comparison = compare(&training, &contest, &|_, _| {});
+    let (correction, _) = learn(&training, &contest, &comparison.judged[comparison.chosen], &mut |_| {}).unwrap();
     let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
     let (mut largest, mut spread, mut covered, mut rows) = ([0.0f64; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
     for (q, residual) in unseen.sources.iter().zip(&unseen.residual) {
@@ -279,7 +279,7 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
     let (training, unseen) = (slow(200, 11), slow(300, 12));
     let cheap = Recipe { generations: 5, iterations: 100, ..recipe(6) };
     let left = |through: Option<ScrewArm>| {
-        let (correction, _) = train(&training, &Recipe { through, ..cheap.clone() }, |_| {});
+        let (correction, _) = train(&training, &Recipe { through, ..cheap.clone() }, &mut |_| {});
         mean_error(&unseen, Some(&correction)) / mean_error(&unseen, None)
     };
     let (point, joints) = (left(None), left(Some(tool.clone())));
@@ -323,7 +323,7 @@ fn targets_of_one_pose_do_not_vouch_for_each_other() {
 
 #[test]
 fn outside_the_range_it_saw_the_correction_fades_to_nothing() {
-    let (correction, _) = train(&arm(120, 1.0, 0.1e-3, 5), &recipe(6), |_| {});
+    let (correction, _) = train(&arm(120, 1.0, 0.1e-3, 5), &recipe(6), &mut |_| {});
     let mut q = vec![0.1; 6];
     let range = correction.region.ranges[1];
     q[1] = range.upper;
@@ -391,9 +391,9 @@ fn every_kind_of_correction_comes_back_from_its_table() {
     let samples = waves(120, &tool, 50e-6, 7);
     let cheap = Recipe { generations: 3, iterations: 20, ..recipe(6) };
     let contest = contest(Some(&tool), &ALL, &cheap, 2);
-    let comparison = compare(&samples, &contest, |_, _| {});
+    let comparison = compare(&samples, &contest, &|_, _| {});
     for judged in &comparison.judged[1..] {
-        let (correction, _) = learn(&samples, &contest, judged, |_| {}).unwrap();
+        let (correction, _) = learn(&samples, &contest, judged, &mut |_| {}).unwrap();
         let table = Network::of(&correction, &[false; 6]);
         let back = Network::from_frame(&table.to_frame().unwrap()).unwrap().correction(&[false; 6]).unwrap().unwrap();
         for q in &samples.sources {

@@ -262,7 +262,7 @@ fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is
         let warnings = desk.warnings.lock().unwrap().join("\n");
         (table::<Prediction>(&tables).remove(0), warnings)
     };
-    let worse = "what was found besides does not hold here";
+    let worse = "what was identified besides it does not hold here";
     let (prediction, warnings) = carry(&parameters);
     assert!(!warnings.contains(worse), "{warnings}");
     for (row, predicted) in prediction.0.iter().enumerate() {

@@ -138,7 +138,10 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         Families::Beyond => Collection::Beyond,
     };
     if collection == Collection::Beyond && arguments.pairs + arguments.open > 0.0 {
-        faults.push(Fault::new("--pairs, --open", "are of the library; with `--families beyond` every recording has one cause"));
+        faults.push(Fault::new(
+            "--pairs, --open",
+            "need `--families library`; with `--families beyond` every recording has one cause",
+        ));
     }
     let mut allowed: Vec<&str> = Vec::new();
     for family in collection.families() {

@@ -40,7 +40,10 @@ pub(super) fn main(arguments: &ProveArguments) -> Result<()> {
     }
     if folder.join(SEAL).is_file() {
         if !Seal::read(folder)?.is_of(&design) {
-            return Err(Error::spec(folder.display().to_string(), "holds another set; name a new folder, or give its options"));
+            return Err(Error::spec(
+                folder.display().to_string(),
+                "holds a set made with other options; name a new folder, or give the same options",
+            ));
         }
     } else {
         proof::vacant(folder)?;

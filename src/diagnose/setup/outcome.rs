@@ -22,7 +22,7 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
     let scale: f64 = all.iter().map(|words| words.scale).product();
     let (before, after) = (stated.placed.left, scale * found.placed.left);
     let mut text = format!(
-        "{}; so the nominal robot is {} off the points (median, base and tool fitted), without it {}. Mend it: {}",
+        "{}; with this error the nominal robot is {} off the points (median, base and tool fitted), without it {}. Remedy: {}",
         what.join(", and "),
         mm(before),
         mm(after),
@@ -33,7 +33,7 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
     alike.dedup();
     alike.retain(|other| !what.contains(&other.as_str()));
     if !alike.is_empty() {
-        text.push_str(&format!(". These data are explained as well where {}", alike.join(", or ")));
+        text.push_str(&format!(". These data are explained equally well if {}", alike.join(", or ")));
     }
     let number = |name: &str, value: f64| ParameterEstimate { name: name.into(), form: 0, value, unit: "mm", sigma: None };
     let kept: Vec<bool> = found.placed.off.iter().map(|off| *off <= FAR * median(&found.placed.off)).collect();
@@ -54,8 +54,8 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
 /// An identified model that leaves the robot file by more than manufacture allows, and no set-up error of the list that explains it.
 pub(super) fn implausible(question: &Question, numbers: &[String]) -> Diagnosis {
     let text = format!(
-        "the identified robot is another than the robot file's by more than manufacture errs: {}. Look for a typing error there, \
-         for a unit, and for joints whose zero or sign differs",
+        "the identified robot differs from the robot file by more than manufacture allows: {}. Check these for a typing error \
+         or a wrong unit, and the joints for a wrong zero or sign",
         numbers.join(", ")
     );
     wrong(question, vec![finding(format!("{text}."))])
@@ -66,8 +66,8 @@ pub(super) fn unexplained(question: &Question, stated: &AsStated) -> Diagnosis {
     let statement = format!(
         "the set-up is wrong: with base and tool fitted the nominal robot is {} off the points (median), {:.1} % of its reach, and \
          none of the usual errors explains it (units, signs, zeros, exchanged or coupled joints, a mirrored frame, the order of rows, \
-         one length). Look whether the robot file is this arm's (lines marked REPLACE or CHECK, the DH convention), and whether the \
-         joints are those of these points",
+         one length). Check that the robot file is this arm's (lines marked REPLACE or CHECK, the DH convention), and that the \
+         joints belong to these points",
         mm(stated.placed.left),
         100.0 * stated.share_of_reach()
     );
@@ -95,7 +95,7 @@ fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
     let (model, fitted) = fit(&start, data, &FitOptions { rows, candidates: &candidates });
     let before = ErrorLengths::of(data, &model.predict(data), rows);
     let screening = Screening { kept: rows.to_vec(), ..Screening::default() };
-    let not_observable = vec!["what is missing: it is asked when the set-up is right".into()];
+    let not_observable = vec!["what the simulation lacks: it is tested once the set-up is right".into()];
     let diagnosis = unasked(question, VerdictKind::WrongSetup, (model, fitted, screening));
     Diagnosis { before, held_out: false, findings, not_observable, ..diagnosis }
 }

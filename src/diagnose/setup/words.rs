@@ -63,23 +63,23 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
             let degrees = 90 * quarters;
             let zeros = list(&|k| if k == joint { degrees.to_string() } else { "0".into() });
             (
-                format!("the zero of joint {} is {degrees} deg in the recording's numbers", joint + 1),
+                format!("the recording reads {degrees} deg at the zero of joint {}", joint + 1),
                 format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
         WrongSetup::Coupled { moved, by, sign } => {
-            let (how, ratio) = if sign < 0.0 { ("less", -1) } else { ("plus", 1) };
+            let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
             let (moved, by) = (moved + 1, by + 1);
             (
                 format!(
-                    "joint {moved} is reported {how} the angle of joint {by}, against the horizon and not against the link before it"
+                    "joint {moved} is reported {how} the angle of joint {by}, relative to the horizontal and not to the link before it"
                 ),
                 format!("in `ingest`: `columns: {{q: {{.., coupled: [{{joint: {moved}, by: {by}, ratio: {ratio}}}]}}}}`"),
             )
         }
         WrongSetup::Mirrored => (
             "the points are a mirror image: an axis of the tracker's frame has the wrong sign, or two are exchanged".into(),
-            "in `ingest`: exchange the columns of `x` and `y`; as the base is fitted, that mends either".into(),
+            "in `ingest`: exchange the columns of `x` and `y`; since the base is fitted, this corrects both cases".into(),
         ),
         WrongSetup::Order(order) => return of_order(order),
         WrongSetup::Number(number) => return of_number(number, values),
@@ -121,10 +121,10 @@ fn of_lengths(unit: usize, reach: f64) -> SetupWords {
 fn of_order(order: RowOrder) -> SetupWords {
     let (what, mend) = match order {
         RowOrder::Shifted(by) => {
-            let how = if by < 0 { "before" } else { "behind" };
+            let how = if by < 0 { "ahead of" } else { "behind" };
             (
-                format!("the points stand {} {how} their joints", counted(by.unsigned_abs(), "row")),
-                "in `ingest`: `join: {by: id}` or `join: {by: time}`, or take off the rows that only one file has",
+                format!("the points are {} {how} their joints", counted(by.unsigned_abs(), "row")),
+                "in `ingest`: `join: {by: id}` or `join: {by: time}`, or remove the rows that only one file has",
             )
         }
         RowOrder::Reversed => (
@@ -137,7 +137,7 @@ fn of_order(order: RowOrder) -> SetupWords {
         ),
         RowOrder::JointsByText { .. } => (
             "the joints are sorted by name as text (1, 10, 11, 2), their points are not".into(),
-            "in `ingest`: `join: {by: id}`, or sort the joints as they were moved to",
+            "in `ingest`: `join: {by: id}`, or sort the joints in the order in which they were driven to",
         ),
     };
     SetupWords::of(what, mend.into())
@@ -147,7 +147,7 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
     let (what, mend) = match number {
         FreeNumber::Length(joint) => (
             format!(
-                "a length of the robot file from joint {} to joint {} is wrong: what is behind it stands farther by {}",
+                "a length in the robot file from joint {} to joint {} is wrong: all that follows it is displaced by {}",
                 joint + 1,
                 joint + 2,
                 displacement(values)
@@ -156,7 +156,7 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
         ),
         FreeNumber::Axis(joint) => (
             format!(
-                "the axis of joint {} alone stands elsewhere than the robot file says: by {}",
+                "only the axis of joint {} is not where the robot file puts it: it is displaced by {}",
                 joint + 1,
                 displacement(values)
             ),
@@ -165,8 +165,8 @@ fn of_number(number: FreeNumber, values: &[f64]) -> SetupWords {
         FreeNumber::Zero(joint) => {
             let degrees = values.first().copied().unwrap_or_default().to_degrees();
             (
-                format!("the zero of joint {} is off by {} deg, more than manufacture errs", joint + 1, figure(degrees, 2)),
-                format!("master joint {} anew, or put its zero right in the robot file", joint + 1),
+                format!("the zero of joint {} is off by {} deg, more than manufacture allows", joint + 1, figure(degrees, 2)),
+                format!("master joint {} again, or correct its zero in the robot file", joint + 1),
             )
         }
     };

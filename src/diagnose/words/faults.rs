@@ -8,9 +8,9 @@ use crate::estimate::{Screening, Suspect, SuspectKind};
 /// Joints and points of all rows that are so many rows apart.
 pub(super) fn rows_apart(offset: i64) -> Finding {
     let rows = counted(offset.unsigned_abs() as usize, "row");
-    let how = if offset < 0 { "before" } else { "behind" };
+    let how = if offset < 0 { "ahead of" } else { "behind" };
     let text =
-        format!("the joints of a point stand {rows} {how} it: join the two logs anew, nothing else can be said until then");
+        format!("the joints of a point are {rows} {how} it: join the two logs again, nothing else can be diagnosed before");
     of_the_recording(JointLogLag::NAME, text)
 }
 

@@ -55,7 +55,7 @@ impl HolderTurn {
     pub fn sentence(&self, clock: Clock, rms: f64) -> String {
         let joint = Place::Joint(self.joint);
         format!(
-            "the holder has turned by {} deg about the flange{}, its target at constant radius; a step of the zero of {joint} would be the \
+            "the holder has turned by {} deg about the flange{}, its target at constant radius; a step in the zero of {joint} would look the \
              same ({} um rms at the tool).",
             figure(self.angle.to_degrees().abs(), 2),
             clock.since(self.at),

@@ -27,7 +27,7 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
     format!(
         "{}, {} of the base model estimated",
         counted(now.screening.kept.len(), "row"),
-        counted(fitter.free().len(), "number")
+        counted(fitter.free().len(), "parameter")
     )
 }
 
@@ -46,5 +46,5 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
 pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl Iterator<Item = &'f Form>, rest: f64) -> String {
     let keys: Vec<String> = forms.map(|form| format!("; {}", form.key())).collect();
     let (tried, causes) = (pool.hypotheses.len(), counted(keys.len(), "cause"));
-    format!("round {round}: {tried} hypotheses, {causes}{} (p = {rest:.3} that the rest is noise)", keys.concat())
+    format!("round {round}: {tried} hypotheses, {causes}{} (p = {rest:.3} of such a residual from noise alone)", keys.concat())
 }

@@ -46,14 +46,14 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     out.extend(masses(survey));
     let clock = Clock::of(survey.data);
     if clock == Clock::Rows {
-        out.push("time: none was recorded; the order of the rows stands for it".into());
+        out.push("time: none was recorded; the order of the rows is used instead".into());
     }
     if survey.data.temperature.is_none() {
         let by = if clock == Clock::Rows { "the order of the rows" } else { "time" };
         out.push(format!("temperature: none was recorded; growth and drift are separated by {by} alone"));
     }
     if survey.data.current.is_none() {
-        out.push("counterbalance: without motor currents a balancer is the same as gear_cyclic of order 1".into());
+        out.push("counterbalance: without motor currents it is confounded with gear_cyclic of order 1".into());
     }
     if survey.data.direction.is_none() {
         let order =

@@ -156,7 +156,7 @@ impl DeclarationFaults {
                     let near =
                         nearest(word, words()).map(|near| format!("; did you mean `{{{near}}}`?")).unwrap_or_else(|| ".".into());
                     let allowed = words().map(|word| format!("{{{word}}}")).collect::<Vec<_>>().join(", ");
-                    self.add("sentence", format!("nothing is known of `{{{word}}}`{near} Allowed: {allowed}"));
+                    self.add("sentence", format!("unknown placeholder `{{{word}}}`{near} Allowed: {allowed}"));
                 }
                 None => self.add("sentence", "a `{` without its `}`".to_string()),
             }

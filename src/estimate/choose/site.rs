@@ -59,7 +59,7 @@ impl Site {
             });
             let Some(q) = q else {
                 return Err(format!(
-                    "no pose of {TRIES} random ones is inside the box and above the floor: widen them, or the limits"
+                    "no pose of {TRIES} random ones is inside the box and above the floor: widen the box or limits, or lower the floor"
                 ));
             };
             self.push(&mut out, robot, &q, sigma);

@@ -175,7 +175,7 @@ impl RivalContest<'_> {
 /// Judges all rivals in the contest's folds; `observe` sees how many fits are done, and of which rival the last was.
 ///
 /// Panics with fewer than two folds or rows.
-pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: impl Fn(usize, &str) + Sync) -> RivalComparison {
+pub fn compare(samples: &TrainingSamples, contest: &RivalContest, observe: &(dyn Fn(usize, &str) + Sync)) -> RivalComparison {
     assert!(contest.folds >= 2 && samples.rows() >= 2, "something to choose from");
     let done = Mutex::new(0);
     let poses = samples.poses();
@@ -235,7 +235,7 @@ pub fn learn(
     samples: &TrainingSamples,
     contest: &RivalContest,
     judged: &JudgedRival,
-    observe: impl FnMut(&Generation),
+    observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
     let (hidden, decay) = judged.settings.unwrap_or((contest.recipe.hidden, contest.recipe.decay));
     let (mut correction, course) =
@@ -249,7 +249,7 @@ fn fit(
     samples: &TrainingSamples,
     contest: &RivalContest,
     recipe: &Recipe,
-    observe: impl FnMut(&Generation),
+    observe: &mut dyn FnMut(&Generation),
 ) -> Option<(Correction, Vec<TrainingStep>)> {
     let region = || Region::of(&samples.sources, recipe.joints);
     let body = match rival {
@@ -275,7 +275,7 @@ impl Task {
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..samples.rows()).partition(|row| poses[*row] * contest.folds * RUNS / count % contest.folds != self.fold);
         let recipe = Recipe { seed: self.recipe.seed ^ (self.fold as u64 + 1), ..self.recipe.clone() };
-        let (correction, course) = fit(self.rival, &samples.pick(&inside), contest, &recipe, |_| {})?;
+        let (correction, course) = fit(self.rival, &samples.pick(&inside), contest, &recipe, &mut |_| {})?;
         let left = outside.iter().map(|row| {
             let (delta, residual) = (correction.at(&samples.sources[*row]).delta, samples.residual[*row]);
             (*row, length(std::array::from_fn(|k| residual[k] - delta[k])))

@@ -101,7 +101,11 @@ pub struct TrainingStep {
 }
 
 /// Trains on all samples; `observe` sees each generation of the swarm. Panics without samples or features.
-pub fn train(samples: &TrainingSamples, recipe: &Recipe, observe: impl FnMut(&Generation)) -> (Correction, Vec<TrainingStep>) {
+pub fn train(
+    samples: &TrainingSamples,
+    recipe: &Recipe,
+    observe: &mut dyn FnMut(&Generation),
+) -> (Correction, Vec<TrainingStep>) {
     assert!(samples.rows() > 0 && !recipe.features.is_empty(), "something to learn from");
     let prepared = Prepared::new(samples, recipe);
     let (starts, mut course) = prepared.starts(observe);
@@ -175,7 +179,7 @@ impl<'a> Prepared<'a> {
     }
 
     /// Where members start, best first, and the course of the swarm; chance has none.
-    fn starts(&self, observe: impl FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
+    fn starts(&self, observe: &mut dyn FnMut(&Generation)) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let mut rng = self.rng(0);
         let bounds = SearchBox::cube(self.shape.parameters(), -SWARM_BOUND, SWARM_BOUND);
         match self.recipe.start {
@@ -189,7 +193,7 @@ impl<'a> Prepared<'a> {
         algorithm: Algorithm,
         bounds: &SearchBox,
         rng: &mut ChaCha8Rng,
-        mut observe: impl FnMut(&Generation),
+        observe: &mut dyn FnMut(&Generation),
     ) -> (Vec<Vec<f64>>, Vec<TrainingStep>) {
         let rows = if self.y.len() > SWARM_ROWS { draw(rng, self.y.len(), SWARM_ROWS).0 } else { (0..self.y.len()).collect() };
         let batch = self.batch(&rows);

@@ -3,7 +3,7 @@
 //! Michalewicz is Eq. 35 of Wang et al. (2020) with its sign, `-sum sin(x_i) sin(i x_i^2 / pi)^20` on `[0, pi]^n`; the others as in
 //! Jamil and Yang (2013), minimum 0.
 
-use super::SearchBox;
+use super::{Algorithm, Budget, SearchBox, SwarmResult};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{E, PI};
@@ -59,6 +59,11 @@ impl Landscape {
             Self::Ackley => (-32.768, 32.768),
         };
         SearchBox::cube(dimensions, lower, upper)
+    }
+
+    /// One search for its minimum; `population` as of [`Algorithm::minimise`].
+    pub fn search(self, dimensions: usize, method: Algorithm, population: usize, budget: &Budget) -> SwarmResult {
+        method.minimise(population, &|x: &[f64]| self.value(x), &self.bounds(dimensions), budget, |_, _| {})
     }
 
     /// The smallest value, where it is known.

@@ -26,14 +26,14 @@ impl Apart<'_> {
             let means =
                 other.unwrap_or("measure something else: another payload, another temperature, a second target off the first");
             return vec![
-                format!("no pose separates {finding} from {rival}: they move the point alike at every one"),
+                format!("no pose separates {finding} from {rival}: they move the point identically at every pose"),
                 format!("instead: {means}"),
             ];
         };
         let mut out = Vec::new();
         for (k, (true_one, fitted)) in [(&finding, &rival), (&rival, &finding)].into_iter().enumerate() {
             if alike[k] {
-                out.push(format!("whatever {true_one} does, {fitted} can do too: only the other way round does anything show"));
+                out.push(format!("{fitted} can imitate {true_one} completely: only if {fitted} is true are they separable"));
             }
         }
         // What can show at all must.
@@ -46,7 +46,7 @@ impl Apart<'_> {
             let needed = ((TOLD - was) / (will - was) * count as f64).ceil();
             let more =
                 if needed < MOST { format!("some {needed:.0} such poses would") } else { "no number of poses would".into() };
-            let size = if alike.contains(&true) { ", if what shows is as large as this recording would have it" } else { "" };
+            let size = if alike.contains(&true) { ", if the effect is as large as this recording estimates" } else { "" };
             out.push(format!("measured at {}, they are not separable: {more}{size}", counted(count, "pose")));
             out.extend(other.map(|means| format!("instead: {means}")));
         }
@@ -64,7 +64,7 @@ impl PoseAnswer for Apart<'_> {
         let names = self.names();
         let mut text = format!("finding {}: {}\nrival: {}\n", self.finding.rank, self.finding.statement, names[1]);
         text.push_str(&format!(
-            "\nexpected separation L, what is left (squared, over the noise) where the other is fitted in its place; below {TOLD} they\n\
+            "\nexpected separation L: squared residual over noise variance when the other is fitted in its place; below {TOLD} they\n\
              cannot be separated. Points good to {:.3} mm per axis\n",
             self.sigma
         ));
@@ -83,12 +83,12 @@ impl PoseAnswer for Apart<'_> {
         text.push('\n');
         self.conclusion().iter().for_each(|line| text.push_str(&format!("{line}\n")));
         if self.told.proposed.is_some() {
-            text.push_str("measure in the same set-up, tracker and target where they stand");
+            text.push_str("measure in the same set-up, with tracker and target left in place");
             if let Some(temperature) = self.circumstances.temperature {
                 text.push_str(&format!(", the arm at {temperature:.1} C"));
             }
             text.push_str("; append the files under `later` of the stage `ingest` and diagnose again;\n");
-            text.push_str(&format!("what that decided is said by: calib diff {} NEW_RUN\n", self.run));
+            text.push_str(&format!("to see what that decided: calib diff {} NEW_RUN\n", self.run));
             text.push_str(&closing(self.request));
         }
         text

@@ -257,7 +257,7 @@ fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
                 value.fault("a joint cannot move itself; expected two different joints");
             }
             if couplings.iter().any(|c| (c.moved, c.by) == (moved, by)) {
-                value.fault(format!("joint {} by joint {} is there twice", moved + 1, by + 1));
+                value.fault(format!("the coupling of joint {} to joint {} is given twice", moved + 1, by + 1));
             }
             couplings.push(Coupling { moved, by, ratio });
         }

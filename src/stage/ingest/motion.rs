@@ -120,7 +120,7 @@ impl JointSamples {
             return Ok(Track { joints, rates: Vec::new() });
         }
         if steps.is_empty() {
-            return Err(Error::data(label, "the times of no two rows in a row ascend: joint velocities cannot be derived"));
+            return Err(Error::data(label, "no two consecutive rows have increasing times: joint velocities cannot be derived"));
         }
         let usual = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         let gap = motion.and_then(|motion| motion.gap_s).unwrap_or(GAP * usual);
@@ -177,9 +177,9 @@ impl JointSamples {
                 let factor = theirs[joint] / both[joint].abs().max(f64::MIN_POSITIVE);
                 let against = both[joint] < 0.0;
                 if against || !(1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&factor) {
-                    let how = if against { "run against".to_string() } else { format!("are {factor:.3} times") };
+                    let how = if against { "have the opposite sign of".to_string() } else { format!("are {factor:.3} times") };
                     let message = format!(
-                        "the velocities of joint {} {how} what its positions over time say; allowed: the unit and sign that the file has",
+                        "the velocities of joint {} {how} what its positions over time say; state the unit and sign of the file",
                         joint + 1
                     );
                     return Err(Error::data(label, message));

@@ -121,7 +121,7 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], 
         partner.map_or_else(|| "no partner in another file".to_string(), |other| format!("no partner in {}", other.label));
     for (reason, rows, first_line, detail) in [
         (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
-        (Reason::DuplicateRow, copies, first(true), "rows that are there once more".to_string()),
+        (Reason::DuplicateRow, copies, first(true), "duplicate rows".to_string()),
         (Reason::Unmatched, unmatched, 0, lonely),
     ] {
         if rows > 0 {

@@ -175,7 +175,7 @@ impl JoinDecisions<'_> {
             Some(Join::Id {}) => format!("no usable row of {other} has the point id `{}`", row.id),
             Some(Join::Time { tolerance_s, .. }) => {
                 let time = row.values.get(self.arm.slots.time).copied().unwrap_or(f64::NAN);
-                format!("no row of {other} is its partner within {tolerance_s} s of {time} s")
+                format!("{other} has no row within {tolerance_s} s of {time} s")
             }
             _ => format!("data row {} of {other} is missing or rejected", row.number),
         }
@@ -381,12 +381,12 @@ impl<'a> Chunks<'a> {
             let ms = 1e3 * self.carried;
             context
                 .services
-                .note(format!("joints were carried by their velocity to the moment of their point, over {ms:.2} ms at most"));
+                .note(format!("joints were extrapolated by their velocity to the time of their point, over {ms:.2} ms at most"));
         }
         if self.inferred > 0 {
             let (rows, least) = (counted(self.inferred, "row"), START);
             context.services.note(format!(
-                "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, and what figures rest on it is \
+                "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, and all figures that rest on it are \
                  inferred; say `instrument`, or map sigma_x or u95",
                 least.constant_um, least.per_metre_um, least.coverage
             ));

@@ -220,7 +220,7 @@ impl DiagnosisSummary {
                 let proposed = if rows.iter().any(|row| row.proposed) { ", proposed" } else { "" };
                 let (price, folds) = rows.first().map_or((0, 0.0), |row| (row.price, row.folds_rms_mm));
                 let words = formula_in_words(rows);
-                text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm on unseen poses{proposed})\n"));
+                text.push_str(&format!("   formula: {words} ({price} parts, {folds:.4} mm cross-validated{proposed})\n"));
             }
             let rivals: Vec<String> = self.rivals_of(finding).map(rival_words).collect();
             if !rivals.is_empty() {

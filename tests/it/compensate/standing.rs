@@ -21,13 +21,13 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
         (out, err)
     };
     let (out, err) = said(&["run", "pipeline.yaml"], "");
-    assert!(out.contains("\n`poor` is withdrawn, `identify` stands: "), "{out}");
+    assert!(out.contains("\n`poor` is withdrawn and `identify` used instead: "), "{out}");
     assert!(
         out.contains("at the same 60 points, predicted by fits without them\n`calib compensate` and `calib export` take the step `identify`\n"),
         "{out}"
     );
     assert!(out.contains("  poor (withdrawn)  validate"), "{out}");
-    assert!(err.contains("`poor` is withdrawn, `identify` stands: "), "{err}");
+    assert!(err.contains("`poor` is withdrawn and `identify` used instead: "), "{err}");
     let document: Value = serde_json::from_str(&said(&["run", "pipeline.yaml", "--json", "--quiet"], "").0).expect("JSON");
     assert_eq!((&document["standing"]["step"], &document["standing"]["model"]), (&"identify".into(), &"identify".into()));
     let gone = &document["standing"]["withdrawn"][0];
