@@ -291,13 +291,13 @@ fn a_network_of_joint_motions_learns_what_joints_do_better_than_one_of_displacem
 fn the_judge_keeps_what_helps_and_refuses_what_was_learnt_from_noise() {
     let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
     let tool = sr210d();
-    let smooth = compare(&arm(150, 1.0, 0.2e-3, 4), &contest(Some(&tool), &ALL, &cheap, 5), |_, _| {});
+    let smooth = compare(&arm(150, 1.0, 0.2e-3, 4), &contest(Some(&tool), &ALL, &cheap, 5), &|_, _| {});
     let best = &smooth.judged[smooth.chosen];
     assert!(best.helps() && best.mean() < 0.8 * smooth.judged[0].mean(), "{smooth:?}");
     let refused = (0..20).filter(|seed| {
         let recipe = Recipe { seed: *seed, ..cheap.clone() };
         let rivals = [Rival::Ridge, Rival::Process, Rival::Network(TrainingStart::Random)];
-        compare(&arm(120, 0.0, 0.5e-3, 200 + seed), &contest(None, &rivals, &recipe, 4), |_, _| {}).chosen == 0
+        compare(&arm(120, 0.0, 0.5e-3, 200 + seed), &contest(None, &rivals, &recipe, 4), &|_, _| {}).chosen == 0
     });
     let refused = refused.count();
     assert!(refused >= 18, "useless corrections pass: {refused} of 20 refused");
@@ -315,7 +315,7 @@ fn targets_of_one_pose_do_not_vouch_for_each_other() {
     }
     assert_eq!(thrice.poses(), (0..180).map(|row| row % 60).collect::<Vec<_>>());
     let cheap = Recipe { generations: 5, members: 2, iterations: 60, ..recipe(6) };
-    let comparison = compare(&thrice, &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5), |_, _| {});
+    let comparison = compare(&thrice, &contest(None, &[Rival::Ridge, Rival::Process], &cheap, 5), &|_, _| {});
     assert_eq!(comparison.chosen, 0, "nothing carries over to another pose");
     // Of rows that share a pose with trained ones a Gaussian process leaves next to nothing.
     assert!(error(&comparison, Rival::Process) > 0.8 * comparison.judged[0].mean());
