@@ -33,7 +33,7 @@
 //! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, stage, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
-//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, shell, stage, store |
+//! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
 //! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, effect, pipeline, shell, stage, store, table |

@@ -2,7 +2,7 @@
 
 use super::means::{CommandTask, Means};
 use super::pipeline_arguments::told_as;
-use super::{emit, emit_json};
+use super::{emit_json, emit_lines};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
@@ -93,7 +93,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
     let store = arguments.means.store_again();
     match arguments.json {
         true => emit_json(&told.document(&store)),
-        false => emit(&if arguments.details { told.text(&store) } else { told.short(&store) }),
+        false => emit_lines(&if arguments.details { told.text(&store) } else { told.short(&store) }),
     }
 }
 

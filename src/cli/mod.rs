@@ -145,6 +145,14 @@ fn emit(text: &str) -> Result<()> {
     }
 }
 
+/// Lines of a result, folded where stdout is a terminal.
+fn emit_lines(text: &str) -> Result<()> {
+    match surroundings::columns() {
+        Some(columns) => emit(&crate::summary::folded(text, columns)),
+        None => emit(text),
+    }
+}
+
 fn emit_json(value: &serde_json::Value) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(|error| Error::Bug(error.to_string()))?;
     emit(&format!("{text}\n"))

@@ -68,7 +68,11 @@ fn answer(arguments: &QueryArguments, store: &Store, tables: &QueryTables, sql: 
     match (arguments.csv, arguments.json) {
         (true, _) => emit(&summary::csv(&answer)?),
         (_, true) => emit(&summary::json(&answer)?),
-        _ => emit(&summary::grid(&answer, if arguments.rows == 0 { usize::MAX } else { arguments.rows }, width())),
+        _ => emit(&summary::grid(
+            &answer,
+            if arguments.rows == 0 { usize::MAX } else { arguments.rows },
+            super::surroundings::columns(),
+        )),
     }
 }
 
@@ -83,12 +87,4 @@ fn answer(_: &QueryArguments, _: &Store, _: &QueryTables, _: &str) -> Result<()>
 /// The tables with their columns.
 fn columns(store: &Store, tables: &[&QueryTable], json: bool) -> Result<()> {
     if json { emit_json(&summary::columns_json(store, tables)?) } else { emit(&summary::columns(store, tables)?) }
-}
-
-/// Columns of the terminal, where stdout is one.
-#[cfg(feature = "query")]
-fn width() -> Option<usize> {
-    let out = std::io::stdout();
-    let size = std::io::IsTerminal::is_terminal(&out).then(|| terminal_size::terminal_size_of(&out)).flatten();
-    size.map(|(width, _)| usize::from(width.0))
 }

@@ -1,10 +1,11 @@
 //! `calib run`: runs what is not already done.
 
 use super::pipeline_arguments::PipelineArguments;
-use super::{emit, emit_json};
+use super::{emit, emit_json, emit_lines};
 use crate::error::{Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
+use crate::raw::ending;
 use crate::store::Store;
 use crate::summary::{self, labelled};
 use crate::table::Withdrawn;
@@ -84,12 +85,12 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
     }
     text.push_str(short.as_deref().unwrap_or_default());
     text.push_str(&summary::rejected(&outcome));
-    for path in &outcome.documents {
+    for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
         text.push_str(&labelled("report", &path.display().to_string()));
     }
     let more = if arguments.details || short.is_none() { "" } else { "; --details prints every step and set" };
     text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64(), more));
-    emit(&text)
+    emit_lines(&text)
 }
 
 /// What was done; `more` is said behind it.

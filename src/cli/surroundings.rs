@@ -43,6 +43,13 @@ fn peak_memory() -> Option<u64> {
     Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
 }
 
+/// Columns of the terminal, where stdout is one.
+pub(super) fn columns() -> Option<usize> {
+    let out = std::io::stdout();
+    let size = std::io::IsTerminal::is_terminal(&out).then(|| terminal_size::terminal_size_of(&out)).flatten();
+    size.map(|(width, _)| usize::from(width.0))
+}
+
 pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }

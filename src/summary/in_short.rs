@@ -9,13 +9,16 @@ use crate::store::Store;
 use crate::table::{Standing, StatisticsRow};
 
 /// Of the set with most points that the step which stands was not fitted to, else of the one that it was fitted to; nothing where no stage
-/// stated errors. `wrong` is what is wrong with the set-up.
+/// stated errors. Of a `wrong` set-up nothing else is said.
 pub fn in_short(
     outcome: &CompletedRun,
     standing: Option<&Standing>,
     wrong: Option<&str>,
     store: &Store,
 ) -> Result<Option<String>> {
+    if let Some(wrong) = wrong {
+        return Ok(Some(labelled("verdict", &format!("not accepted: {wrong}"))));
+    }
     let rows = rows(outcome, store)?;
     let last = || rows.iter().max_by_key(|row| row.order).map(|row| row.step.as_str());
     let Some(step) = standing.map(|stands| stands.step.as_str()).or_else(last) else { return Ok(None) };
@@ -33,14 +36,10 @@ pub fn in_short(
         text.push_str(&labelled("", &format!("`calib compensate` and `calib export` take the step `{}`", standing.model)));
     }
     let diagnosed = outcome.manifest.stages.iter().rfind(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
-    match (wrong, diagnosed) {
-        (Some(wrong), _) => text.push_str(&labelled("verdict", &format!("not accepted: {wrong}"))),
-        (None, Some(stage)) => {
-            let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
-            text.push_str(&labelled("verdict", &told.verdict()));
-            text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));
-        }
-        (None, None) => (),
+    if let Some(stage) = diagnosed {
+        let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
+        text.push_str(&labelled("verdict", &told.verdict()));
+        text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));
     }
     Ok(Some(text))
 }

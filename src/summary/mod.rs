@@ -25,7 +25,7 @@ pub use explanation::explanation;
 #[cfg(feature = "query")]
 pub use grid::grid;
 pub use in_short::in_short;
-pub use labelled::labelled;
+pub use labelled::{folded, labelled};
 #[cfg(feature = "query")]
 pub use lines::{csv, json};
 pub use plan::graph;

@@ -357,7 +357,7 @@ fn an_interrupted_proof_goes_on_where_it_stood_and_only_with_the_same_set() {
     assert_eq!((&board["recordings"], &board["failures"]), (&json!(12), &json!([])));
     let other = prove("11");
     assert_eq!(other.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&other.stderr).contains("holds another set"));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("holds a set made with other options"));
 }
 
 const STATED: &str = "

@@ -72,7 +72,7 @@ fn clocks_that_are_apart_are_named_with_their_milliseconds() {
     let (value, sigma) = first(&found);
     assert!((value - 2.0).abs() < 3.0 * sigma && sigma < 0.05, "{value} +- {sigma} ms");
     let said = found["findings"][0]["statement"].as_str().expect("a sentence");
-    assert!(said.starts_with("the tracker's clock is ") && said.contains("ms late against the controller's"), "{said}");
+    assert!(said.starts_with("the tracker's clock is ") && said.contains("ms late relative to the controller's"), "{said}");
     assert_eq!(found["verdict"], "explained");
     // Told so, ingest carries the joints there and nothing is left.
     let cured = case.diagnose(&format!("      motion: {{later_s: {}}}\n", 1e-3 * value));

@@ -96,7 +96,7 @@ fn counts_in_the_order_of_recording_must_fit_the_rows() {
     let yaml = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 1}, {set: a}]}";
     assert_eq!(sets(yaml, distinct(5)).unwrap(), ["a", "a", "b", "a", "a"]);
     let short = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 4}]}";
-    assert_eq!(refusal(short, distinct(5)), "split: set `b` wants 4 rows, 3 of 5 are left");
+    assert_eq!(refusal(short, distinct(5)), "split: set `b` takes 4 rows, but only 3 of 5 remain");
     let message = "split: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
     assert_eq!(refusal(short, distinct(7)), message);
 }

@@ -133,7 +133,7 @@ fn one_flipped_bit_in_any_file_is_found() {
     overwrite(&runs[0], forged.as_bytes());
     let output = calib(store, &["verify"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(text(&output).contains("is another one than when this run began"), "{}", text(&output));
+    assert!(text(&output).contains("has changed since this run began"), "{}", text(&output));
 }
 
 #[test]

@@ -136,7 +136,7 @@ fn a_table_of_another_program_is_taken_only_where_that_is_said() {
     for more in [&[][..], &["--unchecked"]] {
         let (code, written, said) = compensated(folder.path(), more);
         assert_eq!((code, written), (Some(10), String::new()));
-        assert!(said.contains("is of other numbers") && said.contains("calib run"), "{said}");
+        assert!(said.contains("does not match its numbers") && said.contains("calib run"), "{said}");
     }
 }
 

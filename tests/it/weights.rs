@@ -151,7 +151,7 @@ fn with_a_payload_the_stiffness_is_said_beside_the_weight() {
     };
     // 1e-4 rad are 20.6 arcsec.
     let alone = said(std::slice::from_ref(&weight));
-    assert!(alone.contains("by up to 21 arcsec") && alone.contains("cannot be separated from their weight"), "{alone}");
+    assert!(alone.contains("by up to 21 arcsec") && alone.contains("cannot be separated from the links' weight"), "{alone}");
     let both = said(&[weight, load]);
     assert!(both.contains("1.000e-4 rad/Nm, and under its own weight") && both.contains("by up to 21 arcsec"), "{both}");
 }

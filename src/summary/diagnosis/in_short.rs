@@ -49,7 +49,7 @@ impl DiagnosisSummary {
         let unseen: Vec<&str> =
             v.not_observable.lines().map(|line| line.split_once(": ").map_or(line, |(what, _)| what)).collect();
         if !unseen.is_empty() {
-            text.push_str(&labelled("unseen", &format!("{}: these data cannot show it", unseen.join(", "))));
+            text.push_str(&labelled("limits", &format!("not observable from these data: {}", unseen.join(", "))));
         }
         text.push_str(&self.next_in_short(store));
         text + &labelled("more", "--details prints places, numbers, formulas, reasons and every rival")
@@ -82,7 +82,11 @@ impl DiagnosisSummary {
         if shown.is_empty() {
             shown.extend(lines.first());
         }
-        let mut text: String = shown.iter().map(|line| labelled("next", line)).collect();
+        let line = |line: &&String| match line.split_once(": calib ") {
+            Some((what, command)) => format!("{}{}", labelled("next", what), labelled("", &format!("calib {command}"))),
+            None => labelled("next", line),
+        };
+        let mut text: String = shown.iter().map(line).collect();
         if lines.len() > shown.len() {
             text.push_str(&labelled("", &format!("{}: --details", counted(lines.len() - shown.len(), "more proposal"))));
         }

@@ -20,10 +20,10 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
         assert!(output.status.success(), "{arguments:?}: {err}");
         (out, err)
     };
-    let (out, err) = said(&["run", "pipeline.yaml"], "");
-    assert!(out.contains("\n`poor` is withdrawn and `identify` used instead: "), "{out}");
+    let (out, err) = said(&["run", "pipeline.yaml", "--details"], "");
+    assert!(out.contains("\nwarning   `poor` is withdrawn and `identify` used instead: "), "{out}");
     assert!(
-        out.contains("at the same 60 points, predicted by fits without them\n`calib compensate` and `calib export` take the step `identify`\n"),
+        out.contains("at the same 60 points, predicted by fits without them\n          `calib compensate` and `calib export` take the step `identify`\n"),
         "{out}"
     );
     assert!(out.contains("  poor (withdrawn)  validate"), "{out}");

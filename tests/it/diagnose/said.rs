@@ -49,7 +49,7 @@ fn without_a_clock_nothing_is_said_in_seconds() {
     let statement = rows["findings"][0]["statement"].as_str().expect("a sentence");
     assert!(statement.contains(&format!(" from row {first} (")), "{statement}");
     let unseen = rows["not_observable"].as_array().expect("a list");
-    assert!(unseen.iter().any(|line| line == "time: none was recorded; the order of the rows stands for it"), "{unseen:?}");
+    assert!(unseen.iter().any(|line| line == "time: none was recorded; the order of the rows is used instead"), "{unseen:?}");
     let goes_with = rows["located"]["variables"].as_array().expect("a list");
     assert!(goes_with.iter().any(|by| by["name"] == "row") && goes_with.iter().all(|by| by["name"] != "time"), "{goes_with:?}");
     calib(&[&["run", "p.yaml", "--quiet"], &CASE[..]].concat(), here);
@@ -111,7 +111,7 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
     assert_eq!(said["leftover"]["p_value"], Value::Null);
     assert_eq!(
         said["not_observable"][0],
-        "what is missing: 12 rows were fitted, at least 15 are needed to separate it from geometry"
+        "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
     let text = calib(&["diagnose", "HEAD"], here);
     assert!(text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"), "{text}");

@@ -29,7 +29,7 @@ fn gravity_is_found_where_nobody_knows_the_masses_and_no_hose_is() {
             let statement = finding["statement"].as_str().expect("a sentence");
             assert_eq!(finding["effect"], "joint_compliance", "{robot}: {statement}");
             assert!(statement.contains("winds up under gravity, by up to "), "{statement}");
-            assert!(statement.contains("cannot be separated from their weight"), "{statement}");
+            assert!(statement.contains("cannot be separated from the links' weight"), "{statement}");
         }
         let plain = truth["effects"].as_array().expect("a list").iter().filter(|effect| effect["L"].as_f64() > Some(50.0));
         let plain: Vec<&str> = plain.filter_map(|effect| effect["where"].as_str()).collect();

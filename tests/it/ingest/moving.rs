@@ -86,7 +86,7 @@ fn velocities_in_another_unit_than_the_settings_say_are_refused() {
     let yaml = one_file("      velocity: {column: \"dq{j}\", unit: rad/s}\nmotion: {}\n");
     let desk = Desk::default().with("a.csv", controller(0.01, 50, |_| false));
     let text = refusal(&desk, &yaml, robot("rr", 1.0));
-    assert!(text.contains("the velocities of joint 1 are 57.") && text.contains("allowed: the unit and sign"), "{text}");
+    assert!(text.contains("the velocities of joint 1 are 57.") && text.contains("state the unit and sign"), "{text}");
     let yaml = yaml.replace("rad/s", "deg/s");
     assert!(take(&Desk::default().with("a.csv", controller(0.01, 50, |_| false)), &yaml, robot("rr", 1.0)).is_ok());
 }
@@ -126,7 +126,7 @@ fn two_clocks_become_one_recording_with_the_joints_at_the_moment_of_the_point() 
             }
         }
         let said = desk.notes.lock().unwrap().join("\n");
-        assert!(said.contains("carried by their velocity to the moment of their point"), "{said}");
+        assert!(said.contains("extrapolated by their velocity to the time of their point"), "{said}");
     }
 }
 

@@ -144,8 +144,8 @@ fn rows_join_by_time_within_the_tolerance_and_across_clocks() {
     assert_eq!(
         refused(&taken.rejected),
         [
-            ("b_tracker.csv", 5, "unmatched", "no row of z_arm.csv is its partner within 0.2 s of 46 s"),
-            ("z_arm.csv", 5, "unmatched", "no row of b_tracker.csv is its partner within 0.2 s of 40 s"),
+            ("b_tracker.csv", 5, "unmatched", "z_arm.csv has no row within 0.2 s of 46 s"),
+            ("z_arm.csv", 5, "unmatched", "b_tracker.csv has no row within 0.2 s of 40 s"),
         ]
     );
 }

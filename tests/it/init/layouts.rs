@@ -278,7 +278,7 @@ fn nominal_and_actual_points_are_told_apart_in_every_order() {
         made.has(&[&format!("x: {{column: \"{measured}\", unit: mm}}"), "q: {column: \"Axis_{j}\", unit: deg}"]).runs(30);
     }
     let targets = one(table("A1,A2,A3,A4,A5,A6,x_soll,y_soll,z_soll", |k| format!("{},{}", joints(k, ","), point(k, ","))));
-    targets.lacks(&["x_soll"]).says(&["REPLACE", "only the wanted point is there"]);
+    targets.lacks(&["x_soll"]).says(&["REPLACE", "only a target is there, no measured point"]);
 }
 
 #[test]
