@@ -5,6 +5,7 @@ use calib::stage::{Context, OpenedInput, Output, RawFile, Services, Sink, Stage,
 use calib::store::frame::Frame;
 use calib::table::Table;
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -90,15 +91,25 @@ impl Services for Desk {
     }
 }
 
-/// Real recordings beside the repository, or `None` with a line that says so. In CI nothing is skipped.
+/// Real recordings beside the repository; or `None`, and the test is listed as skipped when all have run (tests/skipped.rs). Where
+/// `CALIB_ALL_TESTS` is set nothing is skipped.
 pub fn shared(folder: &str) -> Option<PathBuf> {
     let root = std::env::var_os("CALIB_SHARED").map(PathBuf::from);
     let root = root.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"));
     let path = root.join(folder);
-    if path.is_dir() {
-        return Some(path);
+    if !path.is_dir() {
+        skipped(&format!("{} is missing", path.display()));
+        return None;
     }
-    assert!(std::env::var_os("CI").is_none(), "{} is missing", path.display());
-    println!("skipped: {} is missing", path.display());
-    None
+    Some(path)
+}
+
+/// Notes that this test, or a part of it, has nothing to test.
+pub fn skipped(why: &str) {
+    assert!(std::env::var_os("CALIB_ALL_TESTS").is_none(), "nothing may be skipped here: {why}");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("skipped");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let test = std::thread::current().name().expect("a test").replace("::", " ");
+    let mut notes = std::fs::OpenOptions::new().create(true).append(true).open(folder.join(test)).expect("a note");
+    writeln!(notes, "{why}").expect("a note");
 }

@@ -462,8 +462,8 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
     assert!(said.contains("base_shift at base can imitate zero_shift at joint 1 completely"), "{said}");
     assert!(said.contains("instead: return to a few anchor poses"), "{said}");
     for (names, wanted) in [
-        (&["9"][..], "`9` is no finding of run"),
-        (&["zero_shift@joint 7"], "is no finding of run"),
+        (&["9"][..], "`9` matches no finding of run"),
+        (&["zero_shift@joint 7"], "matches no finding of run"),
         (&["1", "gear_cyclc@joint 1"], "did you mean `gear_cyclic`?"),
         (&["1", "gear_cyclic@joint 9"], "gear_cyclic has no place `joint 9` here; allowed: joint 1, joint 2"),
         (&["1", "gear_cyclic"], "say where, e.g. 'gear_cyclic@"),

@@ -50,11 +50,14 @@ fn a_worse_last_step_is_withdrawn_by_run_report_compensate_and_export() {
     assert_eq!((&report["standing"], &report["withdrawn"][0]["step"]), (&"identify".into(), &"poor".into()));
     assert!(report["parameters"].as_array().expect("rows").iter().any(|row| row["name"] == "joint_offset.j2"));
     let page = read("report.html");
-    assert!(page.contains("poor (withdrawn)") && page.contains("`poor` is withdrawn, `identify` stands"), "the page is silent");
+    assert!(
+        page.contains("poor (withdrawn)") && page.contains("`poor` is withdrawn and `identify` used instead"),
+        "the page is silent"
+    );
     for model in ["pipeline.yaml", "HEAD"] {
         let targets = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
         let (taken, err) = said(&["compensate", model, "--quiet"], targets);
-        assert!(err.contains("warning: `poor` is withdrawn, `identify` stands"), "{err}");
+        assert!(err.contains("warning: `poor` is withdrawn and `identify` used instead"), "{err}");
         let (asked, err) = said(&["compensate", model, "--quiet", "--step", "identify"], targets);
         assert_eq!((taken, err.as_str()), (asked, ""));
         let (out, err) = said(&["export", model, "--format", "json"], "");

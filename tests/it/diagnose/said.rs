@@ -113,6 +113,6 @@ fn of_few_rows_nothing_is_asked_and_the_report_is_written_all_the_same() {
         said["not_observable"][0],
         "what the simulation lacks: 12 rows were fitted, at least 15 are needed to separate it from geometry"
     );
-    let text = calib(&["diagnose", "HEAD"], here);
+    let text = calib(&["diagnose", "HEAD", "--details"], here);
     assert!(text.starts_with("not asked (noise basis: instrument)\ntoo few rows were fitted"), "{text}");
 }
