@@ -18,6 +18,6 @@ fn main() {
     let _ = fs::remove_dir_all(folder);
     match lines.len() {
         0 => println!("\nnothing was skipped"),
-        count => println!("\nskipped {count}, whose recordings are not here:\n{}", lines.into_iter().collect::<String>()),
+        _ => println!("\nskipped, for want of what they need:\n{}", lines.into_iter().collect::<String>()),
     }
 }

@@ -10,7 +10,7 @@ use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{Evaluation, Problem};
 use super::repeats::{Poses, Repeated};
-use super::term::{as_of_three, bound};
+use super::term::{as_of_three, bound, share};
 use crate::observation::{Dimension, ExcessSigma, Residual};
 use crate::robot::Measurements;
 use crate::statistics::{MEDIAN_CHI2, nearest};
@@ -55,8 +55,8 @@ pub struct Fitted {
     pub excess_sigma_angle: Option<f64>,
     /// Numbers that were measured in the fitted rows.
     pub values: usize,
-    /// Of what was measured, how much has a Huber weight below one.
-    pub downweighted: usize,
+    /// Fitted rows of which something has a Huber weight below one, with the smallest such weight.
+    pub downweighted: BTreeMap<usize, f64>,
     /// Parameters with a prior: what it says against what the data say.
     pub prior_checks: BTreeMap<usize, PriorCheck>,
     /// Singular values of the free parameters (priors included) scaled by prior sigma, largest first.
@@ -177,7 +177,7 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
         prior_checks,
         repeated: poses.against(model, problem.data, whole_points(&all.residuals), free.len()),
         clusters: clusters.map_or(0, <[Vec<usize>]>::len),
-        downweighted: errors.iter().filter(|(error, axes)| *error > bound(*axes)).count(),
+        downweighted: downweighted(&all.residuals, &errors),
         indices: indices(&singular, problem.rows.len()),
         singular,
         singular_all,
@@ -311,6 +311,16 @@ fn bounded(model: &Model, free: &[usize], pinned: &[bool], factor: &TriangularFa
         let step = factor.given(&fixed).solve(0.0).and_then(|step| step.get(among).copied());
         statuses[*k] = ParameterStatus::Bound(model.x[*k] + step.unwrap_or_default());
     }
+}
+
+/// Rows with a reduced weight, of residuals with their (error, axes).
+fn downweighted(residuals: &[Residual], errors: &[(f64, usize)]) -> BTreeMap<usize, f64> {
+    let mut out = BTreeMap::new();
+    for (residual, (error, axes)) in residuals.iter().zip(errors).filter(|(_, (error, axes))| *error > bound(*axes)) {
+        let weight = share(*error, *axes).powi(2);
+        out.entry(residual.row).and_modify(|least: &mut f64| *least = least.min(weight)).or_insert(weight);
+    }
+    out
 }
 
 /// Reduced chi-square with Huber's weights, of (error, axes).

@@ -232,7 +232,7 @@ stages:
     assert_eq!(
         faults(text, &["sead=3", "source.x.y=3"]),
         [
-            "--set sead: nothing of that name to set; did you mean `seed`? Allowed: sett, seed, source.SETTING, b.SETTING, source.SETTING, count.SETTING, later.SETTING",
+            "--set sead: no variable or setting of that name; did you mean `seed`? Allowed: sett, seed, source.SETTING, b.SETTING, source.SETTING, count.SETTING, later.SETTING",
             "p.yaml:1:8: calib: format 2 is not known to this calib, which reads 1",
             "p.yaml:2:7: name: `a/b`: expected letters, digits, `-` and `_`, starting with a letter or digit",
             "p.yaml:3:1: sed: unknown key; did you mean `seed`? Allowed: calib, name, seed, variables, stages",

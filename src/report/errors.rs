@@ -71,7 +71,7 @@ struct VerdictView {
     sentence: String,
     before: Option<(String, String)>,
     after: Option<(String, String)>,
-    facts: Vec<(&'static str, String)>,
+    facts: Vec<(String, String)>,
     others: Vec<String>,
 }
 
@@ -283,21 +283,21 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         before: before_row.map(|before| (before.step.clone(), mm(before.mean_mm))),
         after: Some((after.step.clone(), mm(after.mean_mm))),
         facts: vec![
-            ("95 % of points within", mm(after.p95_mm)),
-            ("worst point", mm(after.max_mm)),
-            ("rms", mm(after.rms_mm)),
-            ("rms of measurement noise alone", noise(after)),
+            ("95 % of points within".into(), mm(after.p95_mm)),
+            ("worst point".into(), mm(after.max_mm)),
+            ("rms".into(), mm(after.rms_mm)),
+            (format!("rms of measurement noise alone{}", basis(after)), mm(after.noise_rms_mm)),
         ],
         others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
     }
 }
 
-/// The noise, and what it rests on.
-fn noise(row: &StatisticsRow) -> String {
+/// What the noise rests on.
+fn basis(row: &StatisticsRow) -> String {
     match row.noise_basis.as_deref() {
-        _ if row.is_inferred() => format!("{} (inferred: the recording states none)", mm(row.noise_rms_mm)),
-        Some(basis) => format!("{} (by {basis})", mm(row.noise_rms_mm)),
-        None => mm(row.noise_rms_mm),
+        _ if row.is_inferred() => " (inferred: the recording states none)".into(),
+        Some(basis) => format!(" (by {basis})"),
+        None => String::new(),
     }
 }
 

@@ -171,6 +171,7 @@ impl Stage for Diagnose {
             covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
             prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
                 .with_suspects(aside)
+                .with_weights(&diagnosis.kept, &diagnosis.fitted)
                 .with_folds(errors),
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })

@@ -11,6 +11,7 @@ use crate::stage::{Context, computed, repeated, screened};
 use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What stands in for a joint's load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -172,6 +173,7 @@ impl Identified {
         let prediction =
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
                 .with_suspects(aside)
+                .with_weights(fitting.rows, fitted)
                 .with_folds(errors);
         let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
         let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
@@ -247,10 +249,22 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     if !stopped.is_empty() {
         services.note(format!("stopped by their bounds: {}", stopped.join(", ")));
     }
-    if fitted.downweighted > 0 {
-        services.note(format!("far off and down-weighted: {}", counted(fitted.downweighted, "row")));
+    if !fitted.downweighted.is_empty() {
+        services.note(downweighted(&fitted.downweighted, &fitting.recording.point_id));
     }
 }
+
+/// How many rows count less than others, and which the least.
+fn downweighted(weights: &BTreeMap<usize, f64>, names: &[String]) -> String {
+    let mut least: Vec<(&usize, &f64)> = weights.iter().collect();
+    least.sort_by(|a, b| a.1.total_cmp(b.1));
+    let named: Vec<String> = least.iter().take(NAMED).map(|(row, weight)| format!("{} to {weight:.2}", names[**row])).collect();
+    let more = if least.len() > NAMED { ", ..." } else { "" };
+    format!("far off and down-weighted: {} ({}{more})", counted(weights.len(), "row"), named.join(", "))
+}
+
+/// Down-weighted rows that are named.
+const NAMED: usize = 3;
 
 /// No arm is that far off in orientation (rad); angles read in another convention are.
 const ASKEW: f64 = 0.02;

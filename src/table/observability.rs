@@ -103,7 +103,7 @@ impl Observability {
                 "poses: not enough, or too many, for the folds that were asked for, so that nothing was cross-validated",
             );
         }
-        push("downweighted", 0, fitted.downweighted as f64, "fitted rows with reduced weight (Huber)");
+        push("downweighted", 0, fitted.downweighted.len() as f64, "fitted rows with reduced weight (Huber)");
         for (name, value, meaning) in &fitted.indices {
             push(name, 0, *value, meaning);
         }

@@ -31,6 +31,9 @@ crate::table::rows! { "prediction",
         fold_error_mm: Option<f64>,
         /// The same with contiguous stretches of the recording as folds.
         block_error_mm: Option<f64>,
+        /// Huber's weight in the fit of this step: 1 of a row that counts in full, 0 of one set aside; null where the step was not fitted
+        /// to the row.
+        weight: Option<f64>,
         /// What was measured, where it was not a whole point: its axes, e.g. `z`, `rotation`, `distance`. Residual and error then are
         /// those of the axes, or else of the distance.
         measured: Option<String>,
@@ -41,7 +44,7 @@ crate::table::rows! { "prediction",
     }
 }
 
-use crate::estimate::{Covariance, Model};
+use crate::estimate::{Covariance, Fitted, Model};
 use crate::observation::{KINDS, noise};
 use crate::robot::Measurements;
 use crate::table::{Recording, Split};
@@ -93,6 +96,7 @@ impl Prediction {
                 sigma_mm: sigma.as_ref().map(|all| all[row] * 1e3),
                 fold_error_mm: None,
                 block_error_mm: None,
+                weight: None,
                 measured: (!whole).then(|| measured(data, row)),
                 turn_rad: error.and_then(|error| error.angle),
                 remark: None,
@@ -132,6 +136,13 @@ impl Prediction {
             self.0[*row].fold_error_mm = Some(fold * 1e3);
             self.0[*row].block_error_mm = Some(block * 1e3);
         }
+        self
+    }
+
+    /// The same with the weights of `rows` in a fit to them; 0 of those that were set aside.
+    pub fn with_weights(mut self, rows: &[usize], fitted: &Fitted) -> Self {
+        rows.iter().for_each(|row| self.0[*row].weight = Some(fitted.downweighted.get(row).copied().unwrap_or(1.0)));
+        self.0.iter_mut().filter(|row| row.suspect).for_each(|row| row.weight = Some(0.0));
         self
     }
 

@@ -99,6 +99,7 @@ fn arm(rows: usize, signal: f64, noise: f64, seed: u64) -> (Recording, Split, Pr
             sigma_mm: None,
             fold_error_mm: None,
             block_error_mm: None,
+            weight: None,
             measured: None,
             turn_rad: None,
             remark: None,

@@ -1,6 +1,6 @@
 //! Every pipeline of the repository: checked, and run where its data are at hand.
 
-use crate::desk::skipped;
+use crate::desk;
 use calib::error::Error;
 use calib::pipeline::Plan;
 use calib::stage::STAGES;
@@ -69,7 +69,7 @@ fn every_pipeline_is_sound_and_runs_where_its_data_are() {
     for file in pipelines() {
         let name = file.strip_prefix(root()).unwrap().display().to_string();
         if let Some(missing) = missing_data(&file) {
-            skipped(&format!("{name}: {}", missing.lines().next().unwrap_or_default()));
+            desk::missing(&format!("{name}: {}", missing.lines().next().unwrap_or_default()));
             continue;
         }
         let store = tempfile::tempdir().unwrap();

@@ -5,7 +5,7 @@ use crate::sr210d::{experiment, settings};
 use calib::stage::ingest::{Ingest, IngestReads};
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Identify, IdentifyReads, ReadRobot, RobotReads};
-use calib::table::{Prediction, Recording, Robot, Split, Suspects};
+use calib::table::{Prediction, PredictionRow, Recording, Robot, Split, Suspects};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::path::Path;
@@ -116,7 +116,19 @@ fn suspects_are_named_to_the_person_listed_and_still_predicted() {
     assert_eq!((prediction.0.len(), marked), (recording.rows(), 4));
     // A row that was looked at to set it aside is no held-out row of the fit's own set.
     assert!(prediction.0.iter().all(|row| row.set != "unloaded_fit" || !row.held_out));
+    let weight = |row: &PredictionRow| match (row.suspect, row.set.as_str()) {
+        (true, _) => row.weight == Some(0.0),
+        (false, "unloaded_fit") => row.weight.is_some_and(|weight| weight > 0.0),
+        _ => row.weight.is_none(),
+    };
+    assert!(prediction.0.iter().all(weight));
     stage.screen = false;
-    let (suspects, prediction) = identify(&Desk::default(), &stage, inputs());
+    let desk = Desk::default();
+    let (suspects, prediction) = identify(&desk, &stage, inputs());
     assert_eq!((suspects.0.len(), prediction.0.iter().filter(|row| row.suspect).count()), (0, 0));
+    // Rows that are not set aside count the less the farther off they are, and the note names them.
+    let least = prediction.0[inch].weight.expect("a fitted row");
+    assert!(least < 0.01 && prediction.0.iter().filter_map(|row| row.weight).all(|weight| weight >= least), "{least}");
+    let said = desk.notes.lock().unwrap().join("\n");
+    assert!(said.contains("far off and down-weighted: ") && said.contains(&format!("({} to 0.0", id(inch))), "{said}");
 }

@@ -183,7 +183,7 @@ fn duckdb_pandas_pyarrow_and_polars_read_every_table_with_its_units_and_key() {
     let run = |arguments: &[&std::ffi::OsStr]| std::process::Command::new(&python).args(arguments).output();
     let import = "import duckdb, pandas, polars, pyarrow";
     if !run(&["-c".as_ref(), import.as_ref()]).is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: {python} has not all of duckdb, pandas, pyarrow and polars");
+        crate::desk::skipped(&format!("{python} has not all of duckdb, pandas, pyarrow and polars"));
         return;
     }
     let folder = tempfile::tempdir().unwrap();

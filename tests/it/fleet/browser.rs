@@ -58,7 +58,7 @@ fn chromium() -> Option<PathBuf> {
 #[test]
 fn a_browser_sorts_and_filters_the_page_without_a_request() {
     let Some(chromium) = chromium() else {
-        println!("skipped: no chromium on PATH");
+        crate::desk::skipped("no chromium on PATH");
         return;
     };
     // The page's own script, driven as a person would.

@@ -26,6 +26,7 @@ pub fn point(sequence: i64, step: &str, set: &str, held_out: bool, residual: [f6
         sigma_mm: None,
         fold_error_mm: None,
         block_error_mm: None,
+        weight: None,
         measured: None,
         turn_rad: None,
         remark: None,
