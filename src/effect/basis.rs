@@ -91,7 +91,7 @@ pub enum Basis {
         /// Of the power.
         exponent: f64,
     },
-    /// The same from `start` on; 1 later than [`CREEPING`] times the way.
+    /// The same from `start` on; 1 later than `CREEPING` times the way.
     Creep {
         /// Where it is zero.
         start: f64,

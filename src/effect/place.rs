@@ -66,7 +66,7 @@ impl fmt::Display for Place {
 impl FromStr for Place {
     type Err = ();
 
-    /// Reads what [`Place::to_string`] or [`Place::tag`] wrote.
+    /// Reads what its text or [`Place::tag`] wrote.
     fn from_str(text: &str) -> Result<Self, ()> {
         let one = |number: &str| number.parse::<usize>().ok()?.checked_sub(1);
         let two = |first: &str, second: &str| Some((one(first)?, one(second)?));

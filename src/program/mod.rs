@@ -1,6 +1,6 @@
 //! Programs of robot controllers, read strictly and rewritten: only the numbers of targets change, every other byte stays.
 //!
-//! KUKA KRL ([`krl`]) and ABB RAPID ([`rapid`]). A target is accepted where its literal is understood exactly: every field known, named
+//! KUKA KRL (`krl`) and ABB RAPID (`rapid`). A target is accepted where its literal is understood exactly: every field known, named
 //! once, one number each. What cannot be told to be a target or not refuses the program; nothing is guessed. A program is parsed
 //! whole before anything is solved, so that all its faults come at once. Joint positions that a program declares under names are a table,
 //! too ([`joint_list`]).

@@ -126,7 +126,7 @@ pub trait Writes: Sized {
     fn give(self) -> Result<Vec<Output>>;
 }
 
-/// What a stage hands back on one port: columns in memory, or a table already streamed through [`Context::sink`].
+/// What a stage hands back on one port: columns in memory, or a table already streamed through [`Services::sink`].
 pub enum Output {
     /// Columns in memory.
     Frame(Frame),

@@ -1,6 +1,6 @@
 //! The bridge between Parquet columns and Rust values: one file per table, one schema file each in `schemas/`.
 //!
-//! Most tables are a list of rows declared by [`rows!`]; only the recording, whose columns depend on the number of joints,
+//! Most tables are a list of rows declared by `rows!`; only the recording, whose columns depend on the number of joints,
 //! is written by hand.
 
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! A Gaussian process with a squared exponential kernel, a length for each input, and the three axes apart but alike.
 //!
 //! `k(x, x') = s^2 exp(-1/2 sum (x - x')^2 / l^2)`; lengths, signal and noise maximise the marginal likelihood (Rasmussen and
-//! Williams 2006, Eqs. 2.30 and 5.9) on at most [`TUNED`] rows; at most [`ROWS`] rows are remembered.
+//! Williams 2006, Eqs. 2.30 and 5.9) on at most `TUNED` rows; at most `ROWS` rows are remembered.
 
 use super::descent::descend;
 use super::perceptron::OUTPUTS;
