@@ -14,6 +14,7 @@ mod lineage;
 mod log;
 mod means;
 mod model_arguments;
+mod paint;
 mod panics;
 mod pipeline_arguments;
 mod poses;
@@ -145,12 +146,11 @@ fn emit(text: &str) -> Result<()> {
     }
 }
 
-/// Lines of a result, folded where stdout is a terminal.
+/// Lines of a result, folded and in colour where stdout is a terminal.
 fn emit_lines(text: &str) -> Result<()> {
-    match surroundings::columns() {
-        Some(columns) => emit(&crate::summary::folded(text, columns)),
-        None => emit(text),
-    }
+    let Some(columns) = surroundings::columns() else { return emit(text) };
+    let text = crate::summary::folded(text, columns);
+    emit(&if surroundings::colours() { paint::painted(&text) } else { text })
 }
 
 fn emit_json(value: &serde_json::Value) -> Result<()> {

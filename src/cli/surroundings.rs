@@ -43,6 +43,12 @@ fn peak_memory() -> Option<u64> {
     Some(line.trim().strip_suffix(" kB")?.parse::<u64>().ok()? * 1024)
 }
 
+/// Whether a person wants colours on a terminal: https://no-color.org.
+pub(super) fn colours() -> bool {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
 /// Columns of the terminal, where stdout is one.
 pub(super) fn columns() -> Option<usize> {
     let out = std::io::stdout();

@@ -76,6 +76,12 @@ pub trait Cause: Sync {
         false
     }
 
+    /// The size (one sigma, SI) that the coefficients of a law are held to where the rows do not determine them; nothing where they are
+    /// free.
+    fn held(&self, _term: &Term) -> Option<f64> {
+        None
+    }
+
     /// Causes whose small rest at the same joint is the finer shape of this one, where it is not quite that of the library.
     fn finer(&self) -> &'static [&'static str] {
         &[]

@@ -37,9 +37,9 @@ pub trait Placed: Effect + Any {
     fn free_curve(&self) -> std::ops::Range<usize> {
         0..0
     }
-    /// A parameter, by its number, that is held to a size known beforehand (one sigma, SI), so that it carries on no further than that
-    /// where the rows do not determine it.
-    fn held(&self) -> Option<(usize, f64)> {
+    /// Parameters, by their numbers, that are held to a size known beforehand (one sigma, SI), so that they carry on no further than that
+    /// where the rows do not determine them.
+    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
         None
     }
     /// The law, where it is one at a place.

@@ -48,7 +48,7 @@ impl Cause for GearCyclic {
             orders::within_travel(survey, joint, ORDERS).flat_map(move |order| {
                 let pure = Hypothesis::new(Self::term(joint, order, false), if order > LOW { ORDERS as usize } else { 6 });
                 let wheel = (order <= LOW).then(|| Hypothesis::new(Self::term(joint, order, true), 6).penalised(OVERTONE));
-                [Some(pure), wheel].into_iter().flatten()
+                [Some(pure), wheel].into_iter().flatten().map(|hypothesis| hypothesis.within(orders::BEYOND))
             })
         });
         forms.collect()
@@ -72,6 +72,10 @@ impl Cause for GearCyclic {
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))
+    }
+
+    fn held(&self, _term: &Term) -> Option<f64> {
+        Some(orders::LARGE)
     }
 
     fn finer(&self) -> &'static [&'static str] {

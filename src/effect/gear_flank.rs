@@ -45,6 +45,10 @@ impl Cause for GearFlank {
         orders::variant(term)
     }
 
+    fn held(&self, _term: &Term) -> Option<f64> {
+        Some(orders::LARGE)
+    }
+
     fn sentence(&self, summary: &Summary) -> String {
         let orders = orders::in_words(summary, self.name());
         format!("the two flanks of the teeth of {} err differently: {} to either side", summary.place, orders)

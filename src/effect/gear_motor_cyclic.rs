@@ -38,6 +38,10 @@ impl Cause for GearMotorCyclic {
         orders::variant(term)
     }
 
+    fn held(&self, _term: &Term) -> Option<f64> {
+        Some(orders::LARGE)
+    }
+
     fn sentence(&self, summary: &Summary) -> String {
         let amplitude = amplitude(&summary.parameters.iter().collect::<Vec<_>>());
         format!("{} errs periodically with its motor's angle, amplitude {amplitude}", summary.place)

@@ -229,12 +229,12 @@ impl Placed for BentWindup {
         if let HardeningLaw::Curve { .. } = self.law { 1..1 + CURVE } else { 0..0 }
     }
 
-    fn held(&self) -> Option<(usize, f64)> {
+    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
         match self.law {
             HardeningLaw::Saturating { at_nm }
             | HardeningLaw::SoftZone { at_nm }
             | HardeningLaw::Knee { at_nm }
-            | HardeningLaw::Power { at_nm, .. } => Some((1, LARGE / at_nm)),
+            | HardeningLaw::Power { at_nm, .. } => Some((1..2, LARGE / at_nm)),
             HardeningLaw::Curve { .. } => None,
         }
     }

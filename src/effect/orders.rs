@@ -7,6 +7,10 @@ use crate::units::Unit;
 /// An order needs this much of its phase (rad) within the joint's travel to be more than a line.
 const PHASE: f64 = 2.2;
 
+/// Twice what the worst gears and encoders err by, rad (206 arcsec), and what none does.
+pub(super) const LARGE: f64 = 1e-3;
+pub(super) const BEYOND: f64 = 5e-3;
+
 /// A sine and a cosine of `order` times the variable.
 pub(super) fn wave(of: Variable, order: u32) -> Law {
     Law::new(of, Basis::Wave { order, overtone: false })

@@ -145,6 +145,10 @@ impl Placed for Term {
         Some(self)
     }
 
+    fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
+        Some((0..self.law.count(), self.cause.held(self)?))
+    }
+
     fn free_curve(&self) -> std::ops::Range<usize> {
         if self.is_own_curve() { 0..self.law.count() } else { 0..0 }
     }

@@ -3,6 +3,7 @@
 use super::basis::around;
 use super::joint_table::PLAUSIBLE;
 use super::motion::{SHORT, extent};
+use super::orders;
 use super::sighted;
 use super::unweighed_windup::is_unweighed;
 use super::{
@@ -190,6 +191,12 @@ impl Cause for Unknown {
                 numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
             }
         }
+    }
+
+    fn held(&self, term: &Term) -> Option<f64> {
+        let loaded = term.law().times.is_some_and(|factor| matches!(factor.of, Variable::Load { .. }));
+        let of_joint = matches!(term.motion(), Motion::Joint { .. });
+        (of_joint && !loaded && !term.is_own_curve()).then_some(orders::LARGE)
     }
 
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {

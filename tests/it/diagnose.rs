@@ -472,3 +472,19 @@ fn what_no_pose_tells_apart_is_said_with_what_would() {
         assert_eq!((code, said.contains(wanted)), (Some(2), true), "{said}");
     }
 }
+
+#[test]
+fn of_few_rows_no_law_takes_a_size_that_no_gear_has() {
+    // 51 rows of an arm with four soft joints and a wrong mass, 34 parameters of the base: gears of 2700 arcsec explained as much of them.
+    let folder = tempfile::tempdir().expect("a folder");
+    case_with(folder.path(), &[]);
+    let rows = format!("case={}/tests/it/diagnose/few_rows", env!("CARGO_MANIFEST_DIR"));
+    let said = calib(&["diagnose", "p.yaml", "--set", &rows, "--json", "--quiet"], folder.path());
+    let said: Value = serde_json::from_str(&said).expect("JSON");
+    let findings = said["findings"].as_array().expect("a list").iter().filter(|finding| finding["effect"] != "outlier");
+    let mut names: Vec<String> = findings.map(|finding| format!("{} {}", finding["effect"], finding["where"])).collect();
+    names.sort();
+    assert_eq!(names, [2, 3, 4, 5].map(|joint| format!("\"joint_compliance\" \"joint {joint}\"")));
+    // The instrument's noise is 0.017 mm.
+    assert!(said["after"]["validate_rms_mm"].as_f64().is_some_and(|rms| rms < 0.03), "{}", said["after"]);
+}

@@ -248,6 +248,20 @@ fn without_numbers(sentence: &str) -> String {
 }
 
 #[test]
+fn what_rows_do_not_determine_is_held_to_what_gears_err_by() {
+    let mut held: BTreeSet<String> = BTreeSet::new();
+    over_all(|_, hypothesis| {
+        if let Some((numbers, sigma)) = hypothesis.form.held() {
+            let all = numbers.len() == hypothesis.form.term().map_or(1, |term| term.law().count());
+            held.insert(format!("{} {all} {sigma:.0e}", hypothesis.form.name()));
+        }
+    });
+    for name in ["gear_cyclic", "gear_flank", "gear_motor_cyclic", "unknown"] {
+        assert!(held.contains(&format!("{name} true 1e-3")), "{name}: {held:?}");
+    }
+}
+
+#[test]
 fn every_sentence_is_as_it_was_read() {
     let mut said: BTreeSet<String> = BTreeSet::new();
     over_all(|survey, hypothesis| {

@@ -56,7 +56,7 @@ impl EstimatedCause {
         let share = |k: usize| if k < curve.start + SLOW { GEOMETRY } else { 1.0 };
         let of_curve = |k: usize, plausible: f64| (share(k) * plausible.min(TYPICAL * typical)).max(f64::MIN_POSITIVE.sqrt());
         let sigma = |k: usize, spec: ParameterSpec| match held {
-            Some((number, sigma)) if number == k => sigma,
+            Some((ref numbers, sigma)) if numbers.contains(&k) => sigma,
             _ if curve.contains(&k) => of_curve(k, spec.prior_sigma),
             _ => spec.prior_sigma,
         };

@@ -42,9 +42,17 @@ pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
     }
 }
 
-/// A round in a line, which leaves what is noise with a probability of `rest`.
+/// Causes of a round that are named.
+const NAMED: usize = 4;
+
+/// A round in a line, which leaves a residual that noise alone makes with a probability of `rest`.
 pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl Iterator<Item = &'f Form>, rest: f64) -> String {
-    let keys: Vec<String> = forms.map(|form| format!("; {}", form.key())).collect();
-    let (tried, causes) = (pool.hypotheses.len(), counted(keys.len(), "cause"));
-    format!("round {round}: {tried} hypotheses, {causes}{} (p = {rest:.3} of such a residual from noise alone)", keys.concat())
+    let names: Vec<String> = forms.map(|form| format!("{} at {}", form.name(), form.place())).collect();
+    let (tried, causes) = (pool.hypotheses.len(), counted(names.len(), "cause"));
+    let mut shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > NAMED {
+        shown.push_str(", ...");
+    }
+    let shown = if shown.is_empty() { shown } else { format!(" ({shown})") };
+    format!("round {round}: {tried} hypotheses, {causes}{shown}; p = {rest:.3} of such a residual from noise alone")
 }
