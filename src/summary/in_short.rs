@@ -22,7 +22,7 @@ pub fn in_short(
     let rows = rows(outcome, store)?;
     let last = || rows.iter().max_by_key(|row| row.order).map(|row| row.step.as_str());
     let Some(step) = standing.map(|stands| stands.step.as_str()).or_else(last) else { return Ok(None) };
-    let own = rows.iter().filter(|row| row.step == step && row.reference.is_none());
+    let own = rows.iter().filter(|row| row.step == step);
     let Some(after) = own.max_by_key(|row| (row.held_out, row.points)) else { return Ok(None) };
     let earlier = rows.iter().filter(|row| row.set == after.set && row.order < after.order);
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));

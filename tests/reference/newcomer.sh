@@ -9,7 +9,7 @@ set -eu
 clone=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$clone"
 if [ -z "${CALIB:-}" ]; then
-    cargo build
+    cargo build --no-default-features
     CALIB=target/debug/calib
 fi
 CALIB=$(cd "$(dirname "$CALIB")" && pwd)/$(basename "$CALIB")
