@@ -91,11 +91,11 @@ mod tests {
         let said = |basis, instrument| statement(VerdictKind::NothingMissing, &ground(basis, instrument));
         assert_eq!(
             said(NoiseBasis::Repeats, Some(17e-6)),
-            "nothing found; what is left is the noise that 24 repeats show, 31 um"
+            "nothing found; the residual agrees with the noise that 24 repeats show, 31 um"
         );
         assert_eq!(
             said(NoiseBasis::Instrument, Some(17e-6)),
-            "nothing found; what is left is the noise that the instrument states, 31 um"
+            "nothing found; the residual agrees with the noise that the instrument states, 31 um"
         );
         assert_eq!(
             said(NoiseBasis::Inferred, Some(17e-6)),
@@ -115,33 +115,33 @@ mod tests {
             (
                 VerdictKind::Explained,
                 NoiseBasis::Repeats,
-                "what was found explains the error; what is left is the noise that 24 repeats show, 31 um",
+                "the findings explain the error; the residual agrees with the noise that 24 repeats show, 31 um",
             ),
             (
                 VerdictKind::Explained,
                 NoiseBasis::Instrument,
-                "what was found explains the error; what is left is the noise that the instrument states, 31 um",
+                "the findings explain the error; the residual agrees with the noise that the instrument states, 31 um",
             ),
             (
                 VerdictKind::Explained,
                 NoiseBasis::Inferred,
-                "what was found explains the error but for noise; 31 um scatter at random, of which the instrument explains 8.2: \
+                "the findings explain the error except for noise; 31 um scatter at random, of which the instrument explains 8.2: \
                  measure ten poses twice",
             ),
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Repeats,
-                "the findings do not explain all: 32 um are left, against the noise that 24 repeats show, 31 um",
+                "the findings do not explain everything: 32 um remain, against the noise that 24 repeats show, 31 um",
             ),
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Instrument,
-                "the findings do not explain all: 32 um are left, against the noise that the instrument states, 31 um",
+                "the findings do not explain everything: 32 um remain, against the noise that the instrument states, 31 um",
             ),
             (
                 VerdictKind::Unexplained,
                 NoiseBasis::Inferred,
-                "the findings do not explain all: 32 um are left; 31 um scatter at random, of which the instrument explains 8.2: \
+                "the findings do not explain everything: 32 um remain; 31 um scatter at random, of which the instrument explains 8.2: \
                  measure ten poses twice",
             ),
         ] {
