@@ -109,6 +109,12 @@ pub fn nearest<'a>(given: &str, allowed: impl IntoIterator<Item = &'a str>) -> O
         .map(|(_, name)| name)
 }
 
+/// What may stand there instead: `; did you mean X? Allowed: X, Y`.
+pub fn instead(found: &str, allowed: &[&str]) -> String {
+    let hint = nearest(found, allowed.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
+    format!("{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::counted;

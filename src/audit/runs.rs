@@ -4,9 +4,10 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 
 use crate::diff::{DiffOptions, TableDiff, compare};
-use crate::error::Result;
+use crate::error::{Error, Result, nearest};
 use crate::pipeline::{KeyChange, Manifest, OutputRecord, changes_of};
 use crate::store::Store;
+use crate::store::schema::{self, TableSchema};
 
 /// Two runs compared.
 #[derive(Debug, Clone, Serialize)]
@@ -64,7 +65,8 @@ impl RunDiff {
     }
 }
 
-/// Compares run `a` with run `b`: all stages or one, all its ports or one.
+/// Compares run `a` with run `b`: all stages or one, all its ports or one. Tolerances and columns that are left out hold in every table
+/// that has the column; fails where no table that both have does.
 pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &DiffOptions) -> Result<RunDiff> {
     let (left, right) = (Manifest::of(store, &a.run)?, Manifest::of(store, &b.run)?);
     let (outputs_a, outputs_b) = (outputs(&left, a), outputs(&right, b));
@@ -72,6 +74,9 @@ pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &Dif
     // In the order of the pipeline, what only A has last.
     let mut order: Vec<&String> = outputs_b.iter().map(|(name, _)| name).collect();
     order.extend(names.into_iter().filter(|name| !outputs_b.iter().any(|(other, _)| other == *name)));
+    let common = outputs_b.iter().filter(|(name, _)| outputs_a.iter().any(|(other, _)| other == name));
+    known_columns(&common.map(|(_, output)| output.kind.as_str()).collect(), options)?;
+    let options = &DiffOptions { where_present: true, ..options.clone() };
     let mut tables = Vec::new();
     for name in order {
         let of = |outputs: &[(String, OutputRecord)]| {
@@ -80,6 +85,26 @@ pub fn compare_runs(store: &Store, a: &RunAddress, b: &RunAddress, options: &Dif
         tables.push(table(store, name, of(&outputs_a), of(&outputs_b), options)?);
     }
     Ok(RunDiff { a: told(&left), b: told(&right), causes: causes(&left, &right), tables })
+}
+
+/// Columns in the options must be those of some of these kinds of tables.
+fn known_columns(kinds: &BTreeSet<&str>, options: &DiffOptions) -> Result<()> {
+    let schemas: Vec<&TableSchema> = schema::all().filter(|schema| kinds.contains(schema.name.as_str())).collect();
+    let wishes = [
+        ("--ignore", options.ignore.iter().collect::<Vec<_>>()),
+        ("--atol", options.atol.columns.keys().collect()),
+        ("--rtol", options.rtol.columns.keys().collect()),
+    ];
+    for (flag, names) in wishes {
+        let unknown = names.into_iter().find(|name| schemas.iter().all(|schema| schema.field_of(name).is_none()));
+        if let Some(name) = unknown {
+            let columns = schemas.iter().flat_map(|schema| &schema.fields).map(|field| field.name.as_str());
+            let hint = nearest(name, columns).map(|near| format!("; did you mean `{near}`?"));
+            let message = format!("no column `{name}` in any table that both runs have{}", hint.unwrap_or_default());
+            return Err(Error::spec(flag, message));
+        }
+    }
+    Ok(())
 }
 
 /// A run, or one stage of it, or one of its tables.

@@ -1,7 +1,7 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm};
+use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm, Stated};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
@@ -12,6 +12,7 @@ use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
+use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -136,16 +137,39 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
             faults.push(Fault::new(option, format!("unknown unit `{given}`; allowed: {}", Unit::symbols(quantity).join(", "))));
         }
     }
-    if !(arguments.payload.is_finite() && arguments.payload >= 0.0) {
-        faults.push(Fault::new("--payload", format!("expected a mass of 0 or more, kg, found {}", arguments.payload)));
-    }
+    faults.extend(Stated::Payload.fault(arguments.payload).map(|message| Fault::new("--payload", message)));
+    let temperature = arguments.temperature.and_then(|temperature| Stated::Temperature.fault(temperature));
+    faults.extend(temperature.map(|message| Fault::new("--temperature", message)));
     if let Some(direction) = arguments.direction.filter(|direction| direction.abs() != 1.0) {
         faults.push(Fault::new("--direction", format!("expected 1 or -1, found {direction}")));
     }
-    if arguments.out.as_ref().is_some_and(|out| same_file(out, &arguments.targets)) {
-        faults.push(Fault::new("--out", "is the targets file itself: name another file"));
+    if arguments.targets.as_os_str() != "-" {
+        faults.extend(open(&arguments.targets).err());
     }
+    faults.extend(arguments.out.as_deref().and_then(|out| misplaced(out, &arguments.targets)));
     if faults.is_empty() { Ok(()) } else { Err(Error::Spec(faults)) }
+}
+
+/// Opens targets; what is wrong is known before a pipeline is run for them.
+fn open(targets: &Path) -> Result<File, Fault> {
+    raw::open(targets).map_err(|error| Fault::new(targets.display().to_string(), format!("cannot be read: {error}")))
+}
+
+/// Why the targets cannot be written to this file.
+fn misplaced(out: &Path, targets: &Path) -> Option<Fault> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let message = if same_file(out, targets) {
+        "is the targets file itself: name another file".into()
+    } else if out.is_dir() {
+        format!("{} is a folder: name a file", out.display())
+    } else if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+        format!("{}: there is no folder {}; make it, or name a file in another one", out.display(), folder.display())
+    } else if language(targets).is_none() && is_parquet(out) != is_parquet(targets) {
+        "must have the format of the targets (text or Parquet): give it the same file ending".into()
+    } else {
+        return None;
+    };
+    Some(Fault::new("--out", message))
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
@@ -221,12 +245,7 @@ fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut C
     let Some(out) = &arguments.out else {
         return convert(&arguments.targets, std::io::stdout(), is_parquet(&arguments.targets), layout, corrector);
     };
-    let columnar = is_parquet(out);
-    if columnar != is_parquet(&arguments.targets) {
-        let message = "must have the format of the targets (text or Parquet): give it the same file ending";
-        return Err(Error::spec("--out", message));
-    }
-    whole(out, |file| convert(&arguments.targets, file, columnar, layout, corrector))
+    whole(out, |file| convert(&arguments.targets, file, is_parquet(out), layout, corrector))
 }
 
 fn convert(
@@ -236,14 +255,13 @@ fn convert(
     layout: &Layout,
     corrector: &mut Corrector,
 ) -> Result<Unreached> {
-    let open =
-        || raw::open(targets).map_err(|error| Error::spec(targets.display().to_string(), format!("cannot be read: {error}")));
+    let opened = || open(targets).map_err(|fault| Error::Spec(vec![fault]));
     let mut output = BufWriter::new(output);
     if columnar {
-        return parquet::stream(open()?, &mut output, layout, corrector);
+        return parquet::stream(opened()?, &mut output, layout, corrector);
     }
     if targets.as_os_str() == "-" {
         return text::stream(&mut BufReader::new(std::io::stdin()), &mut output, layout, corrector);
     }
-    text::stream(&mut BufReader::new(open()?), &mut output, layout, corrector)
+    text::stream(&mut BufReader::new(opened()?), &mut output, layout, corrector)
 }

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// Compare two tables or two runs: which rows changed, by how much, in the column's unit and in sigmas.
 ///
 /// Keys, tolerances and what is an angle come from the tables' schema. Rows are the same, within tolerance, changed, in one
-/// table only, or have a key that is not theirs alone. Of two runs with a diagnosis it is said which rivals of a finding B decided.
+/// table only, or have a key that is not theirs alone. Of two runs every table is compared; tolerances that are given and columns that are
+/// left out hold in each table that has the column. Of runs with a diagnosis it is said which rivals of a finding B decided.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct DiffArguments {
@@ -22,7 +23,7 @@ pub(super) struct DiffArguments {
     a: String,
     /// The same, to compare with
     b: String,
-    /// Columns that identify rows, instead of those of the schema
+    /// Columns that identify rows, instead of those of the schema; for two tables, not for runs
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     key: Vec<String>,
     /// Overlooks differences up to this, in the column's unit or in one given: 0.1, x_mm=0.1, x_mm=50um
@@ -34,7 +35,7 @@ pub(super) struct DiffArguments {
     /// Leaves columns out
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     ignore: Vec<String>,
-    /// Four columns that are one rotation; those called qw, qx, qy, qz are known
+    /// Four columns that are one rotation; those called qw, qx, qy, qz are known; for two tables, not for runs
     #[arg(long, value_name = "W,X,Y,Z")]
     quaternion: Vec<String>,
     /// Pairs rows with the same key in their order: first with first
@@ -55,7 +56,7 @@ pub(super) struct DiffArguments {
     /// Writes a page
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Writes every cell that differs as a row of a Parquet file
+    /// Writes every cell that differs as a row of a Parquet file; for two tables, not for runs
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Where runs are kept [default: .calib in the working directory]
@@ -69,6 +70,7 @@ pub(super) struct DiffArguments {
 const EXAMPLES: &str = "Examples:
   calib diff monday.parquet tuesday.parquet
   calib diff HEAD~1 HEAD
+  calib diff HEAD~1 HEAD --atol 0.001 --ignore remark
   calib diff released/joint/parameters HEAD/joint/parameters
   calib diff a.parquet b.parquet --key robot,pose --atol x_mm=50um --ignore remark
   calib diff a.parquet b.parquet --stat --out cells.parquet
@@ -97,16 +99,11 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     if let (Some(left), Some(right)) = (output(&store, &a)?, output(&store, &b)?) {
         return tables(arguments, &store.object(&left)?, &store.object(&right)?, &options);
     }
-    if options.out.is_some() {
-        return Err(Error::spec("--out", "is for two tables: name them as RUN/STAGE/PORT"));
+    let for_tables =
+        [("--key", !options.key.is_empty()), ("--quaternion", !options.quaternions.is_empty()), ("--out", options.out.is_some())];
+    if let Some((flag, _)) = for_tables.into_iter().find(|(_, given)| *given) {
+        return Err(Error::spec(flag, "is for two tables: name them as RUN/STAGE/PORT"));
     }
-    // What is asked of columns holds where a table has them, so only what the schemas say is used for runs.
-    let options = DiffOptions {
-        limit: options.limit,
-        reread: options.reread,
-        by_occurrence: options.by_occurrence,
-        ..DiffOptions::default()
-    };
     let diff = compare_runs(&store, &a, &b, &options)?;
     let rivals = rival_changes(&store, &diff, [&a, &b])?;
     if arguments.json {

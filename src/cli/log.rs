@@ -3,7 +3,8 @@
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::error::Result;
-use crate::pipeline::{Manifest, StageStatus, find_run};
+use crate::pipeline::{Manifest, RunStatus, StageStatus, find_run};
+use crate::store::Store;
 use crate::summary::status;
 use clap::Args;
 use serde_json::json;
@@ -51,11 +52,12 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
             Ok(manifest) if arguments.pipeline.as_ref().is_some_and(|name| name != &manifest.pipeline.name) => continue,
             Ok(manifest) => {
                 let names: Vec<&str> = is_head.then_some("HEAD").into_iter().chain(own.iter().copied()).collect();
-                text.push_str(&line(&manifest, &names));
+                let [executed, cached] = counts(&store, &manifest);
+                text.push_str(&line(&manifest, [executed, cached], &names));
                 rows.push(json!({
                     "run": run, "started": manifest.started, "what": manifest.what(), "pipeline": manifest.pipeline.name, "status": manifest.status,
-                    "wall_seconds": manifest.wall_seconds, "executed": count(&manifest, StageStatus::Executed),
-                    "cached": count(&manifest, StageStatus::Cached), "tags": own, "head": is_head, "error": manifest.error,
+                    "wall_seconds": manifest.wall_seconds, "executed": executed,
+                    "cached": cached, "tags": own, "head": is_head, "error": manifest.error,
                 }));
             }
             Err(error) => {
@@ -71,9 +73,8 @@ pub(super) fn main(arguments: &LogArguments) -> Result<()> {
     emit(if shown == 0 { "no runs\n" } else { &text })
 }
 
-fn line(manifest: &Manifest, tags: &[&str]) -> String {
+fn line(manifest: &Manifest, [executed, cached]: [usize; 2], tags: &[&str]) -> String {
     let status = status(manifest);
-    let (executed, cached) = (count(manifest, StageStatus::Executed), count(manifest, StageStatus::Cached));
     let seconds = manifest.wall_seconds.map_or_else(String::new, |seconds| format!("  {seconds:.1} s"));
     let tags = if tags.is_empty() { String::new() } else { format!("  [{}]", tags.join(", ")) };
     format!(
@@ -85,6 +86,11 @@ fn line(manifest: &Manifest, tags: &[&str]) -> String {
     )
 }
 
-fn count(manifest: &Manifest, status: StageStatus) -> usize {
-    manifest.stages.iter().filter(|stage| stage.status == status).count()
+/// How many stages were executed, and how many cached. The manifest of a run that did not end is older than its events.
+fn counts(store: &Store, manifest: &Manifest) -> [usize; 2] {
+    let events = if manifest.status == RunStatus::Running { store.events(&manifest.run_id) } else { Vec::new() };
+    [StageStatus::Executed, StageStatus::Cached].map(|status| {
+        let ended = events.iter().filter(|event| event["event"] == "ends" && event["detail"]["status"] == json!(status)).count();
+        manifest.stages.iter().filter(|stage| stage.status == status).count().max(ended)
+    })
 }

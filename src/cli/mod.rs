@@ -68,7 +68,7 @@ enum Verb {
     Verify(verify::VerifyArguments),
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
 
 /// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
@@ -92,7 +92,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
 
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
-        Verb::Run(verb) => run::main(&verb, arguments),
+        Verb::Run(verb) => return run::main(&verb, arguments),
         Verb::Check(verb) => check::main(&verb),
         Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),

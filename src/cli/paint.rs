@@ -1,9 +1,7 @@
 //! Colours of a result on a terminal: labels stand out, a verdict has the colour of what it means.
 
+use crate::summary::LABEL;
 use anstyle::{AnsiColor, Style};
-
-/// Columns of a label, as `summary::labelled` writes it.
-const LABEL: usize = 10;
 
 /// Labels of lines that say what is to be seen to, and all others.
 const ALARMS: [&str; 3] = ["warning", "rejected", "withdrawn"];
@@ -33,7 +31,8 @@ fn line_of(line: &str) -> String {
         () if rank || LABELS.contains(&word) => Style::new().bold(),
         () => return line.into(),
     };
-    let verdict = VERDICTS.iter().find(|(word, _)| label.starts_with("verdict") && rest.starts_with(word));
+    let judges = ["verdict", "limits"].contains(&word);
+    let verdict = VERDICTS.iter().find(|(begins, _)| judges && rest.starts_with(begins));
     let rest = match verdict {
         Some((word, colour)) => {
             let colour = Style::new().bold().fg_color(Some((*colour).into()));

@@ -1,5 +1,6 @@
 //! `calib query`: the tables of a run asked in SQL.
 
+use super::pipeline_arguments::told_as;
 use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::audit::{QueryTable, QueryTables};
@@ -47,6 +48,10 @@ pub(super) struct QueryArguments {
 }
 
 pub(super) fn main(arguments: &QueryArguments) -> Result<()> {
+    told_as(arguments.json, execute(arguments))
+}
+
+fn execute(arguments: &QueryArguments) -> Result<()> {
     let run = arguments.run.as_str();
     if run.contains(char::is_whitespace) {
         return Err(Error::spec("RUN", "the run comes before the SQL: calib query HEAD \"SELECT ...\""));

@@ -1,13 +1,13 @@
 //! `calib run`: runs what is not already done.
 
 use super::pipeline_arguments::PipelineArguments;
-use super::{emit, emit_json, emit_lines};
+use super::{complain, emit, emit_json, emit_lines};
 use crate::error::{Result, counted};
 use crate::identified::{standing_of, wrong_setup_of};
 use crate::pipeline::{CompletedRun, Forecast, Prospect, Selection, StageStatus, preview};
 use crate::raw::ending;
 use crate::store::Store;
-use crate::summary::{self, labelled};
+use crate::summary::{self, LimitsSummary, labelled};
 use crate::table::Withdrawn;
 use clap::Args;
 use serde_json::json;
@@ -18,7 +18,7 @@ use std::time::Instant;
 ///
 /// A stage is done when its settings, its input tables and files, its seed and its implementation are those of an earlier
 /// run; then its tables are taken as they are. A run that was killed goes on where it stood when the same command is given
-/// again. The result is on stdout, progress on stderr.
+/// again. The result is on stdout, progress on stderr. Where the pipeline's report has limits that are exceeded, the code is 1.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RunArguments {
@@ -51,11 +51,15 @@ const EXAMPLES: &str = "Examples:
   calib run pipeline.yaml --from stiffness --force
   calib run pipeline.yaml --json --quiet > result.json";
 
-pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
-    arguments.shared.told(execute(arguments, command_line))
+pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> u8 {
+    match arguments.shared.told(execute(arguments, command_line)) {
+        Ok(code) => code,
+        Err(error) => complain(&error),
+    }
 }
 
-fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
+/// Gives the exit code: 1 where the run went through and its result is not accepted.
+fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     let begun = Instant::now();
     let shared = &arguments.shared;
     let (plan, store) = (shared.plan()?, shared.store()?);
@@ -65,15 +69,18 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
         Selection { only: arguments.only.clone(), from: arguments.from.clone(), until: arguments.until.clone(), force };
     if arguments.dry_run {
         let forecasts = preview(&plan, &store, &selection)?;
-        return if shared.json {
-            emit_json(&json!({ "pipeline": plan.name, "stages": forecasts }))
-        } else {
-            emit(&forecast_lines(&forecasts))
-        };
+        match shared.json {
+            true => emit_json(&json!({ "pipeline": plan.name, "stages": forecasts }))?,
+            false => emit(&forecast_lines(&forecasts))?,
+        }
+        return Ok(0);
     }
     let outcome = shared.run(&plan, &store, selection, command_line)?;
+    let limits = LimitsSummary::read(&outcome, &store)?;
+    let code = u8::from(limits.accepted() == Some(false));
     if shared.json {
-        return emit_json(&document(&outcome, &store)?);
+        emit_json(&document(&outcome, &limits, &store)?)?;
+        return Ok(code);
     }
     let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
     let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store)?;
@@ -84,13 +91,18 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<()> {
         text.push_str(&summary::searches(&outcome, &store)?);
     }
     text.push_str(short.as_deref().unwrap_or_default());
+    // Of a wrong set-up nothing else is said.
+    if wrong.is_none() {
+        text.push_str(&limits.text());
+    }
     text.push_str(&summary::rejected(&outcome));
     for path in outcome.documents.iter().filter(|path| arguments.details || ending(path) == "html") {
         text.push_str(&labelled("report", &path.display().to_string()));
     }
     let more = if arguments.details || short.is_none() { "" } else { "; --details prints every step and set" };
     text.push_str(&closing(&outcome, begun.elapsed().as_secs_f64(), more));
-    emit_lines(&text)
+    emit_lines(&text)?;
+    Ok(code)
 }
 
 /// What was done; `more` is said behind it.
@@ -121,8 +133,9 @@ fn forecast_lines(forecasts: &[Forecast]) -> String {
 }
 
 /// The result of a run for other programs.
-fn document(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> {
+fn document(outcome: &CompletedRun, limits: &LimitsSummary, store: &Store) -> Result<serde_json::Value> {
     let manifest = &outcome.manifest;
+    let documents: Vec<String> = outcome.documents.iter().map(|path| path.display().to_string()).collect();
     let standing = standing_of(&outcome.manifest, store)?.map(|stands| {
         let compared = |gone: &Withdrawn| {
             json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
@@ -157,11 +170,13 @@ fn document(outcome: &CompletedRun, store: &Store) -> Result<serde_json::Value> 
         "stages": stages,
         "standing": standing,
         "wrong_setup": wrong_setup_of(manifest, store)?,
+        "accepted": limits.accepted(),
+        "limits": limits.document()?,
         "statistics": summary::statistics_json(outcome, store)?,
         "corrections": summary::corrections_json(outcome, store)?,
         "searches": summary::searches_json(outcome, store)?,
         "rejected_rows": summary::rejected_rows(outcome),
-        "report": outcome.documents.first(),
-        "documents": outcome.documents,
+        "report": documents.first(),
+        "documents": documents,
     }))
 }

@@ -38,8 +38,9 @@ pub(super) fn main(arguments: &TagArguments) -> Result<()> {
     match (&arguments.run, &arguments.name) {
         (Some(run), Some(name)) => {
             let run = find_run(&store, run)?;
-            store.tag(name, &run)?;
-            emit(&format!("{name} is run {run}\n"))
+            let before = store.tag(name, &run)?.filter(|before| *before != run);
+            let was = before.map_or_else(String::new, |before| format!(", was run {before}"));
+            emit(&format!("{name} is run {run}{was}\n"))
         }
         _ => emit(&store.tags()?.iter().map(|(name, run)| format!("{name}  {run}\n")).collect::<String>()),
     }

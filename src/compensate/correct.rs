@@ -137,13 +137,13 @@ impl CorrectionTotals {
     /// What is wrong with some of them, a sentence a line.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let all = [
-            (self.not_reached, "could not be reached and have no joints"),
-            (self.turned, "are reached in position but not in orientation: the wrist is singular there"),
-            (self.beyond_limits, "leave the joint limits"),
-            (self.beyond_measured, "are outside of what was measured: the model extrapolates there"),
+            (self.not_reached, "could not be reached and has", "could not be reached and have", "no joints"),
+            (self.turned, "is", "are", "reached in position but not in orientation: the wrist is singular there"),
+            (self.beyond_limits, "leaves", "leave", "the joint limits"),
+            (self.beyond_measured, "is", "are", "outside of what was measured: the model extrapolates there"),
         ];
-        let said = all.into_iter().filter(|(count, _)| *count > 0);
-        said.map(|(count, what)| format!("{count} of them {what}"))
+        let said = all.into_iter().filter(|(count, ..)| *count > 0);
+        said.map(|(count, one, several, what)| format!("{count} of them {} {what}", if count == 1 { one } else { several }))
     }
 }
 

@@ -12,6 +12,7 @@ mod inverse;
 mod remark;
 mod rigid;
 mod solve;
+mod stated;
 mod uncertainty;
 
 pub use arm::{Circumstance, IdentifiedArm, Reach};
@@ -22,4 +23,5 @@ pub use inverse::inverse;
 pub use remark::Remark;
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};
+pub use stated::Stated;
 pub use uncertainty::{PositionUncertainty, Scatter, Uncertainty};

@@ -17,11 +17,13 @@ pub(crate) struct Misfit {
     /// Rms length of what is left at fitted rows, m, and reduced chi-square there.
     pub leftover_rms: f64,
     pub chi_square: f64,
-    /// Whether held-out rows are off by more than what was fitted and the noise allow.
-    pub not_carried: bool,
+    /// Rms length of what is left at held-out rows that belong, m, where it is more than what was fitted and the noise allow.
+    pub not_carried: Option<f64>,
 }
 
-/// A residual this much larger than the noise is not explained.
+/// A residual this much larger than the noise, in mean square, does not agree with it: where it has structure it is not explained ...
+pub(crate) const LOUD: f64 = 1.25;
+/// ... and this much larger it is not whatever it looks like.
 pub(crate) const TOO_LOUD: f64 = 2.5;
 
 impl Misfit {
@@ -48,22 +50,27 @@ impl Misfit {
         let freedom = (3 * kept.len()).saturating_sub(parameters).max(1) as f64;
         // Points that were not fitted also see the errors of what was.
         let inflation = 1.0 + parameters as f64 / freedom;
+        let left = |row: usize| (data.position[row] - predicted[row]).norm();
         let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
+        let not_carried = not_carried.then(|| rms(&judges, &left));
         let rows = if held_out { judges } else { kept.clone() };
         Self {
             held_out,
             noise_floor: rms(&rows, &|row| data.noise(row)),
             instrument: rms(&rows, &|row| data.sigma[row].norm()),
-            leftover_rms: rms(kept, &|row| (data.position[row] - predicted[row]).norm()),
+            leftover_rms: rms(kept, &left),
             chi_square: whitened(kept) / freedom,
             not_carried,
             rows,
         }
     }
 
-    /// What a verdict on it rests on.
-    pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize) -> Ground {
+    /// What a verdict on it rests on; `nameless` where something was found that has no name.
+    pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize, nameless: bool) -> Ground {
         Ground {
+            agrees: self.chi_square <= LOUD,
+            not_carried: self.not_carried,
+            nameless,
             basis,
             repeats,
             noise: self.noise_floor,

@@ -23,6 +23,8 @@ pub struct Question<'a> {
     pub without: &'a [String],
     /// Effects that the user declares: they are tried beside the library's.
     pub own: &'a [&'static DeclaredCause],
+    /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
+    pub beside_simulation: bool,
     /// Of the bootstrap and the folds.
     pub seed: u64,
 }
@@ -41,7 +43,7 @@ pub struct JointRepeatability {
 pub struct Evidence {
     /// Of the finding beside all others.
     pub f_statistic: f64,
-    /// Probability that noise gives as much to any hypothesis.
+    /// Chance that noise gives as much to this form alone: the search among many is in the probabilities, not in this.
     pub p_value: f64,
     /// How much worse the criterion is without it.
     pub delta_bic: f64,

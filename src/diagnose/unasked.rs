@@ -27,7 +27,7 @@ pub(super) fn unasked(
     let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
     Diagnosis {
         verdict,
-        statement: statement(verdict, &misfit.ground(data, data.noise_basis, 0)),
+        statement: statement(verdict, &misfit.ground(data, data.noise_basis, 0, false)),
         noise_basis: data.noise_basis,
         noise_floor: misfit.noise_floor,
         before: ErrorLengths::of(data, &predicted, &misfit.rows),

@@ -5,6 +5,7 @@ use crate::error::counted;
 use crate::robot::NoiseBasis;
 
 /// What a verdict rests on; lengths of a point's error, rms, m.
+#[derive(Clone, Copy)]
 pub(crate) struct Ground {
     pub basis: NoiseBasis,
     /// Repeats that the noise was learnt from.
@@ -15,6 +16,12 @@ pub(crate) struct Ground {
     pub instrument: Option<f64>,
     /// What is left at fitted rows.
     pub left: f64,
+    /// Whether what is left is no more than the noise gives.
+    pub agrees: bool,
+    /// What is left of held-out points, where they are off by more than what was fitted and the noise allow.
+    pub not_carried: Option<f64>,
+    /// Whether only causes without a name were found.
+    pub nameless: bool,
     /// Whether the arm moved while it was measured: no pose can be measured twice.
     pub in_motion: bool,
 }
@@ -26,6 +33,27 @@ impl Ground {
             NoiseBasis::Repeats => format!("the noise that {} show, {} um", counted(self.repeats, "repeat"), um(self.noise)),
             NoiseBasis::Instrument => format!("the noise that the instrument states, {} um", um(self.noise)),
             NoiseBasis::Inferred => format!("{}: {}", self.at_random(), self.advice()),
+        }
+    }
+
+    /// What is left beside the noise, after all that was found.
+    fn of_the_rest(&self) -> String {
+        match self.agrees {
+            true => format!("the residual agrees with {}", self.of_noise()),
+            false => format!("{} um remain, against {}", um(self.left), self.of_noise()),
+        }
+    }
+
+    /// Why the error is not explained.
+    fn of_what_is_missing(&self) -> String {
+        let left = um(self.left);
+        match self.not_carried {
+            Some(held_out) => format!(
+                "the findings do not explain everything: {} um remain of held-out points, {left} um of fitted ones",
+                um(held_out)
+            ),
+            None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} um remain"),
+            None => format!("the findings do not explain everything: {left} um remain"),
         }
     }
 
@@ -58,15 +86,13 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
     let inferred = ground.basis == NoiseBasis::Inferred;
     match verdict {
         VerdictKind::NothingMissing if inferred => format!("nothing found; {}", ground.of_noise()),
-        VerdictKind::NothingMissing => format!("nothing found; the residual agrees with {}", ground.of_noise()),
+        VerdictKind::NothingMissing => format!("nothing found; {}", ground.of_the_rest()),
         VerdictKind::Explained if inferred => format!("the findings explain the error except for noise; {}", ground.of_noise()),
-        VerdictKind::Explained => format!("the findings explain the error; the residual agrees with {}", ground.of_noise()),
+        VerdictKind::Explained => format!("the findings explain the error; {}", ground.of_the_rest()),
         VerdictKind::Unexplained if inferred => {
-            format!("the findings do not explain everything: {} um remain; {}", um(ground.left), ground.of_noise())
+            format!("{}; {}", ground.of_what_is_missing(), ground.of_noise())
         }
-        VerdictKind::Unexplained => {
-            format!("the findings do not explain everything: {} um remain, against {}", um(ground.left), ground.of_noise())
-        }
+        VerdictKind::Unexplained => format!("{}, against {}", ground.of_what_is_missing(), ground.of_noise()),
         VerdictKind::WrongSetup => "the set-up is wrong: correct it first; no physical cause was tested".into(),
         VerdictKind::NotAsked => "too few rows were fitted to determine what the simulation lacks".into(),
     }
@@ -83,7 +109,17 @@ mod tests {
     use super::*;
 
     fn ground(basis: NoiseBasis, instrument: Option<f64>) -> Ground {
-        Ground { basis, repeats: 24, noise: 31e-6, instrument, left: 32e-6, in_motion: false }
+        Ground {
+            basis,
+            repeats: 24,
+            noise: 31e-6,
+            instrument,
+            left: 32e-6,
+            agrees: true,
+            not_carried: None,
+            nameless: false,
+            in_motion: false,
+        }
     }
 
     #[test]
@@ -147,6 +183,24 @@ mod tests {
         ] {
             assert_eq!(said(verdict, basis), sentence);
         }
+    }
+
+    #[test]
+    fn what_is_left_agrees_with_the_noise_only_where_it_does_and_says_of_which_points_it_is() {
+        let ground = ground(NoiseBasis::Repeats, Some(17e-6));
+        assert_eq!(
+            statement(VerdictKind::NothingMissing, &Ground { agrees: false, left: 46e-6, ..ground }),
+            "nothing found; 46 um remain, against the noise that 24 repeats show, 31 um"
+        );
+        assert_eq!(
+            statement(VerdictKind::Unexplained, &Ground { not_carried: Some(80e-6), ..ground }),
+            "the findings do not explain everything: 80 um remain of held-out points, 32 um of fitted ones, against the noise that 24 \
+             repeats show, 31 um"
+        );
+        assert_eq!(
+            statement(VerdictKind::Unexplained, &Ground { nameless: true, ..ground }),
+            "the findings reproduce the error, but none has a name: 32 um remain, against the noise that 24 repeats show, 31 um"
+        );
     }
 
     #[test]

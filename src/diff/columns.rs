@@ -185,8 +185,11 @@ fn shown(stored: &str) -> &str {
     if stored.is_empty() { "nested or binary" } else { stored }
 }
 
-/// Names in the options must be columns.
+/// Names in the options must be columns, unless the options are for other tables, too.
 fn known_names(a: &TableFile, b: &TableFile, options: &DiffOptions) -> Result<()> {
+    if options.where_present {
+        return Ok(());
+    }
     let columns: Vec<&str> = a.columns.iter().chain(&b.columns).map(|column| column.name.as_str()).collect();
     let named = |flag: &'static str, names: &mut dyn Iterator<Item = &String>| -> Result<()> {
         for name in names {

@@ -36,6 +36,8 @@ pub struct DiffOptions {
     pub rtol: Tolerances,
     /// Columns that are left out.
     pub ignore: BTreeSet<String>,
+    /// Whether columns named here may be missing in both tables: one wish is for several pairs of them.
+    pub where_present: bool,
     /// Columns w, x, y, z that are one rotation together.
     pub quaternions: Vec<Vec<String>>,
     /// Pairs rows of equal keys in their order instead of reporting them.

@@ -3,7 +3,7 @@
 
 use super::spring::{FINER, MEASURE, Spring};
 use super::unknown::described;
-use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey, Unknown};
+use super::{Cause, CauseDescription, Form, Hypothesis, Measure, Place, Summary, Survey};
 
 /// Hoses that pull joints along.
 pub struct CableDrag;
@@ -26,8 +26,8 @@ impl Cause for CableDrag {
 
     fn sentence(&self, summary: &Summary) -> String {
         let place = summary.place;
-        match summary.terms(Unknown::NAME).next() {
-            Some(law) => format!("something pulls on {place} as a hose package does: {}", described(law, summary.clock)),
+        match described(summary) {
+            Some(law) => format!("something pulls on {place} as a hose package does: {law}"),
             None => format!(
                 "a torque on {place} that depends on its angle, e.g. from a hose package, is missing from the torque model"
             ),

@@ -54,6 +54,10 @@ pub trait Placed: Effect + Any {
     fn is_of_torque_model(&self) -> bool {
         false
     }
+    /// Whether coefficients `p` say, by more than their standard errors, that something moves against its load: no spring does.
+    fn is_against_load(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64) -> bool {
+        false
+    }
     /// The joint that winds up under its load, and by how much (rad/Nm) with coefficients `p`.
     fn compliance(&self, _p: &[f64]) -> Option<(usize, f64)> {
         None

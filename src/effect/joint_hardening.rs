@@ -221,6 +221,15 @@ impl Placed for BentWindup {
         vec![Variable::Load { joint: self.joint }]
     }
 
+    /// Both near no load and far out.
+    fn is_against_load(&self, p: &[f64], error: &dyn Fn(usize) -> f64) -> bool {
+        let per = if let HardeningLaw::Curve { most_nm } = self.law { 1.0 / most_nm } else { 1.0 };
+        let bent = |sum: &dyn Fn(usize) -> f64| per * (1..p.len()).map(sum).sum::<f64>();
+        // The sines of a free curve are 1 and -1 in turn where the load is largest.
+        let near = p[0] + bent(&|k| if k % 2 == 1 { p[k] } else { -p[k] });
+        p[0] < 0.0 && near < 0.0 && p[0] < -error(0) && near < -error(0) - bent(error)
+    }
+
     fn compliance(&self, p: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, *p.first()?))
     }

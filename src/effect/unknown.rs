@@ -8,7 +8,7 @@ use super::sighted;
 use super::unweighed_windup::is_unweighed;
 use super::{
     Axes, Basis, Cause, CauseDescription, Clock, Form, Hypothesis, Law, Motion, NumberSpec, Place, Polar, Summary, Survey, Term,
-    Variable, warmth,
+    Variable, figure, warmth,
 };
 use super::{frames, interactions};
 use crate::robot::RobotModel;
@@ -24,7 +24,7 @@ const EACH: usize = 3;
 const SUPPORT: usize = 5;
 /// The widest bump or step as a share of the joint's travel.
 const LOCAL: f64 = 0.2;
-/// Widths (rad) and spacing of bumps.
+/// Widths (rad; m of a joint that slides) and spacing of bumps.
 const WIDTHS: [f64; 3] = [0.08, 0.16, 0.32];
 /// Powers of time by which something creeps.
 const POWERS: [f64; 2] = [0.3, 3.0];
@@ -87,12 +87,16 @@ impl Unknown {
             };
             let angle = Variable::Angle { joint: by };
             add(Law::new(angle, cosines(by, CURVE)), 1, 0.0);
-            if by != joint {
+            // What slides has no turns.
+            let turns = |joint: usize| survey.robot.is_revolute(joint);
+            if by != joint && turns(by) {
                 (1..=ORDERS).for_each(|order| add(Law::new(angle, Basis::Wave { order, overtone: false }), 6, WOBBLE));
             }
             for other in by + 1..survey.joints() {
                 let (second, wave) = (Variable::Angle { joint: other }, Basis::Wave { order: 1, overtone: false });
-                add(Law::new(angle, wave).times(second, wave), 3, 0.0);
+                if turns(by) && turns(other) {
+                    add(Law::new(angle, wave).times(second, wave), 3, 0.0);
+                }
                 add(Law::new(angle, cosines(by, EACH)).times(second, cosines(other, EACH)), 1, 0.0);
             }
         }
@@ -147,7 +151,7 @@ impl Cause for Unknown {
                 };
                 let bent = law.times(Variable::Angle { joint: link + 1 }, Basis::Wave { order: 1, overtone: false });
                 let long = extent(survey.robot, link).norm() > SHORT;
-                if long {
+                if long && survey.robot.is_revolute(link + 1) {
                     add(Motion::Links { first: link, last: link }, bent, tried, 6.0)
                 }
             }
@@ -265,7 +269,7 @@ impl Cause for Unknown {
     }
 
     fn sentence(&self, summary: &Summary) -> String {
-        let law = summary.terms(Self::NAME).next().map(|law| described(law, summary.clock)).unwrap_or_default();
+        let law = described(summary).unwrap_or_default();
         format!("{} has an error that no entry of the library explains: {law}", summary.place)
     }
 
@@ -308,8 +312,20 @@ fn supported(survey: &Survey, joint: usize, centre: f64, width: f64) -> bool {
     survey.rows.iter().filter(within).take(SUPPORT).count() == SUPPORT
 }
 
-/// What a law is a function of and how, in words.
-pub(super) fn described(term: &Term, clock: Clock) -> String {
+/// What a finding's law without a name is a function of and how, in words; none where it has no such law.
+pub(super) fn described(summary: &Summary) -> Option<String> {
+    let (term, numbers) = summary.estimates(Unknown::NAME).next()?;
+    // A joint that slides errs by a length.
+    let slides = matches!(term.motion(), Motion::Joint { .. }) && numbers.first().is_some_and(|number| number.unit == "mm");
+    Some(in_words(term, slides, summary.clock))
+}
+
+/// A position or width of a joint.
+fn position(q: f64, slides: bool) -> String {
+    if slides { format!("{} mm", figure(1e3 * q, 0)) } else { format!("{:.1} deg", q.to_degrees()) }
+}
+
+fn in_words(term: &Term, slides: bool, clock: Clock) -> String {
     let variables: Vec<String> = term.law().variables().into_iter().map(|variable| clock.named(variable)).collect();
     let of = variables.join(" and ");
     if let Motion::Instrument { of: read } = term.motion() {
@@ -326,14 +342,14 @@ pub(super) fn described(term: &Term, clock: Clock) -> String {
     let over = if clock == Clock::Rows { "over the recording's rows" } else { "with time" };
     match (term.basis(), term.law().first.of) {
         (Basis::Bump { centre, width }, _) => {
-            format!("local bump at {:.1} deg, width {:.1} deg", centre.to_degrees(), width.to_degrees())
+            format!("local bump at {}, width {}", position(centre, slides), position(width, slides))
         }
         (Basis::Rise { centre, width }, _) => {
-            format!("step at {:.1} deg within {:.1} deg", centre.to_degrees(), width.to_degrees())
+            format!("step at {} within {}", position(centre, slides), position(width, slides))
         }
         (Basis::Hinge { from, upwards }, _) => {
             let side = if upwards { "above" } else { "below" };
-            format!("grows with {of} {side} {:.1} deg, nothing on the other side", from.to_degrees())
+            format!("grows with {of} {side} {}, nothing on the other side", position(from, slides))
         }
         (Basis::Wave { .. }, _) if term.law().times.is_some() => format!("product of functions of {of}"),
         (Basis::Wave { order, .. }, _) => format!("periodic in {of}, {order} a turn"),

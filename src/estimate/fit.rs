@@ -98,6 +98,8 @@ const CLEARLY: f64 = 10.0;
 const WORTH: [f64; 2] = [12.5, 1.75];
 /// Where at least one row in so many belongs to a repeated pose, rows are clustered.
 const REPEATING: usize = 4;
+/// Degrees of freedom that the noise of the weights counts as.
+const STATED: f64 = 2.0;
 /// Rounds of fit and new estimate of the unmodelled part; it settles in two or three.
 const ROUNDS: usize = 4;
 
@@ -323,11 +325,12 @@ fn downweighted(residuals: &[Residual], errors: &[(f64, usize)]) -> BTreeMap<usi
     out
 }
 
-/// Reduced chi-square with Huber's weights, of (error, axes).
+/// Reduced chi-square with Huber's weights, of (error, axes). The weights' own noise counts as [`STATED`] degrees of freedom: a fit with
+/// hardly any left cannot say how far points scatter, and one with none knows that noise alone.
 fn reduced(errors: &[(f64, usize)], parameters: usize) -> f64 {
     let sum: f64 = errors.iter().map(|(e, axes)| e.min(bound(*axes)) * e.min(bound(*axes))).sum();
     let values: usize = errors.iter().map(|(_, axes)| axes).sum();
-    sum / values.saturating_sub(parameters).max(1) as f64
+    (STATED + sum) / (STATED + values.saturating_sub(parameters) as f64)
 }
 
 /// The extra standard deviations that bring the median whitened error of lengths, and of angles, to what noise alone would give.

@@ -1,6 +1,7 @@
 //! FLEET.yaml, typed: which robots go through which pipeline, with what settings of their own.
 
 use crate::error::{Error, Fault, Result};
+use crate::pipeline::misnamed;
 use crate::raw;
 use crate::yaml::{self, Mark, Node, Trouble, typed};
 use schemars::JsonSchema;
@@ -188,10 +189,8 @@ impl FleetFile {
         if self.calib != FORMAT {
             fault("calib", format!("format {} is not known to this calib, which reads {FORMAT}", self.calib));
         }
-        let letter = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        let starts = self.name.starts_with(|c: char| c.is_ascii_alphanumeric());
-        if !starts || self.name.len() > 64 || !self.name.chars().all(letter) {
-            fault("name", "expected letters, digits, `-` and `_`, starting with a letter or digit".into());
+        if let Some(message) = misnamed(&self.name) {
+            fault("name", message);
         }
         if self.robots.is_empty() {
             fault("robots", "expected at least one of `- folders:`, `- list:` and `- recording:`".into());

@@ -54,7 +54,7 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
 fn instrument() -> String {
     format!(
         "      # instrument: REPLACE     # what measured the points: {}\n      #                         # or {{constant_um: 10, \
-         per_metre_um: 2.5, coverage: 2}}; without it, or sigma_x or u95 above, noise is inferred\n",
+         per_metre_um: 2.5, coverage: 2}}; without it, or sigma_x or u95 above, noise is not known\n",
         instruments().join(", ")
     )
 }

@@ -5,7 +5,7 @@ use super::{
     Weight,
 };
 use crate::effect::PlacedRow;
-use crate::robot::Measurements;
+use crate::robot::{Measurements, ONE_AND_A_HALF_TURNS};
 use crate::spatial::Pose;
 use crate::units::Quantity::Angle;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -14,8 +14,6 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 #[derive(Debug, Clone, Copy)]
 pub struct Orientation;
 
-/// One and a half turns, rad: more is an angle in another unit.
-const TURNS: f64 = 3.0 * std::f64::consts::PI;
 /// A quaternion whose length differs from 1 by more than this is none: rounding to three digits is allowed.
 const UNIT: f64 = 2e-3;
 
@@ -82,7 +80,7 @@ static ABOUT: KindDescription = KindDescription {
                 "orientation",
                 &["rx", "ry", "rz"],
                 Angle,
-                [-TURNS, TURNS],
+                [-ONE_AND_A_HALF_TURNS, ONE_AND_A_HALF_TURNS],
                 "Orientation of the target in the tracker's frame.",
             )
             .as_part(Part::Value)

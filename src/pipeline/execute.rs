@@ -1,5 +1,6 @@
 //! One stage executed: its tables loaded, its body run on the worker threads, its products handed back.
 
+use super::place;
 use super::run_state::{self, RunState};
 use super::services::{Observer, StageServices};
 use crate::error::{Error, Result};
@@ -35,7 +36,7 @@ pub(super) fn stage(
         .unwrap_or_else(|panic| Err(Error::Bug(format!("stage {} panicked: {}", stage.id, panic_message(&*panic)))));
     let lines = services.lines();
     (account.notes, account.warnings) = (lines.notes, lines.warnings);
-    let outputs = outputs?;
+    let outputs = outputs.map_err(|error| place::placed(error, state.plan, &stage.id))?;
     if outputs.len() != stage.outputs.len() {
         return Err(Error::Bug(format!("stage {} gave {} tables for {} ports", stage.id, outputs.len(), stage.outputs.len())));
     }

@@ -6,7 +6,6 @@ use crate::error::{Error, Result};
 use crate::store::{ActionId, FileHash, Link, StageKey, Store, TableRef};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Bumped when older readers can no longer understand a manifest.
 const MANIFEST_FORMAT: u32 = 1;
@@ -188,7 +187,8 @@ pub struct InputRecord {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FileRecord {
     pub place: String,
-    pub path: PathBuf,
+    /// As text: what is not UTF-8 in it stands there as U+FFFD.
+    pub path: String,
     pub bytes: u64,
     pub modified: Option<String>,
     pub blake3: FileHash,
@@ -201,8 +201,8 @@ pub struct OutputRecord {
     pub port: String,
     /// The name of its schema.
     pub kind: String,
-    /// Where people find it.
-    pub path: Option<PathBuf>,
+    /// Where people find it, as text: what is not UTF-8 in it stands there as U+FFFD.
+    pub path: Option<String>,
     /// Where it is.
     #[serde(flatten)]
     pub table: TableRef,

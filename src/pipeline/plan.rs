@@ -4,7 +4,7 @@ pub use super::spec::InputFile;
 pub use super::wiring::{Input, Origin};
 
 use super::overrides::Override;
-use super::{spec, wiring};
+use super::{sets, spec, wiring};
 use crate::error::{Error, Fault, Result};
 use crate::raw;
 use crate::stage::{ErasedStage, Port, StageEntry};
@@ -64,7 +64,8 @@ impl Plan {
         let mut draft = spec::read(file, &text, overrides, registry);
         let mut inputs = Vec::new();
         for index in 0..draft.stages.len() {
-            let (wired, troubles) = wiring::wire(&draft.stages, index, registry);
+            let (wired, mut troubles) = wiring::wire(&draft.stages, index, registry);
+            troubles.extend(sets::unknown(&draft.stages, index, &wired));
             inputs.push(wired);
             draft.troubles.extend(troubles.into_iter().map(|trouble| trouble.below(&format!("stages[{index}]"))));
         }

@@ -136,6 +136,8 @@ impl Running<'_> {
     }
 
     fn execute(&mut self, index: usize, key: StageKey, reason: String) -> Result<()> {
+        // Another run may have been waited for since the files were hashed.
+        self.state.unchanged(index)?;
         let stage = &self.state.plan.stages[index];
         self.observer.stage_begins(&stage.id, stage.entry.name, &reason);
         let started = (self.now)();
@@ -148,6 +150,7 @@ impl Running<'_> {
         let ended = (self.now)();
         account.ended = rfc3339(ended);
         account.wall_seconds = seconds(started, ended);
+        self.state.unchanged(index)?;
         let published = self.store.publish(&key, products, account.clone())?;
         self.manifest.stages[index].status = StageStatus::Executed;
         if let Some(conflict) = published.conflict {
@@ -179,7 +182,7 @@ impl Running<'_> {
             outputs.push(OutputRecord {
                 port: output.name.into(),
                 kind: output.kind.into(),
-                path: Some(path),
+                path: Some(path.display().to_string()),
                 table: table.clone(),
             });
         }
@@ -220,7 +223,7 @@ impl Running<'_> {
             let metadata = std::fs::metadata(&file.path).ok();
             records.push(FileRecord {
                 place: file.place.clone(),
-                path: file.path.clone(),
+                path: file.path.display().to_string(),
                 bytes: metadata.as_ref().map_or(0, std::fs::Metadata::len),
                 modified: metadata.and_then(|metadata| metadata.modified().ok()).map(rfc3339),
                 blake3: self.state.hash(&file.path)?,

@@ -9,12 +9,28 @@ use crate::store::schema;
 use crate::store::{FileHash, FileKey, KEY_FORMAT, ReadKey, StageKey, TableRef};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 pub(super) struct RunState<'a> {
     pub plan: &'a Plan,
     /// Tables by port, for every stage whose tables are known.
     pub tables: Vec<Option<BTreeMap<String, TableRef>>>,
-    hashes: BTreeMap<PathBuf, FileHash>,
+    hashes: BTreeMap<PathBuf, HashedFile>,
+}
+
+/// The content of a raw input file, and what the file looked like before it was hashed.
+struct HashedFile {
+    content: FileHash,
+    look: Option<FileLook>,
+}
+
+/// Size and time of the last change: where these stay, so did the content.
+type FileLook = (u64, SystemTime);
+
+/// None where the file or its system does not tell.
+fn look(path: &Path) -> Option<FileLook> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()?))
 }
 
 /// The key of a stage, or the stage whose tables must be there first.
@@ -73,14 +89,39 @@ impl<'a> RunState<'a> {
 
     /// The hash of a raw input file, read once a run.
     pub fn hash(&mut self, path: &Path) -> Result<FileHash> {
-        if let Some(hash) = self.hashes.get(path) {
-            return Ok(hash.clone());
+        if let Some(hashed) = self.hashes.get(path) {
+            return Ok(hashed.content.clone());
         }
-        let hash = raw::open(path)
+        // First the look: of a file that is written meanwhile it is an old one.
+        let look = look(path);
+        let content = raw::open(path)
             .and_then(FileHash::of_reader)
             .map_err(|error| Error::data(path.display().to_string(), format!("cannot be read: {error}")))?;
-        self.hashes.insert(path.into(), hash.clone());
-        Ok(hash)
+        self.hashes.insert(path.into(), HashedFile { content: content.clone(), look });
+        Ok(content)
+    }
+
+    /// Fails where a raw input file of a stage is no longer what the stage's key says: its tables would stand under the key of another
+    /// content, in this run and in all that follow.
+    pub fn unchanged(&mut self, index: usize) -> Result<()> {
+        let stage = &self.plan.stages[index];
+        for file in &stage.files {
+            let Some(hashed) = self.hashes.get(&file.path) else { continue };
+            if hashed.look.is_some() && hashed.look == look(&file.path) {
+                continue;
+            }
+            let before = hashed.content.clone();
+            self.hashes.remove(&file.path);
+            if self.hash(&file.path)? != before {
+                let message = format!(
+                    "the file changed while stage `{}` waited or ran: nothing of the stage was kept; give the same command again when \
+                     nobody writes the file",
+                    stage.id
+                );
+                return Err(Error::store(file.path.display().to_string(), message));
+            }
+        }
+        Ok(())
     }
 }
 

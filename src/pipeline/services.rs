@@ -70,19 +70,26 @@ impl Services for StageServices<'_> {
     }
 }
 
-/// Opens an input file that the stage listed.
+/// Opens an input file that the stage listed; settings hold paths as text, whatever bytes they have.
 pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -> Result<OpenedInput> {
-    if !files.iter().any(|known| known.path == file.0) {
-        let message = format!("stage {id} opens {} without listing it among its files", file.0.display());
-        return Err(Error::Bug(message));
-    }
-    let shown = file.0.display().to_string();
-    let opened = raw::open(&file.0).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
+    let asked = file.0.to_string_lossy();
+    let Some(known) = files.iter().find(|known| known.path.to_string_lossy() == asked) else {
+        return Err(Error::Bug(format!("stage {id} opens {asked} without listing it among its files")));
+    };
+    let shown = known.path.display().to_string();
+    let opened = raw::open(&known.path).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
     let size = opened.metadata().ok().map(|metadata| metadata.len());
-    Ok(OpenedInput { label: label(&file.0), reader: Box::new(opened), size })
+    Ok(OpenedInput { label: told(files, known), reader: Box::new(opened), size })
 }
 
-/// A file as messages and tables name it: its name alone, so that equal content gives equal tables wherever it lies.
+/// A file in messages: by its name, and where the stage has another file of that name, as the YAML names it.
+fn told(files: &[super::plan::InputFile], file: &super::plan::InputFile) -> String {
+    let name = label(&file.path);
+    let shared = files.iter().any(|other| other.path != file.path && label(&other.path) == name);
+    if shared { file.named.display().to_string() } else { name }
+}
+
+/// A file as tables name it: its name alone, so that equal content gives equal tables wherever it lies.
 pub(super) fn label(path: &std::path::Path) -> String {
     path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

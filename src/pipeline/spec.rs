@@ -33,6 +33,8 @@ pub(super) struct StageDraft {
     /// Nothing where the settings are faulty.
     pub stage: Option<Box<dyn ErasedStage>>,
     pub files: Vec<InputFile>,
+    /// Sets of the split that the settings name.
+    pub sets: Vec<NamedSet>,
     /// Wishes for the wiring: port -> names of stages.
     pub reads: BTreeMap<String, PortSources>,
 }
@@ -43,6 +45,16 @@ pub(super) struct PortSources {
     pub names: Vec<String>,
 }
 
+/// A set of the split, where the settings of a stage name it.
+pub(super) struct NamedSet {
+    /// Below `with`.
+    pub place: String,
+    pub mark: Mark,
+    pub name: String,
+    /// By the YAML itself, not by a default.
+    pub given: bool,
+}
+
 /// A raw input file of a stage.
 #[derive(Debug, Clone)]
 pub struct InputFile {
@@ -50,6 +62,8 @@ pub struct InputFile {
     pub place: String,
     /// From the working directory.
     pub path: PathBuf,
+    /// As the YAML, or `--set`, names it.
+    pub named: PathBuf,
 }
 
 #[derive(Deserialize)]
@@ -152,9 +166,9 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
         _ => {}
     }
     if let Some(name) = tree.get("name").and_then(Node::text)
-        && !is_identifier(&name)
+        && let Some(message) = misnamed(&name)
     {
-        fault("name", format!("`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"));
+        fault("name", message);
     }
     if tree.get("stages").is_some_and(|stages| matches!(&stages.value, YamlValue::List(items) if items.is_empty())) {
         fault("stages", "expected at least one stage".into());
@@ -162,18 +176,27 @@ fn check_head(tree: &Node) -> Vec<Trouble> {
     troubles
 }
 
-/// Ids and names become parts of paths.
-fn is_identifier(name: &str) -> bool {
+/// Most letters of an id or a name.
+const LONGEST: usize = 64;
+
+/// Why an id or a name cannot be a part of paths, if so.
+pub(crate) fn misnamed(name: &str) -> Option<String> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    name.len() <= 64 && name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.chars().all(allowed)
+    if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(allowed) {
+        return Some(format!("`{name}`: expected letters, digits, `-` and `_`, starting with a letter or digit"));
+    }
+    let letters = name.len();
+    (letters > LONGEST).then(|| format!("`{name}`: {letters} letters; allowed: up to {LONGEST}"))
 }
 
 fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (StageDraft, Vec<Trouble>) {
     let mut troubles = typed::<StageHead>(node).err().unwrap_or_default();
     let uses = node.get("uses").and_then(Node::text);
     let id = node.get("id").and_then(Node::text).or_else(|| uses.clone()).unwrap_or_default();
-    if !id.is_empty() && node.get("id").is_some() && !is_identifier(&id) {
-        let message = format!("`{id}`: expected letters, digits, `-` and `_`, starting with a letter or digit");
+    if !id.is_empty()
+        && node.get("id").is_some()
+        && let Some(message) = misnamed(&id)
+    {
         troubles.push(Trouble::new(message).at(node.nearest_mark("id")).below("id"));
     }
     let entry = uses.as_ref().and_then(|name| registry.iter().find(|entry| entry.name == name));
@@ -183,7 +206,8 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
         let message = format!("unknown stage `{name}`{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), names.join(", "));
         troubles.push(Trouble::new(message).at(node.nearest_mark("uses")).below("uses"));
     }
-    let mut draft = StageDraft { id, mark: node.mark, entry, stage: None, files: Vec::new(), reads: BTreeMap::new() };
+    let mut draft =
+        StageDraft { id, mark: node.mark, entry, stage: None, files: Vec::new(), sets: Vec::new(), reads: BTreeMap::new() };
     for (port, mark, wish) in node.get("reads").map(Node::entries).unwrap_or_default() {
         let path = format!("reads.{port}");
         match stage_names(wish) {
@@ -197,8 +221,13 @@ fn read_stage(file: &Path, node: &Node, registry: &'static [StageEntry]) -> (Sta
             _ => Node::empty_map(node.mark),
         };
         if matches!(with.value, YamlValue::Map(_)) {
-            let (stage, files, mut more) = type_settings(file, with, entry);
+            let (stage, files, mut more) = type_settings(file, with.clone(), entry);
             more.iter_mut().for_each(moved);
+            let named = |(place, name): (String, String)| {
+                let (mark, given) = (with.nearest_mark(&place), with.at(&place).is_some());
+                NamedSet { place: format!("with.{place}"), mark, name, given }
+            };
+            draft.sets = stage.iter().flat_map(|stage| stage.sets_named()).map(named).collect();
             (draft.stage, draft.files) = (stage, files);
             troubles.extend(more.into_iter().map(|trouble| trouble.below("with")));
         }
@@ -250,7 +279,7 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
         if let Err(message) = with.put(&place, text) {
             troubles.push(Trouble::new(message).at(mark).below(&place));
         }
-        files.push(InputFile { place, path });
+        files.push(InputFile { place, path, named: raw.0 });
     }
     if !troubles.is_empty() || files.is_empty() {
         return (troubles.is_empty().then_some(stage), files, troubles);

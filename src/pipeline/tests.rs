@@ -169,6 +169,50 @@ fn a_stage_whose_inputs_came_out_equal_is_not_run_again() {
     assert_eq!(said, ["a: file raw.txt changed"], "another file of the same length gives the same table");
 }
 
+/// Writes a file as soon as a stage begins: after the file was hashed, before the stage opens it.
+struct Hand<'t> {
+    file: &'t Path,
+    text: &'t str,
+}
+impl Observer for Hand<'_> {
+    fn stage_begins(&self, id: &str, _: &str, _: &str) {
+        if id == "a" {
+            std::fs::write(self.file, self.text).unwrap();
+        }
+    }
+    fn stage_ends(&self, _: &StageReport) {}
+    fn begin(&self, _: &str, _: &str, _: Option<u64>, _: &str) {}
+    fn advance(&self, _: &str, _: u64, _: &str) {}
+    fn note(&self, _: &str, _: &str) {}
+    fn warn(&self, _: &str, _: &str) {}
+}
+
+#[test]
+fn nothing_is_kept_of_a_file_that_changed_after_it_was_hashed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (store, file) = (folder.path().join("store"), folder.path().join("raw.txt"));
+    std::fs::write(&file, "abc").unwrap();
+    let text = TWO.replace("rows: 3", &format!("rows: 3, file: {:?}", file.display().to_string()));
+    let plan = plan(&text, &[]).unwrap();
+    let with = |text: &str| {
+        let hand = Hand { file: &file, text };
+        run(&plan, &Store::open(&store).unwrap(), &options(None), &surroundings(), &hand)
+    };
+    let error = with("abcdef").err().unwrap();
+    let said = format!("{}: the file changed while stage `a` waited or ran: nothing of the stage was kept", file.display());
+    assert_eq!((error.exit_code(), error.to_string().starts_with(&said)), (75, true), "{error}");
+    // Were the table of six rows kept under the key of three bytes, it would be taken from here on.
+    std::fs::write(&file, "abc").unwrap();
+    let outcome = with("abc").unwrap();
+    let first = &outcome.manifest.stages[0];
+    assert_eq!(
+        (first.status, &first.notes[..]),
+        (StageStatus::Executed, &["3 rows".to_string()][..]),
+        "written anew and the same"
+    );
+    assert!(with("abc").unwrap().nothing_done());
+}
+
 #[test]
 fn inputs_are_wired_by_kind_or_by_wish() {
     let plan_by_kind = plan(TWO, &[]).unwrap();

@@ -164,7 +164,7 @@ fn document(work: &PoseProposal) -> serde_json::Value {
         "separation": separation.collect::<Vec<_>>(),
         "approach_visible_share": proposal.approach_seen,
         "self_collision_checked": false,
-        "out": work.request.out,
+        "out": work.request.out.as_ref().map(|out| out.to_string_lossy()),
         "poses": work.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
     })
 }

@@ -286,18 +286,18 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
             ("95 % of points within".into(), mm(after.p95_mm)),
             ("worst point".into(), mm(after.max_mm)),
             ("rms".into(), mm(after.rms_mm)),
-            (format!("rms of measurement noise alone{}", basis(after)), mm(after.noise_rms_mm)),
+            (noise(after), mm(after.noise_rms_mm)),
         ],
         others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
     }
 }
 
-/// What the noise rests on.
-fn basis(row: &StatisticsRow) -> String {
+/// What the noise is called by what it rests on.
+fn noise(row: &StatisticsRow) -> String {
     match row.noise_basis.as_deref() {
-        _ if row.is_inferred() => " (inferred: the recording states none)".into(),
-        Some(basis) => format!(" (by {basis})"),
-        None => String::new(),
+        _ if row.is_inferred() => "assumed noise (none is recorded, no instrument is stated)".into(),
+        Some(basis) => format!("rms of measurement noise alone (by {basis})"),
+        None => "rms of measurement noise alone".into(),
     }
 }
 

@@ -11,6 +11,18 @@ use serde::Serialize;
 /// Points drawn in one picture: more would hide each other.
 const DRAWN: usize = 700;
 
+/// The figures that speak for a finding, with what each means.
+const EVIDENCE: [(&str, &str); 8] = [
+    ("probability of the name", "that it is this effect at this place; the rest, up to 1, is listed below the finding"),
+    ("of the place", "that it acts at this place, whatever it is"),
+    ("of none", "that it is neither this effect nor any of its rivals"),
+    ("F", "gain per parameter over the residual variance; about 1 for noise"),
+    ("p", "chance that noise gives as much to this form alone; the search among many is in the probabilities"),
+    ("BIC", "increase of the BIC without the finding; above 10 is strong"),
+    ("cross-validated gain", "cross-validated rms without the finding minus that with it"),
+    ("size", "rms of the whole effect at the tool"),
+];
+
 #[derive(Serialize)]
 pub(super) struct FindingsSection {
     kind: &'static str,
@@ -22,6 +34,8 @@ pub(super) struct FindingsSection {
     errors: Vec<[String; 4]>,
     facts: Vec<(&'static str, String)>,
     findings: Vec<FindingView>,
+    /// What each figure of the evidence means.
+    meanings: Vec<(&'static str, &'static str)>,
     not_observable: Vec<String>,
     next: Vec<String>,
     signature: Option<String>,
@@ -38,8 +52,8 @@ struct FindingView {
     statement: String,
     /// Name, value, sigma, unit.
     numbers: Vec<[String; 4]>,
-    /// What, figure, what it means.
-    evidence: Vec<(&'static str, String, &'static str)>,
+    /// What, figure.
+    evidence: Vec<(&'static str, String)>,
     rivals: Vec<String>,
     /// Formulas that do what it does, with what they cost and bring.
     formulas: Vec<String>,
@@ -60,6 +74,10 @@ impl FindingsSection {
             true => ("before: as set up", "after: set-up corrected"),
             false => ("before: geometry, zeros and ratios identified", "after: with the findings"),
         };
+        let findings: Vec<FindingView> =
+            tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect();
+        let shown = |name: &str| findings.iter().flat_map(|finding| &finding.evidence).any(|(shown, _)| *shown == name);
+        let meanings = EVIDENCE.into_iter().filter(|(name, _)| shown(name)).collect();
         Some(Self {
             kind: match verdict.verdict.as_str() {
                 "explained" | "nothing_missing" => "better",
@@ -73,7 +91,8 @@ impl FindingsSection {
                 errors(after, verdict.after_mean_mm, verdict.after_rms_mm, verdict.after_max_mm),
             ],
             facts: facts(verdict),
-            findings: tables.findings.iter().flat_map(|table| &table.0).map(|row| finding(row, tables)).collect(),
+            findings,
+            meanings,
             not_observable: lines(&verdict.not_observable),
             next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
             signature: verdict.signature.clone(),
@@ -93,8 +112,12 @@ pub(super) fn wrong_setup(tables: &Tables) -> Option<String> {
 
 fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
     let repeatability = Unit::Arcsecond.from_si(verdict.repeatability_rad);
-    let basis = verdict.noise_basis.as_ref().map(|basis| format!(" (by {basis})")).unwrap_or_default();
-    let basis = basis.replace("by inferred", "inferred");
+    let basis = match verdict.noise_basis.as_deref() {
+        _ if verdict.is_noise_assumed() => " (assumed: none is recorded, no instrument is stated)".into(),
+        _ if verdict.is_noise_inferred() => " (inferred from what is left)".into(),
+        Some(basis) => format!(" (by {basis})"),
+        None => String::new(),
+    };
     let noise = format!("{} mm{basis}", mm(verdict.noise_floor_mm));
     let facts = [
         ("noise of one point, rms", Some(noise)),
@@ -147,43 +170,31 @@ fn finding(row: &FindingRow, tables: &Tables) -> FindingView {
     let numbers = tables.finding_numbers.iter().flat_map(|table| &table.0).filter(|number| number.rank == row.rank);
     let rivals = tables.rivals.iter().flat_map(|table| &table.0).filter(|rival| rival.rank == row.rank && rival.is_inseparable());
     let share = |p: Option<f64>| p.map(|p| format!("{p:.2}"));
-    let evidence = [
-        (
-            "probability of the name",
-            share(row.probability),
-            "that it is this effect at this place; the rest, up to 1, is listed below",
-        ),
-        ("of the place", share(row.place_probability), "that it acts at this place, whatever it is"),
-        ("of none", share(row.none_probability), "that it is neither this effect nor any of its rivals"),
-        ("F", row.f_statistic.map(|v| significant(v, 3)), "gain per parameter over the residual variance; about 1 for noise"),
-        ("p", row.p_value.map(chance), "chance of such a gain from noise alone"),
-        ("BIC", row.delta_bic.map(|v| significant(v, 3)), "increase of the BIC without the finding; above 10 is strong"),
-        (
-            "cross-validated gain",
-            row.heldout_gain_mm.map(|v| format!("{} mm", mm(v))),
-            "cross-validated rms without the finding minus that with it",
-        ),
-        ("size", row.effect_rms_mm.map(|v| format!("{} mm", mm(v))), "rms of the whole effect at the tool"),
+    let millimetres = |value: Option<f64>| value.map(|v| format!("{} mm", mm(v)));
+    let figures = [
+        share(row.probability),
+        share(row.place_probability),
+        share(row.none_probability),
+        row.f_statistic.map(|v| significant(v, 3)),
+        row.p_value.map(chance),
+        row.delta_bic.map(|v| significant(v, 3)),
+        millimetres(row.heldout_gain_mm),
+        millimetres(row.effect_rms_mm),
     ];
-    let valid = match (row.valid_joint, row.valid_from_rad, row.valid_to_rad) {
-        (Some(joint), Some(from), Some(to)) => {
-            Some(format!("joint {joint} from {:.1} to {:.1} deg", from.to_degrees(), to.to_degrees()))
-        }
-        _ => None,
-    };
+    let valid = row.valid_range().map(|(joint, [from, to], unit)| format!("joint {joint} from {from:.1} to {to:.1} {unit}"));
     let curve: Vec<&CurveRow> = tables.curves.0.iter().filter(|point| point.rank == row.rank).collect();
     FindingView {
         rank: row.rank.to_string(),
         effect: row.effect.clone(),
         place: row.place.clone(),
-        statement: row.statement.clone(),
+        statement: sentence_case(row.statement.trim_end_matches('.')),
         numbers: numbers
             .map(|n| {
                 let sigma = n.sigma.map(|sigma| significant(sigma, 2)).unwrap_or_default();
                 [n.name.clone(), significant(n.value, 5), sigma, n.unit.clone()]
             })
             .collect(),
-        evidence: evidence.into_iter().filter_map(|(name, value, meaning)| Some((name, value?, meaning))).collect(),
+        evidence: EVIDENCE.into_iter().zip(figures).filter_map(|((name, _), figure)| Some((name, figure?))).collect(),
         rivals: rivals.map(rival).collect(),
         formulas: tables.forms.iter().flat_map(|table| table.of_finding(row.rank)).map(formula).collect(),
         valid,

@@ -45,8 +45,9 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
         json!({ "step": gone.step, "rms_mm": gone.rms_mm, "than": gone.than, "than_rms_mm": gone.than_rms_mm, "points": gone.points })
     });
     let limits = judgement.map(|judgement| {
-        let lines = judgement.lines.iter().map(|(name, found, limit, kept)| json!({ "figure": name, "found_mm": number(found), "limit_mm": number(limit), "kept": kept }));
-        json!({ "kept": judgement.kept, "figures": lines.collect::<Vec<_>>() })
+        let lines = judgement.lines.iter().zip(&judgement.values);
+        let lines = lines.map(|((name, _, _, kept), [found, limit])| json!({ "figure": name, "found_mm": found, "limit_mm": limit, "kept": kept }));
+        json!({ "asked": judgement.asked, "kept": judgement.kept, "sentence": judgement.sentence, "figures": lines.collect::<Vec<_>>() })
     });
     let document = json!({
         "calib_report": 1,
@@ -67,10 +68,6 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
         "tables": options.hashes.iter().map(|(kind, hash)| json!({ "table": kind, "content": hash })).collect::<Vec<_>>(),
     });
     serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|error| Error::Bug(error.to_string()))
-}
-
-fn number(text: &str) -> Value {
-    text.parse::<f64>().map_or(Value::Null, Value::from)
 }
 
 fn form(rows: &[FormRow]) -> Value {

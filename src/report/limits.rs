@@ -3,6 +3,7 @@
 use super::Tables;
 use super::errors::Steps;
 use super::findings::wrong_setup;
+use super::number::mm;
 use crate::table::StatisticsRow;
 use serde::Serialize;
 
@@ -21,10 +22,16 @@ pub struct AcceptanceLimits {
 pub(super) struct Judgement {
     /// `better` where all are kept, else `worse`.
     kind: &'static str,
-    sentence: String,
+    pub sentence: String,
     /// Figure, found, allowed, whether it is kept.
     pub lines: Vec<(&'static str, String, String, bool)>,
+    /// What was found and what is allowed, mm, of each line.
+    #[serde(skip)]
+    pub values: Vec<[f64; 2]>,
     pub kept: bool,
+    /// Whether there are limits: a wrong set-up is not accepted without any.
+    #[serde(skip)]
+    pub asked: bool,
 }
 
 /// The row that is judged: of `set`, else of the held-out set with most points, after the step that stands.
@@ -38,25 +45,25 @@ pub(super) fn judged<'a>(tables: &'a Tables, set: Option<&str>) -> Option<&'a St
 impl Judgement {
     /// None where there are no limits and the set-up is right.
     pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
-        let asked = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
+        let figures = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
+        let asked = figures.iter().any(|(_, limit)| limit.is_some());
+        let unjudged =
+            |sentence: String| Self { kind: "worse", sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
         if let Some(wrong) = wrong_setup(tables) {
-            let sentence = format!("Not accepted: {wrong}.");
-            return Some(Self { kind: "worse", sentence, lines: Vec::new(), kept: false });
+            return Some(unjudged(format!("Not accepted: {wrong}.")));
         }
-        if asked.iter().all(|(_, limit)| limit.is_none()) {
+        if !asked {
             return None;
         }
         let Some(row) = judged(tables, set) else {
-            let sentence = "The limits cannot be judged: no points were held out.".into();
-            return Some(Self { kind: "worse", sentence, lines: Vec::new(), kept: false });
+            return Some(unjudged("The limits cannot be judged: no points were held out.".into()));
         };
         let found = [row.mean_mm, row.p95_mm, row.max_mm];
-        let lines: Vec<_> = (asked.iter().zip(found))
-            .filter_map(|((name, limit), found)| {
-                let limit = (*limit)?;
-                Some((*name, super::number::mm(found), super::number::mm(limit), found <= limit))
-            })
-            .collect();
+        let judged: Vec<(&'static str, [f64; 2])> =
+            figures.iter().zip(found).filter_map(|((name, limit), found)| Some((*name, [found, (*limit)?]))).collect();
+        let line = |(name, [found, limit]): (&'static str, [f64; 2])| (name, mm(found), mm(limit), found <= limit);
+        let lines: Vec<_> = judged.iter().copied().map(line).collect();
+        let values = judged.iter().map(|(_, values)| *values).collect();
         let kept = lines.iter().all(|line| line.3);
         let sentence = format!(
             "{} the limits at {} held-out points of set {}, step {}.",
@@ -65,6 +72,6 @@ impl Judgement {
             row.set,
             row.step
         );
-        Some(Self { kind: if kept { "better" } else { "worse" }, sentence, lines, kept })
+        Some(Self { kind: if kept { "better" } else { "worse" }, sentence, lines, values, kept, asked })
     }
 }

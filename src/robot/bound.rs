@@ -1,5 +1,8 @@
 //! How large a number of a robot, or of a target, may be: what is beyond is in another unit, damaged, or no robot's.
 
+/// rad: more is seldom a position of a joint, but a common one in degrees.
+pub const ONE_AND_A_HALF_TURNS: f64 = 3.0 * std::f64::consts::PI;
+
 /// What a number is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {

@@ -17,7 +17,7 @@ mod setup;
 mod travel;
 mod visited;
 
-pub use bound::Bound;
+pub use bound::{Bound, ONE_AND_A_HALF_TURNS};
 pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
 pub use measurements::Measurements;
 pub use memories::Memories;

@@ -157,7 +157,7 @@ impl Compare {
         let rows: Vec<usize> = (0..data.rows()).collect();
         if data.noise_basis == NoiseBasis::Inferred {
             let which = if split.is_some() { "this" } else { "the earlier" };
-            context.services.note(format!("{which} recording states no noise: rows are weighted by an inferred one"));
+            context.services.note(format!("{which} recording states no noise: rows are weighted by an assumed one"));
         }
         let placed = earlier.clone().standing_at(&align(robot, &data, &rows));
         let mut model = placed.model(robot.clone(), &[BaseFrame::NAME], Load::GravityTorque)?;

@@ -22,10 +22,19 @@ pub fn suspicion(points: impl Iterator<Item = [f64; 2]>, parameters: usize) -> O
     let [rms, stated] = [error, noise].map(|sum| (sum / count as f64).sqrt());
     (FAR_BELOW.powi(2) * error < expected).then(|| {
         format!(
-            "the points miss the model by {rms:.2e} mm rms, far below the {stated:.2e} mm of the recording's noise: they are probably computed (a target, \
-             a nominal point), not measured; check the column mapping in `ingest`, or state the `instrument` there"
+            "the points miss the model by {} mm rms, far below the {} mm of the recording's noise: they are probably computed (a target, \
+             a nominal point), not measured; check the column mapping in `ingest`, or state the `instrument` there. Where they were measured, the \
+             noise is stated too large: check the unit of `sigma_x`, `u95` or the like",
+            plain(rms),
+            plain(stated)
         )
     })
+}
+
+/// To three digits, without a power of ten.
+fn plain(mm: f64) -> String {
+    let digits = if mm > 0.0 { (2.0 - mm.log10().floor()).clamp(0.0, 12.0) } else { 0.0 };
+    format!("{mm:.*}", digits as usize)
 }
 
 #[cfg(test)]
@@ -38,7 +47,7 @@ mod tests {
 
     #[test]
     fn only_a_residual_far_below_the_noise_is_suspected() {
-        assert!(suspicion(points(20, 0.0003), 30).unwrap().contains("3.00e-4 mm rms, far below the 2.00e-2 mm"));
+        assert!(suspicion(points(20, 0.0003), 30).unwrap().contains("0.000300 mm rms, far below the 0.0200 mm"));
         assert!(suspicion(points(20, 0.005), 30).is_none());
         // Ten points and thirty parameters: a fit passes through all of them.
         assert!(suspicion(points(10, 0.0), 30).is_none());

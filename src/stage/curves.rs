@@ -5,7 +5,7 @@
 use crate::effect::{Effect, Form, Place, Variable};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
-use crate::robot::Measurements;
+use crate::robot::{Measurements, RobotModel};
 use crate::table::{CurveRow, Curves, FindingRow, Findings, Parameters, Prediction, Recording};
 use crate::units::Unit;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -77,7 +77,7 @@ pub(super) fn curves(
             let variance: Option<f64> =
                 own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
             let residual = data.position[row] - whole[row];
-            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &motion.posture.torque);
+            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &motion.posture.torque, &model.robot);
             let fitted = along(&shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,
@@ -118,13 +118,17 @@ fn abscissa(
     data: &Measurements,
     row: usize,
     torque: &[f64],
+    robot: &RobotModel,
 ) -> (String, Option<Unit>, f64) {
     let with = |over: String, unit, x| (over, Some(unit), x);
     let time = || match data.has_clock() {
         true => with("time".into(), Unit::Second, data.time(row)),
         false => ("place in the recording".to_string(), None, row as f64 + 1.0),
     };
-    let angle = |joint: usize| with(format!("joint {}", joint + 1), Unit::Radian, data.q(row)[joint]);
+    let position = |joint: usize| {
+        let unit = if robot.is_revolute(joint) { Unit::Radian } else { Unit::Millimetre };
+        with(format!("joint {}", joint + 1), unit, data.q(row)[joint])
+    };
     let load = |joint: usize| with(format!("load torque of joint {}", joint + 1), Unit::NewtonMetre, torque[joint]);
     let variables: Vec<Variable> = forms.iter().flat_map(|form| form.variables()).collect();
     let own = joint.map(|joint| Variable::Angle { joint });
@@ -145,7 +149,7 @@ fn abscissa(
             | Variable::Velocity { joint }
             | Variable::Slip { joint, .. }
             | Variable::Work { joint, .. },
-        ) => angle(joint),
+        ) => position(joint),
         // Links and the base bend with the load of the shoulder.
         _ if torque.len() > 1 => load(1),
         _ => time(),

@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
 use crate::effect::CAUSES;
-use crate::error::{Error, Fault, Result, nearest};
+use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
 use crate::stage::own_effects::own_effects;
@@ -78,23 +78,19 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 15;
+    const IMPLEMENTATION: u32 = 16;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
     fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        if self.on.is_empty() {
-            faults.push(Fault::new("on", "expected at least one set, e.g. [fit]"));
-        }
+        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
         if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
             faults.push(Fault::new("prior_weight", format!("expected a number from 0 to {HEAVIEST}")));
         }
         let tried = || CAUSES.iter().filter(|cause| !cause.is_nameless()).map(|cause| cause.name());
         for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
-            let near = nearest(name, tried()).map_or_else(|| ".".into(), |near| format!("; did you mean `{near}`?"));
-            let allowed = tried().collect::<Vec<_>>().join(", ");
-            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{near} Allowed: {allowed}")));
+            let allowed: Vec<&str> = tried().collect();
+            faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{}", instead(name, &allowed))));
         }
         faults
     }
@@ -105,6 +101,10 @@ impl Stage for Diagnose {
 
     fn look(&self, _reads: Option<DiagnoseReads>, context: &Context) -> Result<Option<DiagnoseWrites>> {
         own_effects(&self.effects, context).map(|_| None)
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
     }
 
     fn run(&self, reads: DiagnoseReads, context: &Context) -> Result<DiagnoseWrites> {
@@ -145,11 +145,10 @@ impl Stage for Diagnose {
             prior_weight: self.prior_weight,
             without: &self.without,
             own: &own,
+            beside_simulation: corrected == Corrected::OutsideSimulation,
             seed: context.seed,
         };
-        // Points beside an outside simulation are moved by it: what moves them says nothing of this robot file.
-        let wrong = if corrected == Corrected::RobotFile { wrong_setup(&question) } else { None };
-        let diagnosis = wrong.unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
+        let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
         let diagnosis = said(diagnosis, &question, context)?;
         let step = context.id;
         let mut held_out = vec![true; data.rows()];

@@ -84,9 +84,7 @@ macro_rules! identification {
             /// Faults of the settings that all identifications share; `example` names a set.
             fn shared_faults(&self, example: &str) -> Vec<crate::error::Fault> {
                 let mut faults = self.parameter_set().faults();
-                if self.on.is_empty() {
-                    faults.push(crate::error::Fault::new("on", format!("expected at least one set, e.g. [{example}]")));
-                }
+                faults.extend(crate::stage::no_set(&self.on, example));
                 faults.extend(self.folds.fault());
                 faults.extend(self.repeatability.fault());
                 faults
@@ -208,7 +206,11 @@ fn note(context: &Context, model: &Model, fitted: &Fitted, fitting: &Fitting) {
     }
     if fitted.values < 2 * free {
         let (points, parameters) = (counted(fitting.rows.len(), "point"), counted(free, "parameter"));
-        services.warn(format!("only {points} for {parameters}: take at least {free}"));
+        let saturated = match fitted.values <= free {
+            true => "; nothing is left to judge the fit by, and its standard deviations rest on the weights' noise alone",
+            false => "",
+        };
+        services.warn(format!("only {points} for {parameters}: take at least {free}{saturated}"));
     }
     let noise: f64 = fitting.rows.iter().map(|row| noise(fitting.data, *row)).sum::<f64>() / fitting.rows.len() as f64;
     let noise_axis = noise / 3f64.sqrt();

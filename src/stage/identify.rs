@@ -2,6 +2,7 @@
 //!
 //! Sec. 3 of the paper, iterated to convergence on the full model (Eqs. 14-23 with errata).
 
+use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
@@ -9,7 +10,7 @@ use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
-use crate::stage::screened::fit_rows;
+use crate::stage::screened::{fit_rows, numbered};
 use crate::stage::weightless::weightless_links;
 use crate::stage::{Context, Stage};
 use crate::table::{Recording, Robot, Split};
@@ -51,7 +52,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 11;
+    const IMPLEMENTATION: u32 = 12;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -79,10 +80,15 @@ impl Stage for Identify {
         faults
     }
 
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
+    }
+
     fn run(&self, reads: IdentifyReads, context: &Context) -> Result<Identified> {
         let mut data = reads.recording.measurements();
         let rows = reads.split.rows(&reads.recording, &self.on)?;
         let (robot, base) = self.gauged(RobotModel::new(reads.robot.to_description()?), &data, &rows, context)?;
+        self.question_setup(&robot, &data, &rows, &reads, context);
         let setting = EffectContext { base, load: self.load.into() };
         let mut effects = Vec::new();
         let asked = identified().filter(|cause| self.effects.iter().any(|name| name == cause.name()));
@@ -131,6 +137,31 @@ impl Stage for Identify {
 const FARTHEST_TARGET: f64 = 1e4;
 
 impl Identify {
+    /// A warning where robot file, joints and points do not belong together: geometry that is estimated would make up for it.
+    fn question_setup(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], reads: &IdentifyReads, context: &Context) {
+        if !self.effects.iter().any(|name| GEOMETRY[OF_THE_ARM].contains(&name.as_str())) {
+            return;
+        }
+        let fit: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
+        let question = Question {
+            robot,
+            data,
+            fit: &fit,
+            validate: &[],
+            set: &numbered(&reads.split),
+            prior_weight: 1.0,
+            without: &[],
+            own: &[],
+            beside_simulation: reads.recording.simulated.is_some(),
+            seed: context.seed,
+        };
+        if let Some(wrong) = wrong_setup(&question) {
+            let found =
+                wrong.findings.first().map(|finding| format!("the set-up is wrong: {}", finding.statement.trim_end_matches('.')));
+            context.services.warn(found.unwrap_or(wrong.statement));
+        }
+    }
+
     /// The robot with what it is measured by, and where its base stands at the start.
     fn gauged(&self, robot: RobotModel, data: &Measurements, rows: &[usize], context: &Context) -> Result<(RobotModel, Pose)> {
         let known = data.target.as_ref().map_or(&[][..], |named| &named.names);
@@ -149,6 +180,8 @@ impl Identify {
 
 /// Effects that together are the rigid geometry of the arm and of what measures it.
 const GEOMETRY: [&str; 5] = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
+/// Those of them that are the arm's own numbers.
+const OF_THE_ARM: std::ops::Range<usize> = 3..5;
 
 /// (found, expected) rank of the geometry, when all of it was asked for and theory has a word on what was measured.
 fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &Fitted) -> Option<(usize, usize)> {

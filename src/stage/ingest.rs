@@ -4,10 +4,12 @@
 //! file that is refused, and memory stays bounded. Per file, accepted + rejected = read.
 
 mod arm;
+mod axes;
 mod bind;
 mod check;
 mod clock;
 mod columns;
+mod copies;
 pub mod encoding;
 mod later;
 mod layout;
@@ -24,6 +26,7 @@ mod rejections;
 mod row;
 mod scan;
 mod slots;
+mod twice;
 mod verdict;
 mod wide;
 mod write;
@@ -66,11 +69,12 @@ pub struct Ingest {
     #[serde(default)]
     pub limits: LimitPolicy,
     /// Axes of the points that were measured at all, e.g. `[z]` for a dial gauge on a plate; without it all three, unless
-    /// orientations or distances are mapped. Of those listed a cell may be blank where its column is `optional`.
+    /// orientations or distances are mapped. The others are not mapped; of those listed a cell may be blank where its column is
+    /// `optional`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<Vec<Axis>>,
     /// By what points were measured, for rows that record no standard deviation: a name, e.g. `leica_at960`, or figures, e.g.
-    /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is inferred, and every figure that rests on it says so.
+    /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is not known: points are weighted by an assumed one, and every figure that rests on it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSetting>,
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
@@ -147,6 +151,7 @@ impl Stage for Ingest {
             verdict::judge(one, &scans, &fates, &arm, context)?;
             scanned.push((scans, fates));
         }
+        copies::refuse(&scanned)?;
         let names = names(scanned.iter().flat_map(|(scans, _)| scans));
         let each = measurements.iter().zip(&scanned).zip(names.chunks(self.files.len().max(1)));
         let decided: Vec<write::JoinDecisions> = each

@@ -186,10 +186,7 @@ impl Stage for Learn {
     type Writes = LearnWrites;
 
     fn check(&self) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        if self.on.is_empty() {
-            faults.push(Fault::new("on", "expected at least one set, e.g. [learn]"));
-        }
+        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "learn").into_iter().collect();
         let counts = [
             ("hidden", self.hidden.unwrap_or(1), 1, 200),
             ("ensemble", self.ensemble, 1, 100),
@@ -219,6 +216,10 @@ impl Stage for Learn {
             faults.push(Fault::new("decay", format!("expected a number from 0 to 1e6, e.g. 1, not {decay}")));
         }
         faults
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
     }
 
     fn run(&self, reads: LearnReads, context: &Context) -> Result<LearnWrites> {

@@ -40,7 +40,7 @@ pub use stiffness::{Stiffness, StiffnessReads};
 pub use transfer::{Transfer, TransferReads};
 pub use validate::{Validate, ValidateReads};
 
-use crate::error::Result;
+use crate::error::{Fault, Result};
 use crate::table::{Frame, Table};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -288,12 +288,20 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     /// Tables that it gives.
     type Writes: Writes;
     /// Faults of the settings that types cannot express, each with its path below `with`.
-    fn check(&self) -> Vec<crate::error::Fault> {
+    fn check(&self) -> Vec<Fault> {
         Vec::new()
     }
     /// The input files among the settings, each with its path below `with`.
     fn files(&self) -> Vec<(String, RawFile)> {
         Vec::new()
+    }
+    /// The sets of the split that the settings name, each with its path below `with`.
+    fn sets_named(&self) -> Vec<(String, String)> {
+        Vec::new()
+    }
+    /// The sets to which rows are dealt out, where the settings alone say it.
+    fn sets_dealt(&self) -> Option<Vec<String>> {
+        None
     }
     /// Looks at the input files without doing the work: at their headers, say. `reads` is there where the stages before could be
     /// looked at so far that they gave their tables; fails with every fault, gives its own tables where that is all of the work.
@@ -302,6 +310,16 @@ pub trait Stage: DeserializeOwned + Serialize + JsonSchema + Send + Sync + 'stat
     }
     /// Does the work. Fails with [`crate::error::Error::Data`] where the tables cannot be used.
     fn run(&self, reads: Self::Reads, context: &Context) -> Result<Self::Writes>;
+}
+
+/// The fault of a setting `on` that names no set; `example` is one.
+fn no_set(sets: &[String], example: &str) -> Option<Fault> {
+    sets.is_empty().then(|| Fault::new("on", format!("expected at least one set, e.g. [{example}]")))
+}
+
+/// The sets of a setting `on`, as [`Stage::sets_named`].
+fn on(sets: &[String]) -> Vec<(String, String)> {
+    sets.iter().enumerate().map(|(k, set)| (format!("on[{k}]"), set.clone())).collect()
 }
 
 /// Every kind of stage, one line each.

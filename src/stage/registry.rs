@@ -12,6 +12,10 @@ pub trait ErasedStage: Send + Sync {
     fn check(&self) -> Vec<Fault>;
     /// As [`Stage::files`].
     fn files(&self) -> Vec<(String, RawFile)>;
+    /// As [`Stage::sets_named`].
+    fn sets_named(&self) -> Vec<(String, String)>;
+    /// As [`Stage::sets_dealt`].
+    fn sets_dealt(&self) -> Option<Vec<String>>;
     /// The settings with defaults filled in; part of the stage's key.
     fn settings(&self) -> serde_json::Value;
     /// As [`Stage::look`], with the frames of each input port where all are known.
@@ -26,6 +30,12 @@ impl<T: Stage> ErasedStage for T {
     }
     fn files(&self) -> Vec<(String, RawFile)> {
         Stage::files(self)
+    }
+    fn sets_named(&self) -> Vec<(String, String)> {
+        Stage::sets_named(self)
+    }
+    fn sets_dealt(&self) -> Option<Vec<String>> {
+        Stage::sets_dealt(self)
     }
     fn settings(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("settings are plain data")

@@ -22,7 +22,8 @@ pub struct Report {
     pub title: Option<String>,
     /// The held-out set that the first sentence speaks of; without it, the one with most points after the step that stands for the run.
     pub set: Option<String>,
-    /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step.
+    /// What is accepted: of the held-out points of the diagnosed model, without a diagnosis after the last step. Beyond it `calib run` says
+    /// so and ends with code 1.
     pub limits: Accepted,
     /// Who, with what, where and when, e.g. {operator: A. Meier, tracker: AT960 no. 123, date: 2026-11-21}; shown as given.
     pub identity: BTreeMap<String, String>,
@@ -73,9 +74,13 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 10;
+    const IMPLEMENTATION: u32 = 12;
     type Reads = ReportReads;
     type Writes = ReportWrites;
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        self.set.iter().map(|set| ("set".into(), set.clone())).collect()
+    }
 
     fn run(&self, reads: ReportReads, context: &Context) -> Result<ReportWrites> {
         let curves = self.curves(&reads)?;

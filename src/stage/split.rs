@@ -169,6 +169,14 @@ impl Stage for SplitBy {
         faults
     }
 
+    fn sets_dealt(&self) -> Option<Vec<String>> {
+        if let Self::Usage { sets, blank } = self {
+            let sets = sets.as_ref()?.values().chain(blank).collect::<BTreeSet<_>>();
+            return Some(sets.into_iter().cloned().collect());
+        }
+        Some(self.names().into_iter().map(Into::into).collect())
+    }
+
     fn run(&self, reads: SplitReads, context: &Context) -> Result<SplitWrites> {
         let faults = self.check();
         if !faults.is_empty() {
@@ -182,7 +190,7 @@ impl Stage for SplitBy {
         }
         for name in self.names() {
             if !counts.contains_key(name) {
-                return Err(Error::data("split", format!("set `{name}` gets none of the {}", counted(recording.rows(), "row"))));
+                return Err(self.empty(name, recording.rows()));
             }
         }
         let listed: Vec<String> = counts.iter().map(|(set, rows)| format!("{set} {rows}")).collect();
@@ -212,6 +220,20 @@ impl SplitBy {
             Self::Usage { .. } => BTreeSet::new(),
             Self::Order { sets } => sets.iter().map(|stretch| stretch.set.as_str()).collect(),
         }
+    }
+
+    /// The fault of a set without rows, at the setting that decides how many it gets.
+    fn empty(&self, name: &str, rows: usize) -> Error {
+        let (setting, advice) = match self {
+            Self::Every { offset: None, .. } => ("n", "say a smaller `n`"),
+            Self::Every { .. } => ("offset", "say another `offset`, or a smaller `n`"),
+            Self::Random { set, .. } if name == set => ("fraction", "say a larger `fraction`"),
+            Self::Random { .. } => ("fraction", "say a smaller `fraction`"),
+            Self::Blocks { count: Some(_), .. } => ("count", "say a larger `count`, or fewer `sets`"),
+            Self::Blocks { .. } => ("length", "say a smaller `length`, or fewer `sets`"),
+            Self::Order { .. } | Self::Usage { .. } => ("sets", "give it rows, or leave it out"),
+        };
+        Error::data(format!("with.{setting}"), format!("set `{name}` gets none of the {}; {advice}", counted(rows, "row")))
     }
 
     /// The set of each row.
@@ -299,7 +321,7 @@ fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blan
             (Some(label), Some(sets)) => sets.get(label).cloned().ok_or_else(|| {
                 let mapped: Vec<&str> = sets.keys().map(String::as_str).collect();
                 Error::data(
-                    "split",
+                    "with.sets",
                     format!("label `{label}` (point `{}`) has no set; mapped: {}; found: {found}", point(), mapped.join(", ")),
                 )
             }),
@@ -308,7 +330,7 @@ fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blan
                     "point `{}` has no usage label; found: {found}; allowed: map `usage` in ingest, or say `blank`",
                     point()
                 );
-                Error::data("split", message)
+                Error::data("with.blank", message)
             }),
         }
     };
@@ -317,12 +339,12 @@ fn by_usage(recording: &Recording, sets: Option<&BTreeMap<String, String>>, blan
 
 fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
     let mut dealt = Vec::with_capacity(rows);
-    for stretch in sets {
+    for (k, stretch) in sets.iter().enumerate() {
         let left = rows - dealt.len();
         let wanted = stretch.rows.map_or(left as u64, |rows| rows);
         if wanted > left as u64 {
             return Err(Error::data(
-                "split",
+                format!("with.sets[{k}].rows"),
                 format!("set `{}` takes {}, but only {left} of {rows} remain", stretch.set, counted(wanted, "row")),
             ));
         }
@@ -334,7 +356,7 @@ fn by_order(rows: usize, sets: &[Stretch]) -> Result<Vec<String>> {
             dealt.len(),
             counted(rows, "row")
         );
-        return Err(Error::data("split", message));
+        return Err(Error::data("with.sets", message));
     }
     Ok(dealt)
 }

@@ -35,12 +35,16 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 11;
+    const IMPLEMENTATION: u32 = 12;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
     fn check(&self) -> Vec<Fault> {
         self.shared_faults("loaded")
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
     }
 
     fn run(&self, reads: StiffnessReads, context: &Context) -> Result<Identified> {

@@ -39,12 +39,16 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = TransferReads;
     type Writes = Identified;
 
     fn check(&self) -> Vec<Fault> {
         self.shared_faults("fit")
+    }
+
+    fn sets_named(&self) -> Vec<(String, String)> {
+        crate::stage::on(&self.on)
     }
 
     fn run(&self, reads: TransferReads, context: &Context) -> Result<Identified> {
@@ -170,10 +174,10 @@ fn remarks(all: &[Labelled<Recording>], own: &Recording, data: &Measurements, co
     let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();
     let outside = remarks.iter().flatten().count();
     if outside > 0 {
-        let rows = counted(data.rows(), "row");
-        context
-            .services
-            .note(format!("{outside} of {rows} lie outside of what the model was measured at: see the remarks of `prediction`"));
+        let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
+        context.services.note(format!(
+            "{outside} of {rows} {lie} outside of what the model was measured at: see the remarks of `prediction`"
+        ));
     }
     remarks
 }

@@ -1,6 +1,6 @@
 //! `validate`: statistics of the position error after every step, held-out and training rows apart.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::robot::NoiseBasis;
 use crate::stage::{Context, Labelled, Stage, computed, reads, writes};
 use crate::statistics::quantile;
@@ -60,6 +60,11 @@ impl Stage for Validate {
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 
+    fn sets_named(&self) -> Vec<(String, String)> {
+        let sets = self.reference.iter().enumerate();
+        sets.map(|(k, reference)| (format!("reference[{k}].set"), reference.set.clone())).collect()
+    }
+
     fn run(&self, reads: ValidateReads, context: &Context) -> Result<ValidateWrites> {
         if reads.prediction.is_empty() {
             return Err(Error::spec(
@@ -92,9 +97,10 @@ impl Stage for Validate {
         }
         for row in statistics.0.iter().filter(|row| row.held_out) {
             if let Some(without) = row.mean_without_mm {
+                let (suspects, them) = (counted(row.suspects, "suspect"), if row.suspects == 1 { "it" } else { "them" });
                 context.services.note(format!(
-                    "{} on {}: the held-out mean of {:.3} mm includes {} suspects; without them {without:.3} mm",
-                    row.step, row.set, row.mean_mm, row.suspects
+                    "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
+                    row.step, row.set, row.mean_mm
                 ));
             }
         }

@@ -205,6 +205,12 @@ impl Store {
         self.run_dir(id).is_ok_and(|dir| fs::metadata(dir.join("manifest.json")).is_ok_and(|file| file.len() > 0))
     }
 
+    /// The events of a run, oldest first, as far as they were written; none where they cannot be read.
+    pub fn events(&self, id: &str) -> Vec<Value> {
+        let text = self.run_dir(id).ok().and_then(|dir| fs::read(dir.join("events.jsonl")).ok()).unwrap_or_default();
+        text.split(|byte| *byte == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect()
+    }
+
     /// The manifest of a run, as far as it was written.
     pub fn manifest(&self, id: &str) -> Result<Value> {
         self.sealed_manifest(id).map(|found| found.manifest)

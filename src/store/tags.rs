@@ -46,13 +46,21 @@ impl Store {
         Ok(tags)
     }
 
-    /// Gives a run a name, or the name to another run.
-    pub fn tag(&self, name: &str, run: &str) -> Result<()> {
+    /// Gives a run a name, or the name to another run; gives the run that had it before, where that can be read.
+    pub fn tag(&self, name: &str, run: &str) -> Result<Option<String>> {
         let path = self.tag_path(name)?;
+        // Ids are found in small letters, too.
+        if ulid::Ulid::from_string(&name.to_ascii_uppercase()).is_ok() {
+            let message = "has the form of a run's id and would hide that run; allowed: any other name, e.g. `released`";
+            return Err(Error::spec(format!("tag {name}"), message));
+        }
+        let before = fs::read(&path).ok().filter(|bytes| unseal(bytes).is_ok());
+        let before = before.and_then(|bytes| Some(serde_json::from_slice::<Tag>(&bytes).ok()?.run));
         let aside = self.workspace()?.fresh();
         write_synced(&aside, &seal(&Tag { run: run.into() })?)?;
         self.give(&aside, &path)?;
-        replace(&aside, &path)
+        replace(&aside, &path)?;
+        Ok(before)
     }
 
     /// Takes a name away; the run stays.

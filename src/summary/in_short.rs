@@ -2,7 +2,7 @@
 
 use super::statistics::rows;
 use super::{DiagnosisSummary, labelled};
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
@@ -46,15 +46,20 @@ pub fn in_short(
 
 fn error(row: &StatisticsRow) -> String {
     let rows = match row.held_out {
-        true => format!("{} held-out points of set {}", row.points, row.set),
-        false => format!("{} points of set {}, to which it was fitted: flattered", row.points, row.set),
+        true => format!("{} of set {}", counted(row.points as usize, "held-out point"), row.set),
+        false => format!("{} of set {}, to which it was fitted: flattered", counted(row.points as usize, "point"), row.set),
     };
     format!("mean {:.4} mm, max {:.4} mm after `{}`, {rows}", row.mean_mm, row.max_mm, row.step)
 }
 
 fn noise(row: &StatisticsRow) -> String {
+    if row.is_inferred() {
+        return format!(
+            "not known: none is recorded, and no `instrument` is stated in `ingest`; points are weighted by an assumed {:.4} mm rms",
+            row.noise_rms_mm
+        );
+    }
     let basis = match row.noise_basis.as_deref() {
-        Some("inferred") => ", inferred: the recording states none, and no `instrument` is stated in `ingest`",
         Some("repeats") => ", by repeated measurements",
         Some(_) => ", by the instrument's statement",
         None => "",

@@ -3,7 +3,7 @@
 use unicode_width::UnicodeWidthStr;
 
 /// Columns of a label.
-const LABEL: usize = 10;
+pub const LABEL: usize = 10;
 /// A terminal narrower than this breaks lines itself.
 const NARROWEST: usize = 40;
 

@@ -8,6 +8,7 @@ mod explanation;
 mod grid;
 mod in_short;
 mod labelled;
+mod limits;
 #[cfg(feature = "query")]
 mod lines;
 mod own_effect;
@@ -25,7 +26,8 @@ pub use explanation::explanation;
 #[cfg(feature = "query")]
 pub use grid::grid;
 pub use in_short::in_short;
-pub use labelled::{folded, labelled};
+pub use labelled::{LABEL, folded, labelled};
+pub use limits::LimitsSummary;
 #[cfg(feature = "query")]
 pub use lines::{csv, json};
 pub use plan::graph;

@@ -56,13 +56,7 @@ pub fn stage(stage: &StageReport) -> String {
     text.push_str(&stage.reason.as_ref().map_or_else(String::new, |reason| format!("because: {reason}\n")));
     text.push_str(&stage.action.as_ref().map_or_else(String::new, |action| format!("action {action}\n")));
     for file in &stage.files {
-        text.push_str(&format!(
-            "file    {} = {}, {} bytes, {:.12}\n",
-            file.place,
-            file.path.display(),
-            file.bytes,
-            file.blake3.as_str()
-        ));
+        text.push_str(&format!("file    {} = {}, {} bytes, {:.12}\n", file.place, file.path, file.bytes, file.blake3.as_str()));
     }
     let mut table = |verb: &str, what: String, table: &TableRef| {
         text.push_str(&format!("{verb:7} {what}, {}, {:.12}\n", counted(table.rows, "row"), table.table_hash.as_str()));

@@ -36,9 +36,7 @@ pub fn statistics(outcome: &CompletedRun, standing: Option<&Standing>, store: &S
         }
     }
     if rows.iter().any(StatisticsRow::is_inferred) {
-        text.push_str(
-            "expected rests on inferred noise: the recording states none, and no `instrument` is stated in `ingest`\n\n",
-        );
+        text.push_str("expected rests on an assumed noise: none is recorded, and no `instrument` is stated in `ingest`\n\n");
     }
     text.push_str(&folds(&rows));
     text.push_str(&references(&rows));
@@ -161,7 +159,7 @@ pub fn rejected_rows(outcome: &CompletedRun) -> u64 {
 /// Nothing where nothing was rejected.
 pub fn rejected(outcome: &CompletedRun) -> String {
     let line = |output: &crate::pipeline::OutputRecord| {
-        let path = output.path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        let path = output.path.as_deref().unwrap_or_default();
         labelled("rejected", &format!("{}, each with its reason in {path}", counted(output.table.rows, "row")))
     };
     outcome.tables(crate::table::Rejected::KIND).filter(|output| output.table.rows > 0).map(line).collect()

@@ -1,6 +1,6 @@
 //! What a diagnosis found, its numbers, and what would explain the data as well: three tables linked by the finding's rank.
 
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, Finding};
 use crate::effect::cause;
 
 crate::table::rows! { "findings",
@@ -30,6 +30,9 @@ crate::table::rows! { "findings",
         valid_joint: Option<i64>,
         valid_from_rad: Option<f64>,
         valid_to_rad: Option<f64>,
+        /// The same of a joint that slides.
+        valid_from_mm: Option<f64>,
+        valid_to_mm: Option<f64>,
         /// Its forms as JSON, by which the model is rebuilt.
         forms: String,
     }
@@ -60,6 +63,18 @@ crate::table::rows! { "rivals",
     }
 }
 
+impl FindingRow {
+    /// The joint (from 1) whose range bounds it, that range as people read it, and the range's unit.
+    pub fn valid_range(&self) -> Option<(i64, [f64; 2], &'static str)> {
+        let joint = self.valid_joint?;
+        match (self.valid_from_rad.zip(self.valid_to_rad), self.valid_from_mm.zip(self.valid_to_mm)) {
+            (Some((from, to)), _) => Some((joint, [from.to_degrees(), to.to_degrees()], "deg")),
+            (None, Some((from, to))) => Some((joint, [from, to], "mm")),
+            (None, None) => None,
+        }
+    }
+}
+
 impl RivalRow {
     /// Whether it is more than the nearest name of a finding that has none: one that the data exclude.
     pub fn is_inseparable(&self) -> bool {
@@ -75,13 +90,17 @@ pub fn is_separable_by_poses(effect: &str) -> bool {
     cause(effect).is_none_or(|cause| cause.is_separable_by_poses())
 }
 
-fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &crate::diagnose::Finding)> {
+fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &Finding)> {
     (1..).zip(&diagnosis.findings)
 }
 
 impl Findings {
     /// A row for each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
+        let turns = |joint: usize| diagnosis.model.robot.is_revolute(joint);
+        let in_rad = |finding: &Finding| finding.valid.filter(|(joint, _)| turns(*joint)).map(|(_, range)| range);
+        let in_mm =
+            |finding: &Finding| finding.valid.filter(|(joint, _)| !turns(*joint)).map(|(_, range)| range.map(|q| 1e3 * q));
         let rows = ranked(diagnosis).map(|(rank, finding)| FindingRow {
             rank,
             effect: finding.effect.into(),
@@ -96,8 +115,10 @@ impl Findings {
             place_probability: Some(finding.probabilities.place),
             none_probability: Some(finding.probabilities.none),
             valid_joint: finding.valid.map(|(joint, _)| joint as i64 + 1),
-            valid_from_rad: finding.valid.map(|(_, range)| range[0]),
-            valid_to_rad: finding.valid.map(|(_, range)| range[1]),
+            valid_from_rad: in_rad(finding).map(|range| range[0]),
+            valid_to_rad: in_rad(finding).map(|range| range[1]),
+            valid_from_mm: in_mm(finding).map(|range| range[0]),
+            valid_to_mm: in_mm(finding).map(|range| range[1]),
             forms: serde_json::to_string(&finding.forms).expect("numbers and names serialise"),
         });
         Self(rows.collect())

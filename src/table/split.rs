@@ -10,7 +10,7 @@ crate::table::rows! { "split",
     }
 }
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, instead};
 use crate::table::Recording;
 
 impl Split {
@@ -20,12 +20,12 @@ impl Split {
         if !same {
             return Err(Error::data("table split", "does not belong to this recording: their sequence numbers differ"));
         }
-        for set in sets {
+        for (k, set) in sets.iter().enumerate() {
             if !self.0.iter().any(|row| row.set == *set) {
                 let mut names: Vec<&str> = self.0.iter().map(|row| row.set.as_str()).collect();
                 names.sort_unstable();
                 names.dedup();
-                return Err(Error::data("with.on", format!("no row is in set `{set}`; the sets are: {}", names.join(", "))));
+                return Err(Error::data(format!("with.on[{k}]"), format!("no row is in set `{set}`{}", instead(set, &names))));
             }
         }
         Ok((0..self.0.len()).filter(|row| sets.contains(&self.0[*row].set)).collect())

@@ -48,6 +48,19 @@ crate::table::rows! { "verdict",
 
 use super::Findings;
 use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};
+use crate::robot::NoiseBasis;
+
+impl VerdictRow {
+    /// Whether nothing is known of the noise: neither was it stated nor measured, nor is it what the joints scatter by.
+    pub fn is_noise_assumed(&self) -> bool {
+        self.is_noise_inferred() && self.repeatability_rad == 0.0
+    }
+
+    /// Whether the noise was neither stated nor measured.
+    pub fn is_noise_inferred(&self) -> bool {
+        self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())
+    }
+}
 
 impl Verdict {
     /// What is wrong with the set-up, where a diagnosis says so: `findings` are its own.

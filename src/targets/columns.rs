@@ -1,5 +1,6 @@
 //! Which column of the targets holds what, by its name: `q1_deg`, `A1_deg`, `x_mm`, `qw`, `a_deg`, `payload_kg`, `temp_c`, `dir1`, ...
 
+use crate::compensate::Stated;
 use crate::error::{Error, Fault, Result};
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::{Header, Quantity, Unit};
@@ -20,6 +21,18 @@ pub(super) enum ColumnRole {
     Current(usize),
 }
 
+impl ColumnRole {
+    /// What is wrong with a number of the column by itself.
+    pub fn fault(self, value: f64) -> Option<String> {
+        match self {
+            Self::Payload => Stated::Payload.fault(value),
+            Self::Temperature => Stated::Temperature.fault(value),
+            Self::Direction(_) => Stated::Direction.fault(value),
+            _ => None,
+        }
+    }
+}
+
 /// Units of columns whose names do not end in one.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Units {
@@ -37,7 +50,9 @@ pub(super) struct TargetColumns {
     /// Column and unit of each joint; empty where joints are not given.
     pub joints: Vec<(usize, Unit)>,
     pub point: bool,
-    pub orientation: bool,
+    pub quaternion: bool,
+    /// A, B, C.
+    pub turns: bool,
 }
 
 /// What columns of joints may be called beside the robot's own names.
@@ -89,7 +104,7 @@ impl TargetColumns {
         if !faults.is_empty() {
             return Err(Error::Spec(faults));
         }
-        Ok(Self { count: header.len(), roles, joints, point: point == 3, orientation: quaternion == 4 || turns == 3 })
+        Ok(Self { count: header.len(), roles, joints, point: point == 3, quaternion: quaternion == 4, turns: turns == 3 })
     }
 }
 

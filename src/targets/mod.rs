@@ -5,6 +5,7 @@ mod columns;
 mod decimal;
 mod fields;
 pub mod parquet;
+mod row;
 pub mod text;
 mod whole;
 

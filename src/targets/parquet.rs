@@ -1,7 +1,7 @@
 //! Targets in Parquet: batch by batch, columns of joints replaced, all others passed on, what is known of each target appended.
 
 use super::columns::{ColumnRole, TargetColumns};
-use super::text::TargetRow;
+use super::row::{FarTurned, TargetRow};
 use super::{Layout, Unreached};
 use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Result};
@@ -28,11 +28,17 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
     let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
-    let mut unreached = Unreached::default();
+    let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
     let mut rows = 0;
     for batch in reader {
         let batch = batch.map_err(fault)?;
         let targets = targets(&batch, &columns, layout, rows)?;
+        for (k, target) in targets.iter().enumerate() {
+            turned.count(|| format!("{}: row {}", layout.place, rows + k + 1), target, layout.robot);
+        }
+        if let Some(fault) = turned.fault(&columns) {
+            return Err(Error::Data(vec![fault]));
+        }
         let answers = corrector.batch(targets);
         for (k, answer) in answers.iter().enumerate().filter(|(_, answer)| answer.q.is_none()) {
             unreached.push(|| format!("{}: row {}", layout.place, rows + k + 1), &answer.remark());
@@ -98,6 +104,10 @@ fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before
                     ColumnRole::Joint(..) | ColumnRole::Axis(..) | ColumnRole::Quaternion(_) | ColumnRole::Turn(..)
                 );
                 if !values.is_null(row) && values.value(row).is_finite() {
+                    if let Some(message) = role.fault(values.value(row)) {
+                        let place = format!("row {}: column `{name}`", before + row + 1);
+                        return Err(Error::data(layout.place, format!("{place}: {message}")));
+                    }
                     taken.take(*role, values.value(row), layout.robot.joints.len());
                 } else if needed {
                     return Err(Error::data(layout.place, format!("row {}: column `{name}` is empty", before + row + 1)));

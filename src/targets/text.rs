@@ -2,13 +2,12 @@
 
 use super::columns::{ColumnRole, TargetColumns};
 use super::fields::fields;
+use super::row::{FarTurned, TargetRow};
 use super::{Layout, Unreached, decimal};
-use crate::compensate::{CommandTarget, CorrectedCommand, Corrector, turns};
+use crate::compensate::{CommandTarget, CorrectedCommand, Corrector};
 use crate::error::{Error, Fault, Result};
-use crate::robot::Bound;
 use crate::robot::description::JointKind;
-use crate::units::{Quantity, Unit};
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use crate::units::Unit;
 use rayon::prelude::*;
 use std::io::{BufRead, Read, Write};
 use std::ops::Range;
@@ -30,8 +29,8 @@ const DECIMALS: usize = 7;
 
 /// Reads targets from `input` to its end and writes them corrected.
 pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
-    let mut unreached = Unreached::default();
-    let mut number = 0;
+    let (mut unreached, mut turned) = (Unreached::default(), FarTurned::default());
+    let (mut number, mut head) = (0, String::new());
     let header = loop {
         let Some(line) = next(input, layout.place)? else {
             return Err(Error::data(layout.place, "is empty; expected a header line and targets"));
@@ -40,7 +39,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
         if !line.trim().is_empty() {
             break line;
         }
-        put(output, &line)?;
+        head.push_str(&line);
     };
     let delimiter = delimiter(&header);
     let (body, ending) = split_ending(&header);
@@ -52,7 +51,8 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
     joints.sort_unstable_by_key(|(index, ..)| *index);
     let table = TextTable { layout, columns: &columns, joints, delimiter };
-    put(output, &format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())))?;
+    // Written with the first rows: a fault among them leaves nothing half done.
+    head.push_str(&format!("{body}{}{ending}", table.appended_names(corrector.has_uncertainty())));
     let mut block = Block::default();
     loop {
         let first = number + 1;
@@ -60,6 +60,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
         let lines: Vec<&str> = block.lines()?;
         number += lines.len();
         if lines.is_empty() {
+            put(output, &head)?;
             return match output.flush() {
                 Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(refused(&error)),
                 _ => Ok(unreached),
@@ -75,10 +76,16 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             return Err(Error::Data(faults));
         }
         let (mut targets, mut spans) = (Vec::with_capacity(lines.len()), Vec::with_capacity(lines.len()));
-        for row in parsed.into_iter().filter_map(Result::ok) {
+        for (k, row) in parsed.into_iter().filter_map(Result::ok).enumerate() {
             let (target, span) = row.unzip();
+            if let Some(target) = &target {
+                turned.count(|| format!("{}:{}", layout.place, first + k), target, layout.robot);
+            }
             targets.extend(target);
             spans.push(span);
+        }
+        if let Some(fault) = turned.fault(&columns) {
+            return Err(Error::Data(vec![fault]));
         }
         let mut answers = corrector.batch(targets).into_iter();
         let rows: Vec<(&str, Option<(Spans, CorrectedCommand)>)> = lines
@@ -92,7 +99,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
             }
         }
         let written: Vec<String> = rows.par_chunks(CHUNK).map(|rows| table.lines(rows)).collect();
-        for text in &written {
+        for text in std::iter::once(&std::mem::take(&mut head)).chain(&written) {
             if !put(output, text)? {
                 return Ok(unreached);
             }
@@ -223,6 +230,9 @@ impl TextTable<'_> {
         let mut row = TargetRow::default();
         for (index, role) in &self.columns.roles {
             if let Some(value) = number(*index)? {
+                if let Some(message) = role.fault(value) {
+                    return Err(format!("column {}: field {}: {message}", cells[*index].0.start + 1, index + 1));
+                }
                 row.take(*role, value, self.layout.robot.joints.len());
             } else if matches!(
                 role,
@@ -315,62 +325,4 @@ fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
         Err(_) => return Err(()),
     };
     if value.is_finite() { Ok(Some(value)) } else { Err(()) }
-}
-
-/// The numbers of one row, by what they mean.
-#[derive(Default)]
-pub(super) struct TargetRow {
-    target: CommandTarget,
-    point: [f64; 3],
-    quaternion: [f64; 4],
-    turns: [f64; 3],
-}
-
-impl TargetRow {
-    pub fn take(&mut self, role: ColumnRole, value: f64, joints: usize) {
-        let put =
-            |slot: &mut Option<Vec<f64>>, joint: usize, value: f64| slot.get_or_insert_with(|| vec![0.0; joints])[joint] = value;
-        match role {
-            ColumnRole::Joint(joint, unit) => put(&mut self.target.q, joint, unit.to_si(value)),
-            ColumnRole::Axis(axis, unit) => self.point[axis] = unit.to_si(value),
-            ColumnRole::Quaternion(part) => self.quaternion[part] = value,
-            ColumnRole::Turn(turn, unit) => self.turns[turn] = unit.to_si(value),
-            ColumnRole::Payload => self.target.payload = Some(value),
-            ColumnRole::Temperature => self.target.temperature = Some(value),
-            ColumnRole::Time => self.target.time = Some(value),
-            ColumnRole::Direction(joint) => put(&mut self.target.direction, joint, value),
-            ColumnRole::Current(joint) => put(&mut self.target.current, joint, value),
-        }
-    }
-
-    pub fn target(mut self, columns: &TargetColumns, cartesian: bool) -> Result<CommandTarget, String> {
-        let joints = self.target.q.iter().flatten().zip(&columns.joints);
-        let joints =
-            joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
-        let others = self.point.iter().map(|x| (Bound::Length, *x)).chain(self.turns.iter().map(|turn| (Bound::Angle, *turn)));
-        if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
-            return Err(message);
-        }
-        // Where joints are the targets, what else stands there is not the tool's place in the base frame, e.g. measured points.
-        if columns.point && (cartesian || columns.joints.is_empty()) {
-            self.target.point = Some(Vector3::from(self.point));
-            if columns.orientation {
-                self.target.rotation = Some(self.rotation()?);
-            }
-        }
-        Ok(self.target)
-    }
-
-    fn rotation(&self) -> Result<Matrix3<f64>, String> {
-        let [w, x, y, z] = self.quaternion;
-        let length = Vector3::new(x, y, z).norm().hypot(w);
-        if length == 0.0 {
-            let [a, b, c] = self.turns;
-            return Ok(turns(a, b, c));
-        }
-        if (length - 1.0).abs() > 1e-3 {
-            return Err(format!("the quaternion has length {length:.4}, expected 1"));
-        }
-        Ok(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner())
-    }
 }

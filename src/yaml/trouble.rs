@@ -2,7 +2,7 @@
 
 use super::Mark;
 use super::path::join;
-use crate::error::{Fault, counted, nearest};
+use crate::error::{Fault, counted, instead};
 use serde::de::{self, Expected, Unexpected};
 use std::fmt;
 
@@ -105,12 +105,6 @@ impl de::Error for Trouble {
     fn duplicate_field(field: &'static str) -> Self {
         Self::new(format!("key `{field}` is given twice"))
     }
-}
-
-/// `; did you mean X? Allowed: X, Y`.
-fn instead(found: &str, allowed: &[&str]) -> String {
-    let hint = nearest(found, allowed.iter().copied()).map(|name| format!("; did you mean `{name}`?"));
-    format!("{} Allowed: {}", hint.unwrap_or_else(|| ".".into()), allowed.join(", "))
 }
 
 /// What serde calls a type, for people who do not write Rust.

@@ -99,3 +99,73 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
     assert!(out.contains("  20: join: {by: id}   # CHECK: the points' names\n"), "{out}");
     assert!(!out.contains("pipeline.yaml: a line is still marked REPLACE"), "{out}");
 }
+
+/// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
+fn told(command: &str, pipeline: &str, tuesday: &str) -> (i32, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::create_dir(folder.path().join("tue")).expect("a folder");
+    let files = [("robot.yaml", ROBOT), ("pipeline.yaml", pipeline), ("arm.csv", ARM), ("points.csv", POINTS)];
+    for (name, text) in files.into_iter().chain([("tue/arm.csv", ARM), ("tue/points.csv", tuesday)]) {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let output = calib(folder.path(), &[command, "pipeline.yaml"], "");
+    (output.status.code().expect("a code"), String::from_utf8(output.stderr).expect("UTF-8"))
+}
+
+#[test]
+fn a_set_that_the_split_does_not_deal_to_is_a_fault_with_its_place() {
+    let with = |split: &str, more: &str| told("check", &format!("{PIPELINE}  - uses: split\n    with: {split}\n{more}"), POINTS);
+    let on = |set: &str| format!("  - uses: identify\n    with: {{effects: [base_frame], on: [{set}]}}\n");
+    let (code, err) = with("{by: every, n: 4}", &on("Fit"));
+    let expected =
+        "pipeline.yaml:23:40: stages[3].with.on[0]: no set `Fit` in the split; did you mean `fit`? Allowed: fit, validate";
+    assert!(code == 2 && err.contains(expected), "{err}");
+    let (code, err) =
+        with("{by: blocks, count: 4, sets: [training, test]}", "  - uses: identify\n    with: {effects: [base_frame]}\n");
+    let expected = "stages[3].with.on[0]: not given, which means `fit`: no set of the split. Allowed: test, training";
+    assert!(code == 2 && err.contains(expected), "{err}");
+    let reference = "  - uses: validate\n    with: {reference: [{label: L, step: identify, set: fitt, mean_mm: 1}]}\n";
+    let (code, err) = with("{by: every, n: 4}", &(on("fit") + reference));
+    assert!(
+        code == 2 && err.contains("stages[4].with.reference[0].set: no set `fitt` in the split; did you mean `fit`?"),
+        "{err}"
+    );
+    // Labels of the data may be any.
+    assert_eq!(with("{by: usage}", &on("Fit")), (0, String::new()));
+    let (code, err) = with("{by: usage, sets: {a: fit, b: check}, blank: rest}", &on("validate"));
+    assert!(code == 2 && err.contains("no set `validate` in the split. Allowed: check, fit, rest"), "{err}");
+}
+
+#[test]
+fn a_setting_that_only_the_data_refute_is_named_with_its_line_and_stage() {
+    let with = |split: &str| {
+        let identify = "  - uses: identify\n    with: {effects: [base_frame], on: [Fit]}\n";
+        told("run", &format!("{PIPELINE}  - uses: split\n    with: {split}\n{identify}"), POINTS)
+    };
+    let (code, err) = with("{by: every, n: 4, rest: Fit}");
+    let expected =
+        "pipeline.yaml:21:26: stages[2].with.n: stage `split`: set `validate` gets none of the 1 row; say a smaller `n`";
+    assert!(code == 10 && err.contains(expected), "{err}");
+    let (code, err) = with("{by: usage, blank: fit}");
+    let expected =
+        "pipeline.yaml:23:40: stages[3].with.on[0]: stage `identify`: no row is in set `Fit`; did you mean `fit`? Allowed: fit";
+    assert!(code == 10 && err.contains(expected), "{err}");
+}
+
+#[test]
+fn files_of_one_name_are_told_by_their_folder() {
+    let pipeline = PIPELINE.replace("join:", "later:\n        - files: [tue/arm.csv, tue/points.csv]\n      join:");
+    let (code, err) = told("check", &pipeline, "id,x,y\nA,1,2\n");
+    assert!(code == 10 && err.contains("tue/points.csv:1: no column `z`"), "{err}");
+}
+
+#[test]
+fn a_name_that_is_too_long_says_how_long_it_may_be() {
+    let (name, id) = ("n".repeat(65), "s".repeat(70));
+    let pipeline = PIPELINE
+        .replace("name: two", &format!("name: {name}"))
+        .replace("  - uses: robot", &format!("  - id: {id}\n    uses: robot"));
+    let (code, err) = told("check", &pipeline, POINTS);
+    assert!(code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")), "{err}");
+    assert!(err.contains(&format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64")), "{err}");
+}

@@ -1,6 +1,7 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
 mod standing;
+mod stated;
 mod true_error;
 mod within;
 
@@ -180,7 +181,7 @@ fn what_is_known_of_a_target_stands_behind_it() {
     assert!((1.6..2.0).contains(&(number(10) / number(9))), "{first:?}");
     assert_eq!(first[11], "");
     assert!(lines.next().expect("a row").contains("joint 6 beyond its limits"), "{said}");
-    assert!(text(&output.stderr).contains("1 of them leave the joint limits"));
+    assert!(text(&output.stderr).contains("1 of them leaves the joint limits"));
 }
 
 #[test]
@@ -253,7 +254,7 @@ fn a_target_that_is_not_reached_gets_no_joints_and_the_others_do() {
         assert!((6000.0..7000.0).contains(&off), "{said}");
         assert!(said.lines().nth(2).is_some_and(|row| row.contains(",\"not reached, 6") && row.ends_with(" mm off\"")), "{said}");
         assert!(told.contains("stdin:3: not reached, 6") && told.contains(" mm off: no joints are written"), "{told}");
-        assert!(told.contains("warning: 1 of them could not be reached and have no joints (column `remark`)"), "{told}");
+        assert!(told.contains("warning: 1 of them could not be reached and has no joints (column `remark`)"), "{told}");
     }
     let plain = calib(cell(), &["compensate", "latest", "--quiet", "--plain"], input);
     assert_eq!(plain.status.code(), Some(10));
@@ -301,7 +302,7 @@ fn quiet_keeps_warnings_and_takes_the_summary() {
     let (loud, quiet) = (told(&[]), told(&["-q"]));
     assert!(loud.contains("model: ") && loud.contains("1 target; "), "{loud}");
     let warnings: String = loud.lines().filter(|line| line.starts_with("warning: ")).map(|line| format!("{line}\n")).collect();
-    assert!(warnings.contains("1 of them leave the joint limits"), "{loud}");
+    assert!(warnings.contains("1 of them leaves the joint limits"), "{loud}");
     assert_eq!(quiet, warnings);
 }
 

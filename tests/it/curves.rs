@@ -4,6 +4,7 @@ use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::effect::{Effect, Form, Load};
 use calib::robot::RobotModel;
+use calib::robot::description::{JointKind, RobotDescription};
 use calib::stage::{Labelled, Report, ReportReads};
 use calib::table::*;
 use serde_json::json;
@@ -32,36 +33,32 @@ fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
         valid_joint: None,
         valid_from_rad: None,
         valid_to_rad: None,
+        valid_from_mm: None,
+        valid_to_mm: None,
         forms: forms.to_string(),
     }
 }
 
-#[test]
-fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own_curve() {
-    let description = fixture::spherical();
+/// A recording of an arm whose whole model are forms with their sizes in stored units, and the curves of its findings.
+fn curves_of(
+    description: &RobotDescription,
+    forms: &[(&serde_json::Value, &[f64])],
+    findings: Vec<FindingRow>,
+) -> (Recording, Curves) {
     let robot = RobotModel::new(description.clone());
-    // Joint 3: products of q2 and q3, what goes once a turn, what goes twice.
-    let wave = |order: u32| json!({"wave": {"order": order, "overtone": false}});
-    let angle = |joint: usize| json!({"angle": {"joint": joint}});
-    let motion = json!({"joint": {"joint": 2}});
-    let times = json!({"of": angle(2), "basis": wave(1)});
-    let pull = json!({"unknown": {"motion": motion, "law": {"of": angle(1), "basis": wave(1), "times": times}}});
-    let gear = |order: u32| json!({"gear_cyclic": {"motion": motion, "law": {"of": angle(2), "basis": wave(order)}}});
-    let (once, twice) = (gear(1), gear(2));
-    let sizes: [&[f64]; 3] = [&[9.0, -4.0, 6.0, 3.0], &[5.0, -7.0], &[-8.0, 2.0]];
     let mut parameters = Parameters::default();
-    for (form, sizes) in [&pull, &once, &twice].into_iter().zip(sizes) {
-        let parsed: Form = serde_json::from_value(form.clone()).expect("a form");
+    for (form, sizes) in forms {
+        let parsed: Form = serde_json::from_value((*form).clone()).expect("a form");
         let text = serde_json::to_string(&parsed).expect("text");
-        for (spec, size) in parsed.parameters(&robot).into_iter().zip(sizes) {
+        for (spec, size) in parsed.parameters(&robot).into_iter().zip(*sizes) {
             parameters.0.push(ParameterRow {
                 name: spec.name,
                 effect: parsed.name().into(),
                 place: spec.place.to_string(),
-                unit: "rad".into(),
+                unit: spec.unit.symbol().into(),
                 nominal: 0.0,
-                value: size * ARCSEC,
-                change: size * ARCSEC,
+                value: *size,
+                change: *size,
                 sigma: None,
                 status: "free".into(),
                 step: "diagnose".into(),
@@ -71,14 +68,15 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
         }
     }
     parameters.0.sort_by(|a, b| a.name.cmp(&b.name));
-    let model = parameters.model(robot.clone(), &[], Load::GravityTorque).expect("a model");
+    let model = parameters.model(robot, &[], Load::GravityTorque).expect("a model");
+    let joints = description.joints.len();
     let mut recording = Recording {
-        joints: 6,
-        prismatic: vec![false; 6],
+        joints,
+        prismatic: description.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect(),
         sequence: (0..ROWS as i64).collect(),
         point_id: (0..ROWS).map(|row| format!("P{row}")).collect(),
         usage: vec![None; ROWS],
-        q: fixture::poses(&description, ROWS),
+        q: fixture::poses(description, ROWS),
         position: vec![[0.0; 3]; ROWS],
         ..Recording::default()
     };
@@ -87,12 +85,11 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
     let split = |row: usize| SplitRow { sequence: row as i64, point_id: format!("P{row}"), set: "validate".into() };
     let split = Split((0..ROWS).map(split).collect());
     let prediction = Prediction::of("diagnose", &model, &data, &recording, &split, &[true; ROWS], None);
-    let findings = vec![finding(1, "cable_drag", &json!([pull, once])), finding(2, "gear_cyclic", &json!([twice]))];
     let reads = ReportReads {
         statistics: Statistics::default(),
         prediction: labelled(prediction),
         parameters: parameters.clone(),
-        robot: Robot::from_description(&description),
+        robot: Robot::from_description(description),
         recording: recording.clone(),
         split,
         intake: Vec::new(),
@@ -110,7 +107,24 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
         suspects: Vec::new(),
     };
     let tables = Desk::default().run(&Report::default(), reads).expect("a report");
-    let curves: Curves = table(&tables).remove(0);
+    (recording, table(&tables).remove(0))
+}
+
+#[test]
+fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own_curve() {
+    // Joint 3: products of q2 and q3, what goes once a turn, what goes twice.
+    let wave = |order: u32| json!({"wave": {"order": order, "overtone": false}});
+    let angle = |joint: usize| json!({"angle": {"joint": joint}});
+    let motion = json!({"joint": {"joint": 2}});
+    let times = json!({"of": angle(2), "basis": wave(1)});
+    let pull = json!({"unknown": {"motion": motion, "law": {"of": angle(1), "basis": wave(1), "times": times}}});
+    let gear = |order: u32| json!({"gear_cyclic": {"motion": motion, "law": {"of": angle(2), "basis": wave(order)}}});
+    let (once, twice) = (gear(1), gear(2));
+    let pulled = [9.0, -4.0, 6.0, 3.0].map(|size| size * ARCSEC);
+    let [geared, evenly] = [[5.0, -7.0], [-8.0, 2.0]].map(|sizes| sizes.map(|size| size * ARCSEC));
+    let findings = vec![finding(1, "cable_drag", &json!([pull, once])), finding(2, "gear_cyclic", &json!([twice]))];
+    let (recording, curves) =
+        curves_of(&fixture::spherical(), &[(&pull, &pulled), (&once, &geared), (&twice, &evenly)], findings);
     assert_eq!(curves.0.len(), 2 * ROWS);
     for point in &curves.0 {
         let q = recording.q(point.sequence as usize);
@@ -124,5 +138,21 @@ fn a_pull_with_a_gear_error_in_it_and_a_gear_error_beside_it_each_have_their_own
         // A chord is the arc to second order.
         assert!((point.fitted / ARCSEC - arcsec).abs() < 0.01, "{point:?}: {arcsec} arcsec");
         assert!(point.with.abs() < 1e-9 && (point.without - point.fitted).abs() < 1e-9, "{point:?}");
+    }
+}
+
+#[test]
+fn what_a_joint_that_slides_errs_by_is_put_over_its_place_in_millimetres() {
+    let law = json!({"of": {"angle": {"joint": 0}}, "basis": {"bump": {"centre": 1.2, "width": 0.3}}});
+    let bump = json!({"unknown": {"motion": {"joint": {"joint": 0}}, "law": law}});
+    let one = FindingRow { place: "joint 1".into(), ..finding(1, "unknown", &json!([bump])) };
+    let (recording, curves) = curves_of(&fixture::on_track(), &[(&bump, &[0.4])], vec![one]);
+    assert_eq!(curves.0.len(), ROWS);
+    for point in &curves.0 {
+        let q = recording.q(point.sequence as usize)[0];
+        assert_eq!((point.over.as_str(), point.x_unit.as_str(), point.unit.as_str()), ("joint 1", "mm", "mm"));
+        assert!((point.x - 1e3 * q).abs() < 1e-9, "{point:?}");
+        let mm = 0.4 * (-((q - 1.2) / 0.3).powi(2)).exp();
+        assert!((point.fitted - mm).abs() < 1e-6, "{point:?}: {mm} mm");
     }
 }

@@ -181,7 +181,7 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
     let text = text.replace("folder: x", "list: none.csv").replace("priors: 1\n", "");
     let path = write(folder.path().join("FLEET.yaml"), &text);
     let (_, said) = output(&mut fleet("run", &path, &store));
-    for part in ["calib: format 2", "2:7: name: expected letters", "robots[1]: expected exactly one"] {
+    for part in ["calib: format 2", "expected letters, digits, `-` and `_`", "robots[1]: expected exactly one"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     let file = file(folder.path(), "sound", "robots:\n  - folders: nothing/*\noverrides:\n  - {robots: [r7]}\n");

@@ -282,6 +282,31 @@ fn every_sentence_is_as_it_was_read() {
 }
 
 #[test]
+fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
+    let robot = RobotModel::new(fixture::on_track());
+    let data = data(&robot, false);
+    let (rows, torque) = ((0..data.rows()).collect::<Vec<_>>(), torques(&robot, &data));
+    let compliance = vec![COMPLIANCE; robot.joints()];
+    let survey = survey_of(&robot, &data, &rows, &torque, &compliance);
+    let mut said: BTreeSet<String> = BTreeSet::new();
+    for hypothesis in hypotheses(&survey).iter().filter(|hypothesis| hypothesis.form.name() == "unknown") {
+        let form = &hypothesis.form;
+        let (place, numbers) = (form.place(), numbers_of(form, &robot));
+        let summary = Summary { place, forms: std::slice::from_ref(form), parameters: &numbers, clock: Clock::Rows };
+        let sentence = form.cause().sentence(&summary);
+        let in_angles = place == Place::Joint(0) && (sentence.contains(" deg") || sentence.contains("arcsec"));
+        let in_turns = sentence.contains("periodic in q1,") || sentence.contains("product of functions of q1 ");
+        assert!(!in_angles && !in_turns, "{form:?}: {sentence}");
+        said.insert(sentence);
+    }
+    let bumps = |joint: usize, width: &str| {
+        let start = format!("joint {joint} has an error that no entry of the library explains: local bump at ");
+        said.iter().any(|sentence| sentence.starts_with(&start) && sentence.ends_with(width))
+    };
+    assert!(bumps(1, " mm, width 80 mm") && bumps(2, " deg, width 9.2 deg"), "{said:?}");
+}
+
+#[test]
 fn every_cause_is_listed_once_and_described() {
     let mut seen = BTreeSet::new();
     for cause in CAUSES {

@@ -205,6 +205,16 @@ fn what_is_not_there_is_named_with_what_is() {
 }
 
 #[test]
+fn under_json_a_fault_is_a_document_too() {
+    let output = calib(STORE.path(), &["query", "HEAD", "SELECT * FROM nosuch", "--json"]);
+    let said: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((output.status.code(), &said["status"], &said["exit_code"]), (Some(2), &"failed".into(), &2.into()));
+    let message = said["faults"][0]["message"].as_str().unwrap();
+    assert!(message.contains("no table `nosuch`"), "{said}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains(message));
+}
+
+#[test]
 fn a_product_of_tables_that_no_memory_holds_is_refused_before_it_is_made() {
     for sql in [
         "SELECT count(*) FROM recording a CROSS JOIN recording b CROSS JOIN recording c CROSS JOIN recording d CROSS JOIN recording e",

@@ -201,6 +201,17 @@ fn rivals_of_a_correction_stand_with_their_errors_and_why_they_were_not_kept() {
 }
 
 #[test]
+fn the_range_of_a_joint_that_slides_is_in_millimetres() {
+    assert!(html(Report::default(), tables("Heavy 6R, cell 4")).contains("Valid for joint 2 from -45.8 to 63.0 deg."));
+    let mut reads = tables("Heavy 6R, cell 4");
+    let row = &mut reads.findings[0].table.0[0];
+    (row.valid_from_rad, row.valid_to_rad) = (None, None);
+    (row.valid_from_mm, row.valid_to_mm) = (Some(12.0), Some(1987.5));
+    assert_eq!(row.valid_range(), Some((2, [12.0, 1987.5], "mm")));
+    assert!(html(Report::default(), reads).contains("Valid for joint 2 from 12.0 to 1987.5 mm."));
+}
+
+#[test]
 fn the_same_tables_give_the_same_bytes() {
     let make = || html(Report::default(), tables("Heavy 6R, cell 4"));
     assert_eq!(make(), make());

@@ -135,3 +135,22 @@ fn the_manifest_of_a_killed_run_says_that_it_did_not_end() {
     assert_eq!(manifest["status"], "running");
     assert_eq!(manifest["seed"], 11);
 }
+
+#[test]
+fn the_log_counts_the_stages_that_a_killed_run_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path();
+    let _held = held::action(store, &UNDISTURBED.actions[3]);
+    let mut child = calib(store).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let ended = || {
+        let runs = std::fs::read_dir(store.join("runs")).into_iter().flatten().flatten();
+        let events = runs.filter_map(|run| std::fs::read_to_string(run.path().join("events.jsonl")).ok());
+        events.map(|text| text.lines().filter(|line| line.contains("\"ends\"")).count()).sum::<usize>()
+    };
+    held::until(&mut child, || ended() == 3);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let log = Command::new(env!("CARGO_BIN_EXE_calib")).args(["log", "--store"]).arg(store).output().unwrap();
+    let said = String::from_utf8_lossy(&log.stdout).into_owned();
+    assert!(said.contains("running or killed, 3 run, 0 cached"), "{said}");
+}

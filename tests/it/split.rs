@@ -54,7 +54,9 @@ fn every_fourth_row_validates() {
     );
     let named = sets("{by: every, n: 3, offset: 0, set: check, rest: learn}", distinct(4)).unwrap();
     assert_eq!(named, ["check", "learn", "learn", "check"]);
-    assert_eq!(refusal("{by: every, n: 4}", distinct(3)), "split: set `validate` gets none of the 3 rows");
+    assert_eq!(refusal("{by: every, n: 4}", distinct(3)), "with.n: set `validate` gets none of the 3 rows; say a smaller `n`");
+    let few = refusal("{by: random, fraction: 0.0001}", distinct(9));
+    assert_eq!(few, "with.fraction: set `validate` gets none of the 9 rows; say a larger `fraction`");
 }
 
 #[test]
@@ -86,9 +88,9 @@ fn usage_labels_become_sets() {
     let mapped = "{by: usage, sets: {train: fit, test: validate}, blank: rest}";
     assert_eq!(sets(mapped, labelled(&["test", "train", ""])).unwrap(), ["validate", "fit", "rest"]);
     let unknown = refusal(mapped, labelled(&["test", "trian"]));
-    assert_eq!(unknown, "split: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian");
+    assert_eq!(unknown, "with.sets: label `trian` (point `P1`) has no set; mapped: test, train; found: test, trian");
     let none = refusal("{by: usage}", labelled(&["", ""]));
-    assert_eq!(none, "split: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`");
+    assert_eq!(none, "with.blank: point `P0` has no usage label; found: none; allowed: map `usage` in ingest, or say `blank`");
 }
 
 #[test]
@@ -96,8 +98,8 @@ fn counts_in_the_order_of_recording_must_fit_the_rows() {
     let yaml = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 1}, {set: a}]}";
     assert_eq!(sets(yaml, distinct(5)).unwrap(), ["a", "a", "b", "a", "a"]);
     let short = "{by: order, sets: [{set: a, rows: 2}, {set: b, rows: 4}]}";
-    assert_eq!(refusal(short, distinct(5)), "split: set `b` takes 4 rows, but only 3 of 5 remain");
-    let message = "split: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
+    assert_eq!(refusal(short, distinct(5)), "with.sets[1].rows: set `b` takes 4 rows, but only 3 of 5 remain");
+    let message = "with.sets: the sets take 6 of 7 rows; let the last one leave `rows` out, or name one more";
     assert_eq!(refusal(short, distinct(7)), message);
 }
 

@@ -75,6 +75,64 @@ fn a_changed_setting_is_told_with_its_stage_and_by_how_much() {
 }
 
 #[test]
+fn of_two_runs_tolerances_hold_in_every_table_that_has_the_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path();
+    run(store, &[]);
+    run(store, &["--set", "seed=12"]);
+    let with = |more: &[&str]| calib(store, &[&["diff", "HEAD~1/validate", "HEAD/validate"], more].concat());
+    assert_eq!(with(&[]).status.code(), Some(1));
+    let within = with(&["--atol", "1e6"]);
+    assert_eq!(within.status.code(), Some(0), "{}", text(&within));
+    assert!(text(&within).contains("within tolerance"), "{}", text(&within));
+    assert_eq!(with(&["--atol", "mean_mm=1m", "--rtol", "1e-9"]).status.code(), Some(1), "the other columns differ");
+    // Of the run's tables few have the column.
+    assert_eq!(calib(store, &["diff", "HEAD~1", "HEAD", "--ignore", "mean_mm"]).status.code(), Some(1));
+    let refused = |flag: &str, value: &str, why: &str| {
+        let output = calib(store, &["diff", "HEAD~1", "HEAD", flag, value]);
+        let said = text(&output);
+        assert!(output.status.code() == Some(2) && said.contains(why), "{said}");
+    };
+    refused("--ignore", "meen_mm", "--ignore: no column `meen_mm` in any table that both runs have; did you mean `mean_mm`?");
+    refused("--atol", "nowhere_mm=1", "--atol: no column `nowhere_mm` in any table that both runs have");
+    refused("--key", "step", "--key: is for two tables: name them as RUN/STAGE/PORT");
+    refused("--quaternion", "a,b,c,d", "--quaternion: is for two tables: name them as RUN/STAGE/PORT");
+}
+
+#[test]
+fn a_limit_that_is_exceeded_is_said_and_ends_with_code_1() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path();
+    let file = pipeline();
+    let with = |limits: &str, more: &[&str]| {
+        let set = format!("report.limits={limits}");
+        calib(store, &[&["run", file.to_str().unwrap(), "--quiet", "--set", &set], more].concat())
+    };
+    for _ in 0..2 {
+        let beyond = with("{mean_mm: 0.000001, max_mm: 500}", &[]);
+        let said = text(&beyond);
+        assert_eq!(beyond.status.code(), Some(1), "{said}");
+        let line = said.lines().find(|line| line.starts_with("limits    ")).unwrap_or_else(|| panic!("{said}"));
+        assert!(
+            line.starts_with("limits    not accepted: beyond the limits at 20 held-out points of set validate, step geometry")
+        );
+        assert!(
+            line.contains("mean 0.") && line.contains("mm, at most 0.000001 mm allowed") && !line.contains("largest"),
+            "{line}"
+        );
+    }
+    let document = with("{mean_mm: 0.000001}", &["--json"]);
+    let read: Value = serde_json::from_slice(&document.stdout).unwrap();
+    assert_eq!((document.status.code(), &read["status"], &read["accepted"]), (Some(1), &"done".into(), &false.into()));
+    assert_eq!((&read["limits"][0]["stage"], &read["limits"][0]["kept"]), (&"report".into(), &false.into()));
+    let kept = with("{mean_mm: 500}", &[]);
+    let said = text(&kept);
+    assert!(kept.status.success() && said.contains("limits    accepted: within the limits at 20 held-out points"), "{said}");
+    let none = calib(store, &["run", file.to_str().unwrap(), "--quiet"]);
+    assert!(none.status.success() && text(&none).lines().all(|line| !line.starts_with("limits")), "{}", text(&none));
+}
+
+#[test]
 fn runs_are_listed_shown_tagged_and_their_tables_traced() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path();
@@ -99,6 +157,47 @@ fn runs_are_listed_shown_tagged_and_their_tables_traced() {
     assert!(text(&refused).contains("did you mean the tag `first`?"), "{}", text(&refused));
     assert_eq!(said(store, &["tag", "--delete", "first"]), "");
     assert_eq!(said(store, &["tag"]), "");
+}
+
+#[test]
+fn a_tag_has_not_the_form_of_an_id_and_says_which_run_it_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path();
+    run(store, &["--set", "seed=12"]);
+    run(store, &[]);
+    let [old, new] = ["HEAD~1", "HEAD"].map(|name| json(store, &["show", name])["run_id"].as_str().unwrap().to_string());
+    for name in [old.clone(), old.to_lowercase(), ulid::Ulid::from_parts(1 << 45, 7).to_string()] {
+        let refused = calib(store, &["tag", "HEAD", &name]);
+        assert_eq!(refused.status.code(), Some(2), "{}", text(&refused));
+        assert!(text(&refused).contains(&format!("tag {name}: has the form of a run's id")), "{}", text(&refused));
+    }
+    assert_eq!(json(store, &["show", &old])["run_id"], old.as_str());
+    assert_eq!(said(store, &["tag", "HEAD~1", "first"]), format!("first is run {old}\n"));
+    assert_eq!(said(store, &["tag", "HEAD", "first"]), format!("first is run {new}, was run {old}\n"));
+    assert_eq!(said(store, &["tag", "HEAD", "first"]), format!("first is run {new}\n"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn folders_whose_names_are_no_text_are_used_all_the_same() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let named = |bytes: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(bytes));
+    let (cell, store) = (named(b"cell\xff\xfe"), named(b"store\xff"));
+    std::fs::create_dir(&cell).unwrap();
+    let robot = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+    std::fs::copy(robot, cell.join("robot.yaml")).unwrap();
+    let yaml = std::fs::read_to_string(pipeline()).unwrap().replace("../../../pipelines/sr210d/robot.yaml", "robot.yaml");
+    std::fs::write(cell.join("p.yaml"), yaml).unwrap();
+    let mut run = Command::new(env!("CARGO_BIN_EXE_calib"));
+    let output = run.arg("run").arg(cell.join("p.yaml")).args(["-q", "--json", "--store"]).arg(&store).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(document["report"].as_str().unwrap().contains("/store\u{fffd}/documents/"), "{document}");
+    let manifest = json(&store, &["show", "HEAD"]);
+    let path = manifest["stages"][0]["files"][0]["path"].as_str().unwrap();
+    assert!(path.ends_with("/cell\u{fffd}\u{fffd}/robot.yaml"), "{path}");
+    assert!(said(&store, &["log"]).contains("resume  done, 7 run, 0 cached"));
 }
 
 #[test]

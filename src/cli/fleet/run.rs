@@ -17,7 +17,8 @@ use std::time::Instant;
 /// Run the pipeline for every robot that has no record yet; a robot with bad data is reported and the others finish.
 ///
 /// The same command again goes on where it stood: what is recorded is never computed again. Tables of the whole fleet and a page
-/// are made at the end. Exit codes: 0 all done; 10 some robots' data were rejected; 75 some could not be computed now; 70 a bug.
+/// are made at the end. Exit codes: 0 all done, also where a robot is beyond the limits of its report; 10 some robots' data were rejected;
+/// 75 some could not be computed now; 70 a bug.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct FleetRunArguments {
@@ -176,6 +177,10 @@ fn chosen(fleet: &Fleet, names: &[String]) -> Result<Vec<usize>> {
 pub(super) fn note(fleet: &Fleet, place: &FleetLocation, run: &str) -> Result<RunNote> {
     let file = std::path::absolute(&place.fleet);
     let file = file.map_err(|error| Error::store(place.fleet.display().to_string(), error.to_string()))?;
+    if file.to_str().is_none() {
+        let message = "its path is not UTF-8, so that no record can name it for other hosts: move or rename the file";
+        return Err(Error::spec(file.display().to_string(), message));
+    }
     let member = |robot: &crate::fleet::FleetRobot| Member { name: robot.name.clone(), groups: robot.groups.clone(), key: None };
     Ok(RunNote {
         run: run.into(),
@@ -226,10 +231,11 @@ fn document(
             "verdict": row.verdict, "causes": row.causes, "flags": row.flags, "run": record.as_ref().and_then(|r| r.run.clone()),
         })
     });
+    let tables: Vec<_> = told.tables.iter().map(|path| path.to_string_lossy()).collect();
     json!({
         "fleet": fleet.name(), "run": run, "robots": robots.collect::<Vec<_>>(), "computed": computed, "wall_seconds": seconds,
         "done": count(records, Ending::Done), "rejected": count(records, Ending::Rejected), "failed": count(records, Ending::Failed),
-        "missing": records.iter().filter(|record| record.is_none()).count(), "tables": told.tables, "page": told.page,
+        "missing": records.iter().filter(|record| record.is_none()).count(), "tables": tables, "page": told.page.to_string_lossy(),
     })
 }
 

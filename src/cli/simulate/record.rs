@@ -68,7 +68,7 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
         std::fs::write(arguments.out.join(name), text).map_err(fault)?;
     }
     if arguments.json {
-        return emit_json(&json!({ "folder": arguments.out, "points": rows, "true_numbers": truth.0.len() }));
+        return emit_json(&json!({ "folder": arguments.out.to_string_lossy(), "points": rows, "true_numbers": truth.0.len() }));
     }
     emit(&format!("{}, {}: {}\n", counted(rows, "point"), counted(truth.0.len(), "true number"), arguments.out.display()))
 }

@@ -10,17 +10,20 @@ use std::collections::BTreeMap;
 pub(super) struct NamedVariable {
     pub name: String,
     pub is_angle: bool,
+    /// Whether it is the position of a joint that slides.
+    pub is_length: bool,
     /// Over the fitted rows, rounded outwards; of angles a turn to either side.
     pub range: [f64; 2],
 }
 
 impl NamedVariable {
-    /// Of a law at a joint; `None` of one that has no name in formulas.
-    pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2]) -> Option<Self> {
+    /// Of a law at a joint; `None` of one that has no name in formulas. `slides`: which joints do not turn.
+    pub fn of(variable: Variable, joint: usize, [low, high]: [f64; 2], slides: impl Fn(usize) -> bool) -> Option<Self> {
         let name = variable.in_formulas(joint)?;
-        let is_angle = matches!(variable, Variable::Angle { .. });
+        let is_length = matches!(variable, Variable::Angle { joint } if slides(joint));
+        let is_angle = matches!(variable, Variable::Angle { .. }) && !is_length;
         let range = if is_angle { [-TURN, TURN] } else { [rounded(low, f64::floor), rounded(high, f64::ceil)] };
-        (range[0] < range[1]).then_some(Self { name, is_angle, range })
+        (range[0] < range[1]).then_some(Self { name, is_angle, is_length, range })
     }
 }
 
@@ -48,18 +51,18 @@ struct Sketch {
     shape: Vec<(&'static str, ShapeRange)>,
 }
 
-/// Declarations of all formulas at `place` of one variable, or of two.
-pub(super) fn declarations(place: &str, variables: &[NamedVariable]) -> Vec<EffectDeclaration> {
+/// Declarations of all formulas at `place` of one variable, or of two; their coefficients are in `unit`.
+pub(super) fn declarations(place: &str, unit: &str, variables: &[NamedVariable]) -> Vec<EffectDeclaration> {
     let sketches = match variables {
         [one] => of_one(one),
         [first, second] => of_two(first, second),
         _ => Vec::new(),
     };
     let of: Vec<String> = variables.iter().map(|variable| variable.name.replace(['(', ')', '.'], "_")).collect();
-    sketches.into_iter().map(|sketch| declaration(place, &of.join("_and_"), sketch)).collect()
+    sketches.into_iter().map(|sketch| declaration((place, unit), &of.join("_and_"), sketch)).collect()
 }
 
-fn declaration(place: &str, of: &str, sketch: Sketch) -> EffectDeclaration {
+fn declaration((place, unit): (&str, &str), of: &str, sketch: Sketch) -> EffectDeclaration {
     let formulas = sketch.laws.join("; ");
     EffectDeclaration {
         name: format!("{}_of_{of}", sketch.label),
@@ -67,7 +70,7 @@ fn declaration(place: &str, of: &str, sketch: Sketch) -> EffectDeclaration {
         sentence: Some(format!("{{place}} errs by {{values}} times {formulas}{}", told(&sketch.shape))),
         law: Laws(sketch.laws),
         shape: sketch.shape.into_iter().map(|(name, range)| (name.to_string(), range)).collect::<BTreeMap<_, _>>(),
-        unit: Some("rad".into()),
+        unit: Some(unit.into()),
         ..EffectDeclaration::default()
     }
 }
@@ -196,19 +199,33 @@ mod tests {
 
     #[test]
     fn every_formula_is_a_declaration_without_a_fault() {
-        let angle = NamedVariable::of(Variable::Angle { joint: 2 }, 2, [-1.0, 1.0]).expect("a name");
-        let load = NamedVariable::of(Variable::Load { joint: 2 }, 2, [-113.0, 87.0]).expect("a name");
-        let other = NamedVariable::of(Variable::Angle { joint: 4 }, 2, [0.0, 1.0]).expect("a name");
+        let named = |variable, range| NamedVariable::of(variable, 2, range, |joint| joint == 0).expect("a name");
+        let angle = named(Variable::Angle { joint: 2 }, [-1.0, 1.0]);
+        let load = named(Variable::Load { joint: 2 }, [-113.0, 87.0]);
+        let other = named(Variable::Angle { joint: 4 }, [0.0, 1.0]);
         assert_eq!([&angle.name, &load.name, &other.name], ["q", "load", "q5"]);
         assert_eq!(load.range, [-200.0, 90.0]);
         for variables in [vec![angle.clone()], vec![load.clone()], vec![angle.clone(), load], vec![angle, other]] {
-            let all = declarations("joint 3", &variables);
+            let all = declarations("joint 3", "rad", &variables);
             assert!(all.len() > 10);
             for declaration in all {
                 if let Err(faults) = DeclaredCause::of(&declaration) {
                     panic!("{declaration:?}: {faults:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_rail_errs_by_millimetres_over_its_own_travel() {
+        let rail = NamedVariable::of(Variable::Angle { joint: 0 }, 0, [0.012, 1.987], |joint| joint == 0).expect("a name");
+        assert_eq!((rail.name.as_str(), rail.is_angle, rail.is_length, rail.range), ("q", false, true, [0.01, 2.0]));
+        let all = declarations("joint 1", "mm", &[rail]);
+        assert!(all.iter().any(|declaration| declaration.name == "bump_of_q"));
+        for declaration in all {
+            assert_eq!(declaration.unit.as_deref(), Some("mm"));
+            let within = declaration.shape.get("centre").is_none_or(|centre| (centre.from, centre.to) == (0.01, 2.0));
+            assert!(within && DeclaredCause::of(&declaration).is_ok(), "{declaration:?}");
         }
     }
 }

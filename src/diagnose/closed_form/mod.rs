@@ -55,7 +55,9 @@ impl FormulaSearch<'_, '_> {
         let mut rest: Vec<usize> = (0..self.set.len()).filter(|i| !members.contains(i)).map(|i| self.set[i]).collect();
         rest.sort_unstable();
         let beside = Beside::of(self.pool, &rest);
-        let candidates: Vec<Candidate> = declarations(&place, &variables)
+        let Place::Joint(joint) = finding.place else { return None };
+        let unit = if self.survey.robot.is_revolute(joint) { "rad" } else { "mm" };
+        let candidates: Vec<Candidate> = declarations(&place, unit, &variables)
             .iter()
             .filter_map(|declaration| self.candidate(DeclaredCause::of(declaration).ok()?, finding.place, &beside))
             .collect();
@@ -98,7 +100,8 @@ impl FormulaSearch<'_, '_> {
             }
         }
         let joint = joint?;
-        let named = |of: &Variable| NamedVariable::of(*of, joint, self.range(*of)?);
+        let slides = |joint: usize| !self.survey.robot.is_revolute(joint);
+        let named = |of: &Variable| NamedVariable::of(*of, joint, self.range(*of)?, slides);
         let named: Vec<NamedVariable> = variables.iter().map(named).collect::<Option<_>>()?;
         let anywhere = self.survey.robot.is_revolute(joint) && variables.iter().all(|of| of.is_of(joint));
         let place = if anywhere { "joint".into() } else { Place::Joint(joint).to_string() };
@@ -157,7 +160,10 @@ impl FormulaSearch<'_, '_> {
         let sigmas = shape_sigmas(form, beside);
         let shape = form.shape_numbers().into_iter().zip(sigmas);
         let mut out: Vec<ParameterEstimate> = shape
-            .map(|((name, value), sigma)| ParameterEstimate { unit: unit(&name, variables), name, form: 0, value, sigma })
+            .map(|((name, value), sigma)| {
+                let (unit, scale) = unit(&name, variables);
+                ParameterEstimate { unit, name, form: 0, value: scale * value, sigma: sigma.map(|sigma| scale * sigma) }
+            })
             .collect();
         let others = self.state.causes.iter().enumerate().filter(|(i, _)| !members.contains(i)).map(|(_, cause)| cause.clone());
         let fitted = self.fitter.fit(&self.state.model, others.chain([self.at_zero(form)]).collect());
@@ -176,11 +182,14 @@ impl FormulaSearch<'_, '_> {
     }
 }
 
-/// The unit of a shape number: that of the variable, or turns of it; in SI where it is no angle.
-fn unit(name: &str, variables: &[NamedVariable]) -> &'static str {
-    match (name, variables.iter().all(|variable| variable.is_angle)) {
-        ("order", true) => "1",
-        (_, true) => "rad",
-        _ => "SI",
+/// The unit of a shape number, and the factor from SI: that of the variable, or turns of it; in SI where it is no position of a joint.
+fn unit(name: &str, variables: &[NamedVariable]) -> (&'static str, f64) {
+    let all = |is: fn(&NamedVariable) -> bool| variables.iter().all(is);
+    match name {
+        "order" if all(|variable| variable.is_angle) => ("1", 1.0),
+        "order" => ("SI", 1.0),
+        _ if all(|variable| variable.is_angle) => ("rad", 1.0),
+        _ if all(|variable| variable.is_length) => ("mm", 1e3),
+        _ => ("SI", 1.0),
     }
 }

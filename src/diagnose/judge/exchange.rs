@@ -34,6 +34,8 @@ pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &Mod
             }
             Outcome::Dropped(state, errors) => {
                 *set = contested.rest;
+                // Gains were those of a model that is gone.
+                gains.clear();
                 (now, seen) = (*state, errors);
                 at = 0;
             }
@@ -41,6 +43,7 @@ pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &Mod
                 *set = contested.rest;
                 set.push(with);
                 let (effect, place) = named(pool, with);
+                gains.clear();
                 gains.push(FoldGain { effect, place, gain });
                 (now, seen) = (*state, errors);
                 at = 0;

@@ -26,6 +26,8 @@ pub(super) fn withdraw(
         *set = (0..set.len()).filter(kept).map(|i| set[i]).collect();
         said.push(sentence);
         now = state;
+        // Gains were those of a model that is gone.
+        gains.clear();
     }
     if let Some(base) = useless(&now, comparison) {
         set.clear();
@@ -195,6 +197,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
             prior_weight: 1.0,
             without: &[],
             own: &[],
+            beside_simulation: false,
             seed: 1,
         };
         let (fitter, now) = Fitter::start(&question);

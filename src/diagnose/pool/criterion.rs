@@ -39,8 +39,18 @@ impl HypothesisSet<'_> {
         n * (rest / n).ln() + n.ln() * solution.rank as f64 + penalties + self.sign_penalty(set, solution)
     }
 
-    /// Penalty for every coefficient that has the wrong sign or is too large, by more than two standard errors.
+    /// Penalty for every coefficient that has the wrong sign or is too large, and for what moves against its load, by more than two
+    /// standard errors.
     fn sign_penalty(&self, set: &[usize], solution: &Solution) -> f64 {
+        let mut from = 0;
+        let against = set.iter().filter(|k| {
+            let begin = from;
+            from += self.first[**k + 1] - self.first[**k];
+            self.hypotheses[**k]
+                .form
+                .is_against_load(&solution.coefficients[begin..from], &|column| 2.0 * solution.error(begin + column))
+        });
+        let against = against.count();
         let columns = set.iter().flat_map(|k| (self.first[*k]..self.first[*k + 1]).map(move |_| *k));
         let wrong = columns.zip(&solution.coefficients).enumerate().filter(|(column, (k, value))| {
             let Hypothesis { positive, largest, .. } = self.hypotheses[*k];
@@ -48,6 +58,6 @@ impl HypothesisSet<'_> {
             let error = if suspicious { solution.error(*column) } else { 0.0 };
             (positive && **value < -2.0 * error) || value.abs() - 2.0 * error > largest
         });
-        IMPLAUSIBLE * wrong.count() as f64
+        IMPLAUSIBLE * (wrong.count() + against) as f64
     }
 }

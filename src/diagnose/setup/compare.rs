@@ -34,6 +34,7 @@ pub(super) struct AsStated<'a> {
     /// m.
     pub reach: f64,
     cloud: f64,
+    noise: f64,
 }
 
 /// Set-up errors that together explain what the nominal robot leaves, those that explain as well, and what is left without them.
@@ -58,7 +59,8 @@ impl<'a> AsStated<'a> {
         let sample = sampled(question.fit);
         let judges = sample.iter().filter_map(|row| rows.binary_search(row).ok()).collect();
         let pairs = PointPairs::of(question.robot, data, sample.iter().map(|row| (*row, *row)));
-        Self { question, rows, judges, placed: place(&pairs, None), reach: pairs.reach(), cloud: pairs.cloud() }
+        let noise = (sample.iter().map(|row| data.noise(*row).powi(2)).sum::<f64>() / sample.len().max(1) as f64).sqrt();
+        Self { question, rows, judges, placed: place(&pairs, None), reach: pairs.reach(), cloud: pairs.cloud(), noise }
     }
 
     /// What the nominal robot leaves, as a share of its reach.
@@ -71,9 +73,9 @@ impl<'a> AsStated<'a> {
         self.share_of_reach() > NOMINAL
     }
 
-    /// Whether the nominal robot leaves more than most.
+    /// Whether the nominal robot leaves more than most, and more than the noise of its points.
     pub fn is_far_off(&self) -> bool {
-        self.is_no_robot() || self.share() > NOMINAL
+        self.is_no_robot() || self.share() > NOMINAL && self.placed.left > self.noise
     }
 
     fn share(&self) -> f64 {

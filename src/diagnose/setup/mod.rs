@@ -23,7 +23,7 @@ const FEWEST: usize = 10;
 
 /// What is wrong with the set-up, if the nominal robot is far off its points; without findings where nothing of the list explains it.
 pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
-    if question.fit.len() < FEWEST {
+    if question.fit.len() < FEWEST || question.beside_simulation {
         return None;
     }
     let stated = AsStated::of(question);
@@ -38,6 +38,9 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
 
 /// What is wrong with the set-up, if the identified base model leaves the robot file by more than manufacture errs.
 pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Option<Diagnosis> {
+    if question.beside_simulation {
+        return None;
+    }
     let stated = AsStated::of(question);
     let beyond = manufacture::beyond(now, question.robot, stated.reach);
     if beyond.is_empty() {

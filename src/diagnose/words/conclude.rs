@@ -8,7 +8,7 @@ use super::unseen::by_speed;
 use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
-use crate::diagnose::misfit::{Misfit, TOO_LOUD};
+use crate::diagnose::misfit::{LOUD, Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
@@ -18,8 +18,6 @@ use crate::estimate::cross_validate;
 use crate::robot::NoiseBasis;
 use nalgebra::Vector3;
 
-/// With structure left, a residual this much larger than the noise is not explained.
-const LOUD: f64 = 1.25;
 /// Without repeats a residual is not called noise where it is this many times the instrument's.
 const NOT_NOISE: f64 = 4.0;
 
@@ -34,10 +32,15 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let predicted = state.model.predict(data);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
     let (rest, mut findings) = without_small_rests(findings(&last));
-    let something_left =
-        (last.last <= SIGNIFICANT && misfit.chi_square > LOUD) || misfit.chi_square > TOO_LOUD || misfit.not_carried;
+    let basis = basis(fitter);
+    // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
+    let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
+    let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= SIGNIFICANT);
+    let structured = last.last <= SIGNIFICANT || lacking;
+    let something_left = structured && misfit.chi_square > LOUD || misfit.chi_square > TOO_LOUD || misfit.not_carried.is_some();
     let verdict = verdict(&findings, &misfit, something_left, fitter.repeatability);
-    let signature = signature(&rest, &last, something_left, misfit.not_carried);
+    let nameless = !something_left && only_unknown(&findings);
+    let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
     findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
@@ -48,8 +51,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let formulas = search.of_all(&findings);
     let state = last.judged.state;
     let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
-    let basis = basis(fitter);
-    let ground = misfit.ground(data, basis, fitter.repeatability.repeats);
+    let ground = misfit.ground(data, basis, fitter.repeatability.repeats, nameless);
     Diagnosis {
         statement: statement(verdict, &ground),
         noise_basis: basis,
@@ -99,11 +101,15 @@ fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
     findings.into_iter().partition(small)
 }
 
+/// Whether something was found, and none of it has a name.
+fn only_unknown(findings: &[Finding]) -> bool {
+    let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
+    physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME)
+}
+
 fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
     let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
-    let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
-    let only_unknown = physics.peek().is_some() && physics.all(|finding| finding.effect == Unknown::NAME);
-    if blind || something_left || only_unknown {
+    if blind || something_left || only_unknown(findings) {
         VerdictKind::Unexplained
     } else if findings.is_empty() {
         VerdictKind::NothingMissing

@@ -103,8 +103,16 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
 fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
     let state = &last.judged.state;
     members.iter().find_map(|i| {
-        let Hypothesis { positive, largest, .. } = last.pool.hypotheses[last.judged.set[*i]];
-        state.ranges[*i].clone().find_map(|k| {
+        let Hypothesis { positive, largest, ref form, .. } = last.pool.hypotheses[last.judged.set[*i]];
+        let range = state.ranges[*i].clone();
+        let error = |column: usize| match state.fitted.statuses[range.start + column] {
+            ParameterStatus::Free(sigma) => FIRM * sigma,
+            _ => 0.0,
+        };
+        if form.is_against_load(&state.model.x[range.clone()], &error) {
+            return Some("has the wrong sign");
+        }
+        range.clone().find_map(|k| {
             let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else { return None };
             let value = state.model.x[k];
             if positive && value < -FIRM * sigma {

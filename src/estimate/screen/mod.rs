@@ -97,7 +97,8 @@ pub fn fit_screened(start: &Model, data: &Measurements, options: &FitOptions, se
     let mut aside = BTreeSet::new();
     for round in 0.. {
         let held = if round < READMITTING { BTreeSet::new() } else { aside.clone() };
-        let Screened { suspects, crowd, reach, followed } = screen(&model, data, &kept, &fitted, set, &held, &slipped);
+        let Screened { suspects, crowd, reach, followed } =
+            screen(&model, data, &Rows { asked: options.rows, kept: &kept, set }, &fitted, &held, &slipped);
         // What the fitted model follows never slipped.
         slipped.retain(|row, _| !followed.contains(row));
         aside = suspects.iter().filter(|suspect| !suspect.used()).map(|suspect| suspect.row).collect();
@@ -137,20 +138,31 @@ struct Screened {
     followed: BTreeSet<usize>,
 }
 
-/// Suspects of a model that was fitted to the rows `kept`, and how many rows make up a crowd. Rows in `held` stay suspects.
+/// The rows of a look.
+struct Rows<'a> {
+    /// To be fitted, suspects among them. They alone say where far outside begins: held-out rows choose nothing.
+    asked: &'a [usize],
+    /// That were fitted.
+    kept: &'a [usize],
+    /// The number of the set of every row.
+    set: &'a [usize],
+}
+
+/// Suspects of a model that was fitted to the rows kept, and how many rows make up a crowd. Rows in `held` stay suspects.
 fn screen(
     model: &Model,
     data: &Measurements,
-    kept: &[usize],
+    rows: &Rows,
     fitted: &Fitted,
-    set: &[usize],
     held: &BTreeSet<usize>,
     slipped: &BTreeMap<usize, i64>,
 ) -> Screened {
+    let Rows { asked, kept, set } = *rows;
     let problem = Problem { data, rows: kept, excess: fitted.excess() };
     let mut standings = leave_one_out(&problem, model, &fitted.free());
     measure_by_set(&mut standings, set);
-    let limit = limit(&standings);
+    let bulk = bulk(&standings, asked);
+    let limit = limit(&bulk);
     let flagged: Vec<usize> = (0..standings.len()).filter(|row| standings[*row].distance > limit || held.contains(row)).collect();
     let mut named = kind::name(data, &standings, &flagged, limit, data.in_motion(kept));
     named.extend(beside(data, &named));
@@ -177,7 +189,7 @@ fn screen(
         statistic: standings[*row].distance,
     }));
     suspects.sort_by_key(|suspect| suspect.row);
-    Screened { suspects, crowd, reach: tail::reach(&bulk(&standings), standings.len()), followed }
+    Screened { suspects, crowd, reach: tail::reach(&bulk, standings.len()), followed }
 }
 
 /// Divides distances by the spread of their set, where that is more than the fit's own.
@@ -195,13 +207,13 @@ fn measure_by_set(standings: &mut [LeaveOneOut], set: &[usize]) {
 }
 
 /// Where far outside the bulk begins.
-fn limit(standings: &[LeaveOneOut]) -> f64 {
-    (FAR * nearest(&mut bulk(standings), BULK).unwrap_or(0.0)).min(GROSS)
+fn limit(bulk: &[f64]) -> f64 {
+    (FAR * nearest(&mut bulk.to_vec(), BULK).unwrap_or(0.0)).min(GROSS)
 }
 
-/// Distances of the rows that are not gross.
-fn bulk(standings: &[LeaveOneOut]) -> Vec<f64> {
-    standings.iter().map(|standing| standing.distance).filter(|distance| *distance <= GROSS).collect()
+/// Distances of those of the rows that are not gross.
+fn bulk(standings: &[LeaveOneOut], rows: &[usize]) -> Vec<f64> {
+    rows.iter().map(|row| standings[*row].distance).filter(|distance| *distance <= GROSS).collect()
 }
 
 /// The other targets of stops at which most are off without a reason of their own: it is the joints of the stop that are wrong.

@@ -118,7 +118,7 @@ impl PoseAnswer for Apart<'_> {
             "conclusion": self.conclusion(),
             "approach_visible_share": proposed.as_ref().map(|proposed| proposed.approach_seen),
             "self_collision_checked": false,
-            "out": self.request.out,
+            "out": self.request.out.as_ref().map(|out| out.to_string_lossy()),
             "poses": self.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
         })
     }

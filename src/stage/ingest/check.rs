@@ -1,30 +1,17 @@
 //! Faults of the settings that types cannot express, each with its place below `with`.
 
-use super::Ingest;
+use super::axes::{self, needed};
 use super::clock::CLOCK;
 use super::columns::Columns;
 use super::later;
 use super::layout::{Duplicates, FileLayout, Join};
 use super::mapped::{ColumnRef, ConventionColumns, JointColumns, ScalarColumn};
 use super::noise;
+use super::{Ingest, twice};
 use crate::error::{Fault, counted, nearest};
 use crate::observation::{Conventions, DeclaredColumn, KINDS, MeasurementKind, Part};
 use crate::table::recording_columns;
 use crate::units::{Quantity, Unit};
-
-/// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
-fn needed(settings: &Ingest) -> Vec<&'static str> {
-    let [first, others @ ..] = KINDS else { return Vec::new() };
-    let mapped =
-        |kind: &&dyn MeasurementKind, columns: &Columns| kind.columns(Part::Value).any(|column| columns.has(column.setting));
-    let other = |file: &FileLayout| others.iter().any(|kind| mapped(kind, &file.columns));
-    let axes = match &settings.axes {
-        Some(axes) => axes.iter().map(|axis| axis.name()).collect(),
-        None if settings.files.iter().any(other) => Vec::new(),
-        None => first.columns(Part::Value).map(|column| column.setting).collect(),
-    };
-    std::iter::once("q").chain(axes).collect()
-}
 
 /// All faults at once.
 pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
@@ -40,6 +27,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
         file_faults(file, &format!("files[{index}]"), &mut faults);
     }
     faults.extend(later::faults(settings));
+    axes::faults(settings, &mut faults);
     together(settings, &mut faults);
     motion_faults(settings, &mut faults);
     faults.extend(noise::faults(settings));
@@ -104,6 +92,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         let place = format!("{place}.columns.{}", declared.setting);
         convention_faults(declared, conventions, mapped, file, &place, faults);
     }
+    twice::faults(file, place, faults);
     for kind in KINDS {
         kind_faults(*kind, columns, &format!("{place}.columns"), faults);
     }

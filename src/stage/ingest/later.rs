@@ -6,6 +6,7 @@ use crate::error::{Fault, counted};
 use crate::stage::RawFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::{Component, PathBuf};
 
 /// Files of a later measurement, in the layout of `files`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,6 +33,21 @@ impl Ingest {
         });
         std::iter::once(Self { later: Vec::new(), ..self.clone() }).chain(later).collect()
     }
+
+    /// Where the files of the later measurement `index` already stand, all of them.
+    fn earlier_of_the_same_files(&self, index: usize) -> Option<String> {
+        let later = |k: usize| self.later.get(k).map(|later| paths(later.files.iter()));
+        let own = later(index)?;
+        if paths(self.files.iter().map(|layout| &layout.file)) == own {
+            return Some("files".into());
+        }
+        (0..index).find(|k| later(*k).as_ref() == Some(&own)).map(|k| format!("later[{k}].files"))
+    }
+}
+
+/// Paths without what does not change them, as `./`.
+fn paths<'a>(files: impl Iterator<Item = &'a RawFile>) -> Vec<PathBuf> {
+    files.map(|file| file.0.components().filter(|part| *part != Component::CurDir).collect()).collect()
 }
 
 pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
@@ -45,8 +61,15 @@ pub(super) fn faults(settings: &Ingest) -> impl Iterator<Item = Fault> + '_ {
             );
             Fault::new(format!("{place}.files"), message)
         });
+        let again = (expected > 0).then(|| settings.earlier_of_the_same_files(index)).flatten().map(|earlier| {
+            let message = format!(
+                "the files of `{earlier}` again: every row would be used twice, and copies look like perfect repeatability; name the files \
+                 of another measurement, or take these out"
+            );
+            Fault::new(format!("{place}.files"), message)
+        });
         let gap = !(later.gap_s >= 0.0 && later.gap_s.is_finite());
-        files.into_iter().chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
+        files.into_iter().chain(again).chain(gap.then(|| Fault::new(format!("{place}.gap_s"), "allowed: 0 or more, s")))
     })
 }
 

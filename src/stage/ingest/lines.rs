@@ -89,6 +89,16 @@ impl TextReader {
         if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
             return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark), Windows-1252"));
         }
+        // Old Macintosh; one at the end may be a CRLF that was cut.
+        let lone = head.iter().position(|byte| *byte == b'\r').is_some_and(|at| at + 1 < head.len());
+        if lone && !head.contains(&b'\n') {
+            let message = format!(
+                "the lines end in CR alone; allowed: LF or CRLF. Save it again with such line ends, or convert it: \
+                 `tr '\\r' '\\n' < {} > converted.csv`",
+                self.label
+            );
+            return Err(Error::data(&self.label, message));
+        }
         if head.starts_with(&[0xef, 0xbb, 0xbf]) {
             self.reader.consume(3);
             self.bytes += 3;

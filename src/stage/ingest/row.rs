@@ -8,12 +8,10 @@ use super::layout::{Decimal, LimitPolicy};
 use super::lines::RecordFields;
 use super::number::{self, NumberFault};
 use super::slots::KindSlots;
+use crate::robot::ONE_AND_A_HALF_TURNS;
 
 /// A joint at its limit is not beyond it: what rounding in the file's unit may add, rad or m.
 const SLACK: f64 = 1e-6;
-
-/// More than one and a half turns is no position of a joint in rad, but a common one in degrees.
-const TURNS: f64 = 3.0 * std::f64::consts::PI;
 
 /// A tracker that lost its beam writes these as zero.
 const POINT: [&str; 3] = ["x", "y", "z"];
@@ -155,7 +153,7 @@ impl RowReader<'_> {
             }
             value = cell.sign * (value - cell.zero) / cell.divisor;
             let joint = cell.index.wrapping_sub(self.arm.slots.q.start);
-            if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > TURNS {
+            if self.arm.prismatic.get(joint) == Some(&false) && value.abs() > ONE_AND_A_HALF_TURNS {
                 row.turned.get_or_insert((joint, value));
             }
             let [lower, upper] = cell.range;

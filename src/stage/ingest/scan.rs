@@ -106,7 +106,14 @@ pub(super) struct Scan {
     pub largest: f64,
     /// Where the arm moves: of the file with the joints.
     pub track: Option<Track>,
+    /// Hash of what all its usable rows say, of a file with what was measured.
+    pub measured: Option<blake3::Hash>,
+    /// Ids of the first usable rows with their data rows, for a join by id.
+    pub ids: Vec<(u32, String)>,
 }
+
+/// Ids that are kept for examples.
+const EXAMPLES: usize = 1000;
 
 impl Scan {
     pub(super) fn refused(&self) -> u64 {
@@ -151,7 +158,10 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         beyond: FileOddities::default(),
         largest: 0.0,
         track: None,
+        measured: None,
+        ids: Vec::new(),
     };
+    let mut measured = reading.binding().measures.then(blake3::Hasher::new);
     let mut samples = is_track(settings, layout).then(JointSamples::default);
     let keyed = layout.columns.has("point_id") && settings.duplicates != super::layout::Duplicates::Keep;
     let timed = matches!(settings.join, Some(Join::Time { .. }));
@@ -167,6 +177,12 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
             Ok(()) => {
                 if keyed && !row.id.is_empty() {
                     scan.keys.push(key(row, index, &scan.label)?);
+                }
+                if matches!(settings.join, Some(Join::Id {})) && scan.ids.len() < EXAMPLES {
+                    scan.ids.push((narrow(row.number, &scan.label)?, row.id.clone()));
+                }
+                if let Some(hasher) = &mut measured {
+                    hasher.update(&row.number.to_le_bytes()).update(&content(row).to_le_bytes());
                 }
                 if timed {
                     let time = row.values.get(arm.slots.time).copied().unwrap_or(f64::NAN);
@@ -191,6 +207,7 @@ pub(super) fn scan(settings: &Ingest, index: usize, layout: &FileLayout, arm: &R
         pace.row(reading.bytes());
     }
     context.services.advance(reading.bytes(), "");
+    scan.measured = measured.map(|hasher| hasher.finalize());
     scan.lines = reading.lines();
     scan.read = reading.row.number;
     if scan.read == 0 {

@@ -9,6 +9,7 @@ use super::row::Reason;
 use super::scan::{RefusalCount, Scan};
 use crate::error::{Error, Fault, Result, counted};
 use crate::stage::Context;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Beyond this largest angle, deg, a file in degrees is believed to be one.
 const SMALL_IN_DEGREES: f64 = 6.5;
@@ -31,7 +32,7 @@ pub(super) fn judge(
 ) -> Result<()> {
     let mut faults = unequal(settings, scans);
     for (index, (scan, layout)) in scans.iter().zip(&settings.files).enumerate() {
-        let angles = implausible(scan, &layout.columns, settings.limits);
+        let angles = implausible(scan, &layout.columns, settings.limits, arm);
         let fault = angles.or_else(|| too_many_rejected(settings, scans, fates, index));
         if fault.is_none() {
             warn(scan, &layout.columns, settings.limits, arm, context);
@@ -64,7 +65,7 @@ fn unequal(settings: &Ingest, scans: &[Scan]) -> Vec<Fault> {
     faults.collect()
 }
 
-fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy) -> Option<Fault> {
+fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints) -> Option<Fault> {
     let unit = columns.joint("q")?.unit.as_deref().unwrap_or("rad");
     let judged = scan.used() + scan.tally.get(&Reason::OutOfRange).map_or(0, |count| count.rows);
     if scan.turns.rows * 2 > judged
@@ -89,9 +90,10 @@ fn implausible(scan: &Scan, columns: &Columns, limits: LimitPolicy) -> Option<Fa
     {
         let degrees = if unit == "deg" { "" } else { "; if the file holds degrees, say `unit: deg`" };
         let message = format!(
-            "{} of {judged} rows are beyond the robot's joint limits, here joint {} at {value:.4} rad or m; allowed: the unit and order of columns that the file has, or `limits: ignore`{degrees}",
+            "{} of {judged} rows are beyond the robot's joint limits, here {}; allowed: the unit and order of columns that the file has, or \
+             `limits: ignore`{degrees}",
             scan.beyond.rows,
-            joint + 1
+            arm.beyond(joint, value)
         );
         return Some(Fault::new(format!("{}:{line}", scan.label), message));
     }
@@ -110,15 +112,18 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], 
     let unmatched = scan.used() - accepted - twins;
     // Every other file is joined to the first; where the rows that lack a partner decide, the shorter file is at fault.
     let partner = scans.iter().enumerate().filter(|(other, _)| *other != index && (index == 0 || *other == 0));
-    let partner = partner.map(|(_, other)| other).min_by_key(|other| other.used());
+    let partner_at = partner.min_by_key(|(_, other)| other.used()).map(|(other, _)| other);
+    let partner = partner_at.and_then(|other| scans.get(other));
     let cut = partner.filter(|other| 2 * unmatched > rejected && accepted > 0 && other.used() < scan.used());
     let mut counts = scan.tally.clone();
     let first = |copied: bool| {
         let of_kind = fate.twins.values().filter(|twin| twin.copied == copied);
         of_kind.map(|twin| u64::from(twin.line)).min().unwrap_or_default()
     };
-    let lonely =
-        partner.map_or_else(|| "no partner in another file".to_string(), |other| format!("no partner in {}", other.label));
+    let lonely = partner_at.map_or_else(
+        || "no partner in another file".to_string(),
+        |other| format!("no partner in {}{}", scans[other].label, unlike(scans, fates, [index, other]).unwrap_or_default()),
+    );
     for (reason, rows, first_line, detail) in [
         (Reason::DuplicateId, twins - copies, first(false), "point ids that occur more than once".to_string()),
         (Reason::DuplicateRow, copies, first(true), "duplicate rows".to_string()),
@@ -161,16 +166,36 @@ fn too_many_rejected(settings: &Ingest, scans: &[Scan], fates: &[FileDecision], 
     ))
 }
 
+/// An id of each of two files that the other one lacks, where both have such: of a pair that differs in case alone, if there is one.
+fn unlike(scans: &[Scan], fates: &[FileDecision], files: [usize; 2]) -> Option<String> {
+    let lonely = |file: usize| -> Option<Vec<&str>> {
+        let (scan, fate) = (scans.get(file)?, fates.get(file)?);
+        let rows = scan.ids.iter().filter(|(number, _)| !fate.is_whole(*number as usize) && !fate.twins.contains_key(number));
+        Some(rows.map(|(_, id)| id.as_str()).collect())
+    };
+    let [here, there] = [lonely(files[0])?, lonely(files[1])?];
+    // Of three files a row may lack its partner in the third.
+    let (own, known): (BTreeSet<&str>, BTreeSet<&str>) = (here.iter().copied().collect(), there.iter().copied().collect());
+    let by_case: BTreeMap<String, &str> = there.iter().map(|id| (id.to_lowercase(), *id)).collect();
+    let mut strangers = here.iter().filter(|id| !known.contains(*id));
+    if let Some((one, other)) = strangers.clone().find_map(|id| Some((*id, *by_case.get(&id.to_lowercase())?))) {
+        return Some(format!(
+            ", e.g. `{one}` here and `{other}` there: ids that differ in upper and lower case are different ids"
+        ));
+    }
+    let (one, other) = (strangers.next()?, there.iter().find(|id| !own.contains(*id))?);
+    Some(format!(", e.g. `{one}` here and `{other}` there: ids must be the same in both files"))
+}
+
 fn warn(scan: &Scan, columns: &Columns, limits: LimitPolicy, arm: &RobotJoints, context: &Context) {
     if limits == LimitPolicy::Warn
         && let Some((line, joint, value)) = scan.beyond.first
     {
-        let [lower, upper] = arm.limits.get(joint).copied().unwrap_or([f64::NAN; 2]);
         context.services.warn(format!(
-            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, joint {} at {value:.4} (limits {lower:.4} to {upper:.4}, rad or m)",
+            "{}: {} with a joint beyond the robot's limits, used all the same; first line {line}, {}",
             scan.label,
             counted(scan.beyond.rows, "row"),
-            joint + 1
+            arm.beyond(joint, value)
         ));
     }
     let degrees = columns.joint("q").is_some_and(|q| q.unit.as_deref() == Some("deg"));

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 pub(super) const HELD: [&str; 4] = ["x", "y", "z", "target"];
 
 /// What is of one point alone.
-const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
+pub(super) const SIMULATED: [&str; 3] = ["sim_x", "sim_y", "sim_z"];
 
 /// Columns of the points of several targets; a row of the file becomes one of the recording for each target that was seen in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

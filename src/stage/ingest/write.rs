@@ -386,8 +386,8 @@ impl<'a> Chunks<'a> {
         if self.inferred > 0 {
             let (rows, least) = (counted(self.inferred, "row"), START);
             context.services.note(format!(
-                "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, and all figures that rest on it are \
-                 inferred; say `instrument`, or map sigma_x or u95",
+                "{rows} without a stated noise: weighted as {} um + {} um/m ({} sigma) to start from, which is assumed, not \
+                 known; say `instrument`, or map sigma_x or u95",
                 least.constant_um, least.per_metre_um, least.coverage
             ));
         }

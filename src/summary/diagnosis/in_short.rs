@@ -38,7 +38,9 @@ impl DiagnosisSummary {
         let change = |before: Option<f64>, after: Option<f64>| Some(format!("{:.3} -> {:.3} mm", before?, after?));
         if let (Some(mean), Some(max)) = (change(v.before_mean_mm, v.after_mean_mm), change(v.before_max_mm, v.after_max_mm)) {
             let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
-            text.push_str(&labelled("error", &format!("mean {mean}, max {max}, {rows}; noise {:.3} mm rms", v.noise_floor_mm)));
+            let assumed = if v.is_noise_assumed() { "assumed " } else { "" };
+            let noise = format!("{assumed}noise {:.3} mm rms", v.noise_floor_mm);
+            text.push_str(&labelled("error", &format!("mean {mean}, max {max}, {rows}; {noise}")));
         }
         for finding in &self.findings.0 {
             text.push_str(&labelled(&format!("{:>3}.", finding.rank), &self.finding_in_a_line(finding)));
@@ -46,6 +48,8 @@ impl DiagnosisSummary {
         for line in v.withdrawn.iter().flat_map(|text| text.lines()) {
             text.push_str(&labelled("withdrawn", line));
         }
+        text.extend(v.signature.iter().map(|signature| labelled("left", signature)));
+        text.extend(self.set_aside().map(|rows| labelled("set aside", &rows)));
         let unseen: Vec<&str> =
             v.not_observable.lines().map(|line| line.split_once(": ").map_or(line, |(what, _)| what)).collect();
         if !unseen.is_empty() {

@@ -3,14 +3,14 @@
 mod in_short;
 
 use super::own_effect::declared_in_yaml;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::pipeline::StageReport;
 use crate::shell::typed;
 use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 use crate::table::{
-    FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Table, Verdict, VerdictRow, formula_in_words,
-    is_separable_by_poses,
+    FindingNumbers, Findings, FormRow, Forms, RivalRow, Rivals, ShareRow, Shares, Suspects, SuspectsRow, Table, Verdict,
+    VerdictRow, formula_in_words, is_separable_by_poses,
 };
 use serde_json::{Value, json};
 
@@ -24,10 +24,14 @@ pub struct DiagnosisSummary {
     rivals: Rivals,
     shares: Shares,
     forms: Forms,
+    suspects: Suspects,
 }
 
 /// Rivals of a finding that poses are offered for.
 const ASKED: usize = 2;
+
+/// Rows set aside that are named.
+const ASIDE: usize = 4;
 
 /// Places and variables that are shown.
 const SHOWN: usize = 5;
@@ -89,6 +93,7 @@ impl DiagnosisSummary {
             rivals: table(stage, store)?,
             shares: table(stage, store)?,
             forms: table(stage, store)?,
+            suspects: table(stage, store)?,
         })
     }
 
@@ -135,11 +140,9 @@ impl DiagnosisSummary {
             let rivals = self.rivals.0.iter().filter(|rival| rival.rank == finding.rank);
             let rivals =
                 rivals.map(|rival| json!({ "effect": rival.effect, "where": rival.place, "delta_bic": rival.delta_bic, "probability": rival.probability }));
-            let valid = match (finding.valid_joint, finding.valid_from_rad, finding.valid_to_rad) {
-                (Some(joint), Some(from), Some(to)) => {
-                    json!({ format!("q{joint}_deg"): [from.to_degrees(), to.to_degrees()] })
-                }
-                _ => json!({}),
+            let valid = match finding.valid_range() {
+                Some((joint, range, unit)) => json!({ format!("q{joint}_{unit}"): range }),
+                None => json!({}),
             };
             json!({
                 "effect": finding.effect, "where": finding.place, "statement": finding.statement,
@@ -172,8 +175,26 @@ impl DiagnosisSummary {
                 "rms_mm": v.leftover_rms_mm, "chi_square": v.chi_square, "p_value": v.p_after, "signature": v.signature,
             },
             "next_measurements": self.next(store),
+            "set_aside": self.aside().map(|row| json!({ "point_id": row.point_id, "set": row.set, "kind": row.kind, "size_mm": row.size_mm }))
+                .collect::<Vec<_>>(),
             "noise": { "repeatability_rad": v.repeatability_rad, "repeats": v.repeats },
         })
+    }
+
+    /// Rows that count in no figure.
+    fn aside(&self) -> impl Iterator<Item = &SuspectsRow> {
+        self.suspects.0.iter().filter(|row| !row.used)
+    }
+
+    /// How many rows count in no figure, and the worst of them by name.
+    fn set_aside(&self) -> Option<String> {
+        let mut all: Vec<&SuspectsRow> = self.aside().collect();
+        all.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
+        let named: Vec<String> =
+            all.iter().take(ASIDE).map(|row| format!("{} of set {} {:.3} mm off", row.point_id, row.set, row.size_mm)).collect();
+        let more = if all.len() > ASIDE { ", the worst of them" } else { "" };
+        let which = counted(all.len(), "row");
+        (!all.is_empty()).then(|| format!("{which} in none of these figures{more}: {}", named.join(", ")))
     }
 
     fn located_json(&self, by: &str) -> Vec<Value> {
@@ -197,7 +218,8 @@ impl DiagnosisSummary {
         ] {
             text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
         }
-        text.push_str(&format!("  noise   {:>8}  {:>8.3}\n\n", "", v.noise_floor_mm));
+        let assumed = if v.is_noise_assumed() { "  assumed: none is recorded, and no `instrument` is stated" } else { "" };
+        text.push_str(&format!("  noise   {:>8}  {:>8.3}{assumed}\n\n", "", v.noise_floor_mm));
         for (by, what) in [("place", "where"), ("variable", "depends on")] {
             let all = self.located(by);
             let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();
@@ -233,6 +255,8 @@ impl DiagnosisSummary {
         for line in v.not_observable.lines() {
             text.push_str(&format!("not observable: {line}\n"));
         }
+        text.extend(v.signature.iter().map(|signature| format!("what is left: {signature}\n")));
+        text.extend(self.set_aside().map(|rows| format!("set aside: {rows}\n")));
         for line in self.next(store).into_iter().flatten() {
             text.push_str(&format!("measure next: {line}\n"));
         }

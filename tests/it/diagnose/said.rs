@@ -86,7 +86,7 @@ fn a_diagnosis_that_cannot_make_up_for_missing_masses_does_not_stand_for_the_run
     // The payload alone winds up the joints of `joint`, which is all that the file lets one know.
     let standing = &run["standing"]["step"];
     assert!(rms(standing) <= 1.03 * rms(&"joint".into()), "{standing}: {} mm, joint {} mm", rms(standing), rms(&"joint".into()));
-    let (_, said) = refused(&["compensate", "HEAD", "--quiet", "nothing.csv"], here);
+    let (_, said) = refused(&["compensate", "HEAD", "--quiet", "p.yaml"], here);
     assert_eq!(said.contains("warning: `diagnose` is withdrawn"), *standing != "diagnose", "{said}");
 }
 

@@ -30,6 +30,7 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
         prior_weight: 1.0,
         without: &[],
         own: &[],
+        beside_simulation: false,
         seed: 1,
     };
     diagnose(&question, |_| ())

@@ -45,6 +45,7 @@ fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
         prior_weight: 1.0,
         without: &[],
         own: &[],
+        beside_simulation: false,
         seed: 1,
     };
     diagnose(&question, |_| ())

@@ -65,6 +65,7 @@ fn a_diagnosis_learns_the_repeatability_from_the_same_target_again() {
         prior_weight: 1.0,
         without: &[],
         own: &[],
+        beside_simulation: false,
         seed: 1,
     };
     let found = diagnose(&question, |_| ());
@@ -183,6 +184,7 @@ fn near_repeats_count_less_the_known_motion() {
         prior_weight: 1.0,
         without: &[],
         own: &[],
+        beside_simulation: false,
         seed: 1,
     };
     let said = diagnose(&question, |_| ());

@@ -81,6 +81,12 @@ fn what_belongs_together_is_asked_for_together() {
     let height = faults("      z: {column: z, unit: mm}\n");
     assert!(height.contains("not mapped: x, y"), "{height}");
     assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z]\n"), "");
+    let unread = faults(&format!("{POINT}axes: [z]\n"));
+    let expected = "files[0].columns.x: `axes: [z]` says that x was not measured; take `x` out of `columns`, or add it to `axes`\n\
+                    files[0].columns.y: `axes: [z]` says that y";
+    assert!(unread.starts_with(expected), "{unread}");
+    assert_eq!(faults("      z: {column: z, unit: mm}\naxes: [z, z]\n"), "axes[1]: `z` is named twice");
+    assert!(faults(&format!("{POINT}axes: []\n")).starts_with("axes: no axis; name those that were measured"));
     let anchor = faults(&format!("{POINT}      anchor: {{column: box}}\n"));
     assert!(anchor.contains("an anchor is the end of a `distance`"), "{anchor}");
 }

@@ -67,3 +67,37 @@ fn what_a_later_measurement_lacks_is_said_with_its_place() {
     let said = refusal(&without, DAYS, robot("rr", 1.0));
     assert!(said.contains("points2.csv") && said.contains("`z`"), "{said}");
 }
+
+#[test]
+fn the_files_of_an_earlier_measurement_again_are_a_fault_of_the_settings() {
+    let faults = |files: &str| -> Vec<String> {
+        settings(&DAYS.replace("[joints2.csv, points2.csv]", files)).check().iter().map(ToString::to_string).collect()
+    };
+    let again = faults("[./joints1.csv, points1.csv]");
+    assert!(again.len() == 1 && again[0].starts_with("later[0].files: the files of `files` again: "), "{again:?}");
+    let third = faults("[joints2.csv, points2.csv]\n  - files: [joints2.csv, points2.csv]");
+    assert!(third.len() == 1 && third[0].starts_with("later[1].files: the files of `later[0].files` again: "), "{third:?}");
+    // Of a program that moves the robot on both days, or of one log of both, one path is the same.
+    assert!(faults("[joints1.csv, points2.csv]").is_empty() && faults("[joints2.csv, points1.csv]").is_empty());
+}
+
+#[test]
+fn points_that_would_be_used_twice_are_refused_whatever_their_file_is_called() {
+    let copied = desk().with("points2.csv", "id,x,y,z\r\nP2,4,5,6\r\nP1,1,2,3.0\r\n");
+    let said = refusal(&copied, DAYS, robot("rr", 1.0));
+    let expected = "with.later[0].files[1]: `points2.csv` measured what `points1.csv` of `files[1].file` did, and 2 rows would be used \
+                    twice";
+    assert!(said.starts_with(expected), "{said}");
+}
+
+#[test]
+fn one_log_of_two_days_is_no_copy() {
+    let log = "id,x,y,z\nP2,4,5,6\nP1,1,2,3\nP3,7,8,9\n";
+    let days = Desk::default()
+        .with("joints1.csv", "id,t,q1,q2\nP1,0,10,20\nP2,30,11,21\n")
+        .with("joints2.csv", "id,t,q1,q2\nP3,5,12,22\n")
+        .with("points1.csv", log);
+    let yaml = DAYS.replace("points2.csv", "points1.csv") + "max_rejected_fraction: 0.7\n";
+    let taken = take(&days, &yaml, robot("rr", 1.0)).expect("a recording");
+    assert_eq!(taken.recording.point_id, ["P1", "P2", "P3"]);
+}

@@ -33,6 +33,36 @@ fn a_file_that_is_none_says_what_it_is() {
 }
 
 #[test]
+fn a_file_whose_lines_end_in_cr_alone_says_how_to_convert_it() {
+    let expected = "a.csv: the lines end in CR alone; allowed: LF or CRLF. Save it again with such line ends, or convert it: \
+                    `tr '\\r' '\\n' < a.csv > converted.csv`";
+    assert_eq!(with(&format!("{HEAD}P1,1,2,3,4,5\nP2,1,2,3,4,6\n").replace('\n', "\r"), TWO), expected);
+    // A CRLF that was cut is none.
+    assert_eq!(with("id,q1,q2,x,y,z\r", TWO), "a.csv: has a header but no data row; allowed: at least one");
+}
+
+#[test]
+fn a_column_of_two_measured_quantities_or_joints_is_a_fault() {
+    let faults = |yaml: &str| calib::stage::Stage::check(&settings(yaml)).iter().map(ToString::to_string).collect::<Vec<_>>();
+    let own = "each has a column of its own";
+    assert_eq!(
+        faults(&TWO.replace("column: y", "column: \" x\"")),
+        [format!("files[0].columns.y.column: column ` x` is mapped to `x` and `y`; {own}")]
+    );
+    assert_eq!(
+        faults(&TWO.replace("column: \"q{j}\"", "columns: [q1, q1]")),
+        [format!("files[0].columns.q.columns[1]: column `q1` is mapped to joint 1 of `q` and joint 2 of `q`; {own}")]
+    );
+    let target = TWO.replace("column: x", "column: xt, minus: xd").replace("column: y", "column: yt, minus: xd");
+    assert_eq!(faults(&target), [format!("files[0].columns.y.minus: column `xd` is mapped to `x` and `y`; {own}")]);
+    // A target is also the simulated point; one uncertainty is that of all axes.
+    let more = "      sim_x: {column: xt, unit: mm}\n      sim_y: {column: yt, unit: mm}\n      sim_z: {column: zt, unit: mm}\n      \
+                sigma_x: {column: s, unit: mm}\n      sigma_y: {column: s, unit: mm}\n      sigma_z: {column: s, unit: mm}\n";
+    let target = target.replace("column: yt, minus: xd", "column: yt, minus: yd");
+    assert_eq!(faults(&format!("{target}{more}")), Vec::<String>::new());
+}
+
+#[test]
 fn a_header_of_another_shape_gets_a_hint() {
     let semicolons = with("id;q1;q2;x;y;z\n", TWO);
     assert!(semicolons.ends_with("found: id;q1;q2;x;y;z (one column; `delimiter: \";\"`?)"), "{semicolons}");
@@ -76,7 +106,9 @@ fn degrees_declared_as_rad_are_an_error_that_says_so() {
     let small: String = (1..=10).map(|row| format!("P{row},0.{row},5,1,2,3\n")).collect();
     let message = refusal(&rows(&small), &TWO.replace("deg", "rad"), robot("rr", 1.0));
     assert!(
-        message.starts_with("a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 at 5.0000"),
+        message.starts_with(
+            "a.csv:2: 10 of 10 rows are beyond the robot's joint limits, here joint 2 (`J2`) at 286.4789 deg, above"
+        ),
         "{message}"
     );
     assert!(message.ends_with("say `unit: deg`"), "{message}");

@@ -14,8 +14,8 @@ fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
     let text = format!("{}B,190,20,1,2,3\n", good(3));
     let desk = rows(&text);
     assert_eq!(take(&desk, TWO, robot("rr", 1.0)).unwrap().recording.rows(), 4);
-    let warning = "a.csv: 1 row with a joint beyond the robot's limits, used all the same; first line 5, joint 1 at 3.3161 \
-                   (limits -3.1416 to 3.1416, rad or m)";
+    let warning = "a.csv: 1 row with a joint beyond the robot's limits, used all the same; first line 5, joint 1 (`J1`) at \
+                   190.0000 deg, above its upper limit of 180.0000 deg";
     assert_eq!(desk.warnings.lock().unwrap().as_slice(), [warning]);
     let rejecting = take(&rows(&text), &format!("{TWO}limits: reject\n"), robot("rr", 1.0)).unwrap();
     let detail = "joint 1 at 190.0000 deg; allowed: -180.0000 to 180.0000 deg";
@@ -23,6 +23,31 @@ fn joints_beyond_the_limits_are_counted_rejected_or_ignored() {
     let desk = rows(&text);
     assert_eq!(take(&desk, &format!("{TWO}limits: ignore\n"), robot("rr", 1.0)).unwrap().recording.rows(), 4);
     assert!(desk.warnings.lock().unwrap().is_empty());
+}
+
+#[test]
+fn a_prismatic_joint_beyond_its_limits_is_told_in_millimetres() {
+    let desk = rows(&format!("{}B,4000,20,1,2,3\n", good(3)));
+    take(&desk, &TWO.replace("unit: deg", "unit: deg, linear_unit: mm"), robot("pr", 1.0)).unwrap();
+    let warnings = desk.warnings.lock().unwrap();
+    assert!(warnings[0].ends_with("joint 1 (`J1`) at 4000.0000 mm, above its upper limit of 3000.0000 mm"), "{warnings:?}");
+}
+
+#[test]
+fn ids_without_a_partner_are_shown_with_an_example_of_each_file() {
+    let yaml = PAIR.replace("KEY", "point_id").replace("LEFT", "").replace("RIGHT", "") + "join: {by: id}\n";
+    let said = |ids: [&str; 2]| {
+        let points = format!("k,x,y,z\n{},1,1,1\n{},2,2,2\n", ids[0], ids[1]);
+        let desk = Desk::default().with("run/z_arm.csv", "k,q1\nP1,1\nP2,2\n").with("run/b_tracker.csv", points);
+        refusal(&desk, &yaml, robot("r", 2.0))
+    };
+    let other = said(["XP1", "XP2"]);
+    let expected =
+        "2 unmatched (no partner in run/b_tracker.csv, e.g. `P1` here and `XP1` there: ids must be the same in both files)";
+    assert!(other.contains(expected), "{other}");
+    let lower = said(["q7", "p2"]);
+    let expected = "e.g. `P2` here and `p2` there: ids that differ in upper and lower case are different ids";
+    assert!(lower.contains(expected), "{lower}");
 }
 
 #[test]

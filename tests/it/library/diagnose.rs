@@ -5,8 +5,18 @@ use calib::robot::{Measurements, RobotModel};
 pub fn missing_physics(robot: &RobotModel, data: &Measurements) -> Diagnosis {
     let (validate, fit): (Vec<usize>, Vec<usize>) = (0..data.rows()).partition(|row| row % 4 == 3);
     let set: Vec<usize> = (0..data.rows()).map(|row| usize::from(row % 4 == 3)).collect();
-    let question =
-        Question { robot, data, fit: &fit, validate: &validate, set: &set, prior_weight: 1.0, without: &[], own: &[], seed: 1 };
+    let question = Question {
+        robot,
+        data,
+        fit: &fit,
+        validate: &validate,
+        set: &set,
+        prior_weight: 1.0,
+        without: &[],
+        own: &[],
+        beside_simulation: false,
+        seed: 1,
+    };
     // A wrong unit, sign or zero comes before physics.
     wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |progress| eprintln!("{progress}")))
 }

@@ -181,6 +181,8 @@ fn findings() -> Findings {
         valid_joint: Some(2),
         valid_from_rad: Some(-0.8),
         valid_to_rad: Some(1.1),
+        valid_from_mm: None,
+        valid_to_mm: None,
         forms: "[]".into(),
     }])
 }
