@@ -60,7 +60,10 @@ impl ModelArguments {
         }
         let (store, step) = (self.means.store()?, self.step.as_deref());
         if !matches!(ending.as_str(), "yaml" | "yml") {
-            return IdentifiedModel::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step);
+            let mut identified = IdentifiedModel::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step)?;
+            // A pipeline's stages say it themselves.
+            identified.warnings.append(&mut identified.stage_warnings);
+            return Ok(identified);
         }
         let plan = self.means.plan(&self.model)?;
         let steps = steps_of(&plan)?;

@@ -44,6 +44,8 @@ pub struct IdentifiedModel {
     pub origin: String,
     /// What the person must know of it.
     pub warnings: Vec<String>,
+    /// What the stage that identified it, or learned on top, warned of when it ran.
+    pub stage_warnings: Vec<String>,
 }
 
 /// A table of parameters as a file, and the robot that they are of.
@@ -106,11 +108,14 @@ impl IdentifiedModel {
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
         let warnings = stands.iter().flat_map(Standing::warnings).chain(wrong).collect();
+        let learned = learned.filter(|_| correction.is_some());
+        let said = |stage: &StageReport| stage.warnings.iter().map(|line| format!("{}: {line}", stage.id)).collect::<Vec<_>>();
+        let stage_warnings = std::iter::once(stage).chain(learned).flat_map(said).collect();
         let covariance: Option<CovarianceTable> = written(stage, load)?;
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
-        let scatter = scatter::of(stage, learned.filter(|_| correction.is_some()), load)?;
-        Ok(Self { correction, covariance, scatter, data, warnings, ..own })
+        let scatter = scatter::of(stage, learned, load)?;
+        Ok(Self { correction, covariance, scatter, data, warnings, stage_warnings, ..own })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -146,6 +151,7 @@ impl IdentifiedModel {
             data: None,
             origin,
             warnings: Vec::new(),
+            stage_warnings: Vec::new(),
         })
     }
 

@@ -74,7 +74,8 @@ pub struct Ingest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<Vec<Axis>>,
     /// By what points were measured, for rows that record no standard deviation: a name, e.g. `leica_at960`, or figures, e.g.
-    /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is not known: points are weighted by an assumed one, and every figure that rests on it says so.
+    /// `{constant_um: 10, per_metre_um: 2.5, coverage: 2}`. With neither, noise is not known: points are
+    /// weighted by an assumed one, and every figure that rests on it says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<InstrumentSetting>,
     /// The arm moves while it is measured: joint velocities follow from the joints over time where no columns give them. `motion: {}`
@@ -109,7 +110,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 

@@ -265,6 +265,9 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     assert!(!told.lines().any(|line| line.starts_with("after")), "{told}");
     let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
     assert!(code == Some(10) && said.contains("the set-up is wrong: the points are in inches"), "{code:?} {said}");
+    // A step that is asked for by its name says what it warned of when it ran.
+    let (code, said) = refused(&["export", "HEAD", "--step", "joint", "--format", "json", "--quiet"], here);
+    assert!(code == Some(0) && said.contains("warning: joint: the set-up is wrong: the points are in inches"), "{code:?} {said}");
     let said: Value = serde_json::from_str(&calib(&["diagnose", "HEAD", "--json"], here)).expect("JSON");
     assert_eq!((&said["verdict"], &said["findings"][0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
     let run: Value =
