@@ -1,6 +1,6 @@
 //! Errors by reader: who can mend it decides the type, and the type decides the exit code.
 
-use std::fmt;
+use std::{fmt, io};
 
 /// One fault with the place where it is: `stages[2].with.cycles`, `controller.csv:17`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,6 +53,15 @@ impl Error {
     /// A fault of the machine or the store: code 75.
     pub fn store(place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Store(Fault::new(place, message))
+    }
+    /// A file that does not open: a fault of the machine, unless there is no such file or it is none to read.
+    pub fn unreadable(place: impl Into<String>, error: &io::Error) -> Self {
+        use io::ErrorKind::{InvalidInput, IsADirectory, NotADirectory, NotFound};
+        let message = format!("cannot be read: {error}");
+        match error.kind() {
+            NotFound | NotADirectory | IsADirectory | InvalidInput => Self::data(place, message),
+            _ => Self::store(place, message),
+        }
     }
     /// The exit code of the process that fails with this error.
     pub fn exit_code(&self) -> u8 {
@@ -117,7 +126,15 @@ pub fn instead(found: &str, allowed: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::counted;
+    use super::{Error, counted};
+    use std::io::{self, ErrorKind};
+
+    #[test]
+    fn a_file_that_is_refused_now_may_open_later_and_one_that_is_not_there_is_a_fault_of_the_data() {
+        let code = |kind: ErrorKind| Error::unreadable("day2.csv", &io::Error::from(kind)).exit_code();
+        assert_eq!([ErrorKind::PermissionDenied, ErrorKind::Other, ErrorKind::StaleNetworkFileHandle].map(code), [75; 3]);
+        assert_eq!([ErrorKind::NotFound, ErrorKind::InvalidInput].map(code), [10; 2]);
+    }
 
     #[test]
     fn one_of_a_thing_is_named_as_one() {

@@ -96,7 +96,7 @@ impl<'a> RunState<'a> {
         let look = look(path);
         let content = raw::open(path)
             .and_then(FileHash::of_reader)
-            .map_err(|error| Error::data(path.display().to_string(), format!("cannot be read: {error}")))?;
+            .map_err(|error| Error::unreadable(path.display().to_string(), &error))?;
         self.hashes.insert(path.into(), HashedFile { content: content.clone(), look });
         Ok(content)
     }

@@ -77,7 +77,7 @@ pub(super) fn open(id: &str, files: &[super::plan::InputFile], file: &RawFile) -
         return Err(Error::Bug(format!("stage {id} opens {asked} without listing it among its files")));
     };
     let shown = known.path.display().to_string();
-    let opened = raw::open(&known.path).map_err(|error| Error::data(&shown, format!("cannot be read: {error}")))?;
+    let opened = raw::open(&known.path).map_err(|error| Error::unreadable(&shown, &error))?;
     let size = opened.metadata().ok().map(|metadata| metadata.len());
     Ok(OpenedInput { label: told(files, known), reader: Box::new(opened), size })
 }
