@@ -77,10 +77,12 @@ impl Store {
     pub fn open(root: impl Into<PathBuf>) -> Result<Self> {
         let root = root.into();
         let path = root.join("format.json");
-        match fs::read(&path) {
-            Ok(bytes) => check_format(&path, &bytes)?,
-            Err(e) if e.kind() == ErrorKind::NotFound => check_vacant(&root)?,
-            Err(e) => return Err(refused(&path, "read", &e)),
+        if !has_format(&path)?
+            && let Err(occupied) = check_vacant(&root)
+            // Another process may have begun it between the two.
+            && !has_format(&path)?
+        {
+            return Err(occupied);
         }
         Ok(Self { root, remote: None, workspace: Mutex::new(None), durability: Durability::default() })
     }
@@ -118,6 +120,15 @@ impl Store {
 
 fn format_text() -> Result<Vec<u8>> {
     serde_json::to_vec(&StoreMarker { calib_store: STORE_FORMAT }).map_err(|e| Error::Bug(e.to_string()))
+}
+
+/// Whether there is a format file; fails where it is not that of a store of this calib.
+fn has_format(path: &Path) -> Result<bool> {
+    match fs::read(path) {
+        Ok(bytes) => check_format(path, &bytes).map(|()| true),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(refused(path, "read", &e)),
+    }
 }
 
 fn check_format(path: &Path, bytes: &[u8]) -> Result<()> {

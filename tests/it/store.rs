@@ -160,6 +160,23 @@ fn a_key_does_not_depend_on_the_order_of_its_settings() {
 }
 
 #[test]
+fn a_store_opens_while_another_begins_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for number in 0..40 {
+        let root = folder.path().join(number.to_string());
+        let begun = root.join("format.json");
+        let other = std::thread::spawn({
+            let root = root.clone();
+            move || publish(&Store::open(root).unwrap(), &key("split", 1), &split(0..1)).unwrap()
+        });
+        while !begun.exists() {
+            Store::open(&root).unwrap();
+        }
+        other.join().unwrap();
+    }
+}
+
+#[test]
 fn rivals_publish_one_object_and_one_record() {
     let (_folder, store) = place();
     let rivals: Vec<_> = (0..8)
