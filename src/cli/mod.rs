@@ -28,7 +28,8 @@ mod surroundings;
 mod tag;
 mod verify;
 
-use crate::error::{Error, Result, counted};
+use crate::error::{Error, Result, counted, nearest};
+use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 use std::io::Write;
@@ -81,6 +82,7 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
     let parsed = match Arguments::try_parse_from(&arguments) {
         Ok(parsed) => parsed,
         Err(error) => {
+            let error = with_nearest_verb(error);
             // Help and version come this way too, with code 0 and on stdout.
             let code = u8::try_from(error.exit_code()).unwrap_or(2);
             let _ = error.print();
@@ -88,6 +90,19 @@ pub fn main(arguments: Vec<OsString>) -> u8 {
         }
     };
     panics::guarded(|| done(parsed.verb, &arguments))
+}
+
+/// Names the verb that a misspelt one is nearest to, also where letters changed places (`rnu`), which clap's own measure does not see.
+fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
+    let given = match error.get(ContextKind::InvalidSubcommand) {
+        Some(ContextValue::String(given)) if error.get(ContextKind::SuggestedSubcommand).is_none() => given.clone(),
+        _ => return error,
+    };
+    let command = Arguments::command();
+    if let Some(near) = nearest(&given, command.get_subcommands().map(clap::Command::get_name)) {
+        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near.into()]));
+    }
+    error
 }
 
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
