@@ -2,7 +2,8 @@
 
 use super::means::{CommandTask, Means};
 use super::pipeline_arguments::told_as;
-use super::{emit_json, emit_lines};
+use super::run::WRONG_SETUP;
+use super::{complain, emit_json, emit_lines};
 use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
@@ -55,11 +56,15 @@ const EXAMPLES: &str = "Examples:
   calib diagnose HEAD --export-effect worn_tooth.yaml
   calib diagnose HEAD~1/second --json";
 
-pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
-    told_as(arguments.json, execute(arguments, command_line))
+/// Gives the exit code: 10 where the set-up is wrong, whatever else was asked for.
+pub(super) fn main(arguments: &DiagnoseArguments, command_line: &[OsString]) -> u8 {
+    match told_as(arguments.json, execute(arguments, command_line)) {
+        Ok(code) => code,
+        Err(error) => complain(&error),
+    }
 }
 
-fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<()> {
+fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u8> {
     let store = arguments.means.store()?;
     let told = if is_pipeline(&arguments.what) {
         let file = arguments.what.display().to_string();
@@ -92,9 +97,10 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<(
     }
     let store = arguments.means.store_again();
     match arguments.json {
-        true => emit_json(&told.document(&store)),
-        false => emit_lines(&if arguments.details { told.text(&store) } else { told.short(&store) }),
+        true => emit_json(&told.document(&store))?,
+        false => emit_lines(&if arguments.details { told.text(&store) } else { told.short(&store) })?,
     }
+    Ok(if told.is_wrong_setup() { WRONG_SETUP } else { 0 })
 }
 
 /// Writes a file that is not there yet.

@@ -69,7 +69,7 @@ enum Verb {
     Verify(verify::VerifyArguments),
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected (do not retry); \
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected, or the set-up is wrong (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
 
 /// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
@@ -111,7 +111,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Check(verb) => check::main(&verb),
         Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),
-        Verb::Diagnose(verb) => diagnose::main(&verb, arguments),
+        Verb::Diagnose(verb) => return diagnose::main(&verb, arguments),
         Verb::Diff(verb) => return diff::main(&verb),
         Verb::Fleet(verb) => fleet::main(&verb, arguments),
         Verb::Export(verb) => export::main(&verb, arguments),

@@ -58,7 +58,10 @@ pub(super) fn main(arguments: &RunArguments, command_line: &[OsString]) -> u8 {
     }
 }
 
-/// Gives the exit code: 1 where the run went through and its result is not accepted.
+/// The exit code of a run whose files do not belong together as they are read: its tables are there, and its data are rejected.
+pub(super) const WRONG_SETUP: u8 = 10;
+
+/// Gives the exit code: 1 where the run went through and its result is beyond the limits, 10 where the set-up is wrong.
 fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     let begun = Instant::now();
     let shared = &arguments.shared;
@@ -77,12 +80,12 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
     }
     let outcome = shared.run(&plan, &store, selection, command_line)?;
     let limits = LimitsSummary::read(&outcome, &store)?;
-    let code = u8::from(limits.accepted() == Some(false));
+    let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
+    let code = if wrong.is_some() { WRONG_SETUP } else { u8::from(limits.accepted() == Some(false)) };
     if shared.json {
         emit_json(&document(&outcome, &limits, &store)?)?;
         return Ok(code);
     }
-    let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
     let short = summary::in_short(&outcome, standing.as_ref(), wrong.as_deref(), &store)?;
     let mut text = String::new();
     if arguments.details || short.is_none() {

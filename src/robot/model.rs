@@ -6,6 +6,9 @@ use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};
 use nalgebra::{Matrix3, Vector3};
 
+/// Cosine from which on two axes are parallel.
+const PARALLEL: f64 = 0.99;
+
 /// A serial robot ready for computing; immutable.
 #[derive(Debug, Clone)]
 pub struct RobotModel {
@@ -75,6 +78,11 @@ impl RobotModel {
     /// Unit axis of joint `joint` (from 0) at the zero pose.
     pub fn axis(&self, joint: usize) -> &Vector3<f64> {
         &self.axes[joint]
+    }
+
+    /// Whether the axes of two joints are parallel at the zero pose, whichever way they turn.
+    pub fn is_parallel(&self, a: usize, b: usize) -> bool {
+        self.axes[a].dot(&self.axes[b]).abs() > PARALLEL
     }
 
     /// A point on the axis of joint `joint`, m, at the zero pose.

@@ -17,7 +17,7 @@ pub(super) fn refused(path: &Path, doing: &str, error: &io::Error) -> Error {
             "make the folder writable or choose another with --store DIR"
         }
         ErrorKind::NotADirectory | ErrorKind::AlreadyExists | ErrorKind::IsADirectory => {
-            "something else is in the way: move it, or choose another place with --store DIR"
+            "something else is in the way: remove it, or choose another place with --store DIR"
         }
         _ => "check the disk and run again: finished stages are kept",
     };

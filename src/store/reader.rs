@@ -2,6 +2,7 @@
 
 use parquet::file::reader::ChunkReader;
 use std::fs::{self, File};
+use std::io;
 use std::path::Path;
 
 use super::decode::Decoded;
@@ -28,7 +29,7 @@ pub struct Loose<T> {
 pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
     let place = path.display().to_string();
     let (kind, version) = known_schema(&place, &table.schema)?;
-    let open = || File::open(path).map_err(|e| refused(path, "read", &e));
+    let open = || File::open(path).map_err(|e| unopened(path, &e));
     let found = FileHash::of_reader(open()?).map_err(|e| refused(path, "read", &e))?;
     if found != table.file_hash {
         return Err(set_aside(path, "its bytes are not those that were published"));
@@ -42,6 +43,18 @@ pub(super) fn load(path: &Path, table: &TableRef) -> Result<Frame> {
         return Err(set_aside(path, "its content is not what was published"));
     }
     decoded.frame(kind, version)
+}
+
+/// Why a published table does not open: one that is gone, or has something else in its place, no waiting brings back.
+fn unopened(path: &Path, error: &io::Error) -> Error {
+    let place = path.display().to_string();
+    match error.kind() {
+        io::ErrorKind::NotFound => Error::store(place, "the table is gone; `calib run` of its pipeline writes it anew"),
+        io::ErrorKind::IsADirectory => {
+            Error::store(place, "a folder stands in the table's place; remove it, and `calib run` of its pipeline writes the table anew")
+        }
+        _ => refused(path, "read", error),
+    }
 }
 
 /// The kind of a schema id `name/version` that this calib can read.
@@ -116,7 +129,7 @@ fn of_the_data(place: &str, error: Error) -> Error {
 fn set_aside(path: &Path, why: &str) -> Error {
     let place = path.display().to_string();
     match fs::rename(path, path.with_extension("damaged")) {
-        Ok(()) => Error::store(place, format!("damaged: {why}; it was set aside; run again to restore it")),
-        Err(e) => Error::store(place, format!("damaged: {why}; delete it and run again ({e})")),
+        Ok(()) => Error::store(place, format!("damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew")),
+        Err(e) => Error::store(place, format!("damaged: {why}; remove it, and `calib run` of its pipeline writes it anew ({e})")),
     }
 }

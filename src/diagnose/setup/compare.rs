@@ -13,6 +13,9 @@ use rayon::prelude::*;
 
 /// A nominal robot leaves less than this share of its reach, and of the size of the measured cloud.
 const NOMINAL: f64 = 0.02;
+/// A robot that is set up rightly leaves less than this share of the measured cloud: joints that hardly move agree with points that
+/// hardly move, however wrong both are.
+const CLOUD: f64 = 0.1;
 /// A set-up error explains where without it so many times less is left.
 const BETTER: f64 = 3.0;
 /// What has numbers of its own must leave so many times less than what has none.
@@ -98,7 +101,10 @@ impl<'a> AsStated<'a> {
         let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
         let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
         let own = if number.is_some() { OWN_NUMBERS } else { 1.0 };
-        let explains = counts && BETTER * own * share < self.share() && placed.left < NOMINAL * pairs.reach();
+        let explains = counts
+            && BETTER * own * share < self.share()
+            && share < CLOUD
+            && placed.left < NOMINAL * pairs.reach();
         Try { wrong, placed, share: own * share, explains }
     }
 

@@ -11,6 +11,7 @@ mod order;
 mod outcome;
 mod pairs;
 mod placement;
+mod sign_group;
 mod words;
 mod wrong;
 

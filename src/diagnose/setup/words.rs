@@ -5,7 +5,7 @@ use super::order::RowOrder;
 use super::wrong::{LENGTHS, WrongSetup};
 use crate::effect::figure;
 use crate::error::counted;
-use crate::robot::RobotModel;
+use crate::robot::{RobotModel, numbered};
 
 /// What is wrong, and what to change in which file.
 pub(super) struct SetupWords {
@@ -36,13 +36,8 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
         WrongSetup::InDegrees => {
             ("the joints are in deg and were read in rad".into(), "in `ingest`: `columns: {q: {.., unit: deg}}`".into())
         }
-        WrongSetup::Sign(joint) => {
-            let signs = list(&|k| if k == joint { "-1".into() } else { "1".into() });
-            (
-                format!("joint {} turns the other way than the robot file says", joint + 1),
-                format!("in `ingest`: `columns: {{q: {{.., sign: [{signs}]}}}}`, or turn the axis round in the robot file"),
-            )
-        }
+        WrongSetup::Sign(joint) => of_signs(&[joint], joints),
+        WrongSetup::Signs(group) => of_signs(&group.joints().collect::<Vec<_>>(), joints),
         WrongSetup::Exchanged(a, b) => {
             let order = list(&|k| {
                 let from = if k == a {
@@ -67,6 +62,22 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
                 format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
             )
         }
+        WrongSetup::Zeros { joint, quarters, next } => {
+            let (first, second) = (90 * quarters, 90 * next);
+            let zeros = list(&|k| match k {
+                _ if k == joint => first.to_string(),
+                _ if k == joint + 1 => second.to_string(),
+                _ => "0".into(),
+            });
+            (
+                format!(
+                    "the recording reads {first} deg at the zero of joint {} and {second} deg at that of joint {}",
+                    joint + 1,
+                    joint + 2
+                ),
+                format!("in `ingest`: `columns: {{q: {{.., zero: [{zeros}]}}}}`, in deg"),
+            )
+        }
         WrongSetup::Coupled { moved, by, sign } => {
             let (how, ratio) = if sign < 0.0 { ("minus", -1) } else { ("plus", 1) };
             let (moved, by) = (moved + 1, by + 1);
@@ -85,6 +96,16 @@ pub(super) fn words(wrong: WrongSetup, robot: &RobotModel, values: &[f64], reach
         WrongSetup::Number(number) => return of_number(number, values),
     };
     SetupWords::of(what, mend)
+}
+
+/// Joints, from 0, that turn the other way.
+fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
+    let signs: Vec<&str> = (0..joints).map(|joint| if reversed.contains(&joint) { "-1" } else { "1" }).collect();
+    let (verb, axes) = if reversed.len() == 1 { ("turns", "axis") } else { ("turn", "axes") };
+    (
+        format!("joint{} {} {verb} the other way than the robot file says", if reversed.len() == 1 { "" } else { "s" }, numbered(reversed)),
+        format!("in `ingest`: `columns: {{q: {{.., sign: [{}]}}}}`, or turn the {axes} round in the robot file", signs.join(", ")),
+    )
 }
 
 fn unit_name(unit: &str) -> &'static str {

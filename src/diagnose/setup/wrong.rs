@@ -3,7 +3,7 @@
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::pairs::PointPairs;
-use crate::robot::RobotModel;
+use super::sign_group::SignGroup;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// What an engineer may have got wrong; joints from 0.
@@ -15,9 +15,17 @@ pub(super) enum WrongSetup {
     InRadians,
     InDegrees,
     Sign(usize),
+    /// Several joints turn the other way.
+    Signs(SignGroup),
     Exchanged(usize, usize),
     /// What is reported at the robot file's zero, in quarters of a turn: 1, -1, or 2.
     Zero(usize, i32),
+    /// The same of a joint and of the parallel one that follows it, such that only the link between them has another direction.
+    Zeros {
+        joint: usize,
+        quarters: i32,
+        next: i32,
+    },
     /// The angle of joint `by` times `sign` is in that of joint `moved`.
     Coupled {
         moved: usize,
@@ -43,21 +51,25 @@ pub(super) const LENGTHS: [(f64, &str, &str); 9] = [
     (10.0, "mm", "cm"),
 ];
 
-/// Cosine from which on two axes are parallel.
-const PARALLEL: f64 = 0.99;
-
 impl WrongSetup {
     /// All that this robot and these rows, in their order, may have.
     pub fn all(pairs: &PointPairs) -> Vec<Self> {
         let robot = pairs.robot;
         let turning: Vec<usize> = (0..robot.joints()).filter(|joint| robot.is_revolute(*joint)).collect();
         let mut out: Vec<Self> = (0..LENGTHS.len()).map(Self::PointUnit).collect();
-        out.extend([Self::InRadians, Self::InDegrees, Self::Mirrored]);
+        out.extend([Self::InRadians, Self::InDegrees]);
         out.extend(turning.iter().map(|joint| Self::Sign(*joint)));
+        // Before the mirror image: reversing all joints whose axes lie in the plane of a symmetric arm is one, and the usual reason.
+        out.extend(SignGroup::all(robot).into_iter().map(Self::Signs));
+        out.push(Self::Mirrored);
         let pairs_from = |k: usize| turning[k + 1..].iter().map(move |b| (k, b));
         out.extend((0..turning.len()).flat_map(pairs_from).map(|(k, b)| Self::Exchanged(turning[k], *b)));
         out.extend(turning.iter().flat_map(|joint| [1, -1, 2].map(|quarters| Self::Zero(*joint, quarters))));
-        let parallel = turning.windows(2).filter(|pair| is_parallel(robot, pair[0], pair[1]));
+        let parallel = turning.windows(2).filter(|pair| pair[1] == pair[0] + 1 && robot.is_parallel(pair[0], pair[1]));
+        out.extend(parallel.clone().flat_map(|pair| {
+            let against = if robot.axis(pair[0]).dot(robot.axis(pair[1])) > 0.0 { -1 } else { 1 };
+            [1, -1].map(|quarters| Self::Zeros { joint: pair[0], quarters, next: against * quarters })
+        }));
         out.extend(parallel.flat_map(|pair| [1.0, -1.0].map(|sign| Self::Coupled { moved: pair[1], by: pair[0], sign })));
         out.extend(RowOrder::all(pairs).into_iter().map(Self::Order));
         out.extend(FreeNumber::all(robot).into_iter().map(Self::Number));
@@ -69,8 +81,8 @@ impl WrongSetup {
         match self {
             Self::Order(_) | Self::Exchanged(..) => 0,
             Self::PointUnit(_) | Self::InRadians | Self::InDegrees | Self::Mirrored => 1,
-            Self::Zero(..) => 2,
-            Self::Sign(_) => 3,
+            Self::Zero(..) | Self::Zeros { .. } => 2,
+            Self::Sign(_) | Self::Signs(_) => 3,
             Self::Coupled { .. } => 4,
             Self::Number(_) => 5,
         }
@@ -96,15 +108,16 @@ impl WrongSetup {
             Self::InRadians => scaled(180.0 / PI),
             Self::InDegrees => scaled(PI / 180.0),
             Self::Sign(joint) => pairs.with_joints(|q| q[joint] = -q[joint]),
+            Self::Signs(group) => pairs.with_joints(|q| group.joints().for_each(|joint| q[joint] = -q[joint])),
             Self::Exchanged(a, b) => pairs.with_joints(|q| q.swap(a, b)),
             Self::Zero(joint, quarters) => pairs.with_joints(|q| q[joint] -= f64::from(quarters) * FRAC_PI_2),
+            Self::Zeros { joint, quarters, next } => pairs.with_joints(|q| {
+                q[joint] -= f64::from(quarters) * FRAC_PI_2;
+                q[joint + 1] -= f64::from(next) * FRAC_PI_2;
+            }),
             Self::Coupled { moved, by, sign } => pairs.with_joints(|q| q[moved] -= sign * q[by]),
             Self::Mirrored => pairs.with_points(|point| point.yxz()),
             Self::Order(_) | Self::Number(_) => pairs.clone(),
         }
     }
-}
-
-fn is_parallel(robot: &RobotModel, a: usize, b: usize) -> bool {
-    robot.axis(a).dot(robot.axis(b)).abs() > PARALLEL
 }

@@ -3,6 +3,7 @@
 mod in_short;
 
 use super::own_effect::declared_in_yaml;
+use crate::diagnose::VerdictKind;
 use crate::error::{Error, Result, counted};
 use crate::pipeline::StageReport;
 use crate::shell::typed;
@@ -58,6 +59,11 @@ fn form_json(rows: &[FormRow]) -> Value {
 }
 
 impl DiagnosisSummary {
+    /// Whether the files do not belong together as they are read.
+    pub fn is_wrong_setup(&self) -> bool {
+        self.verdict.verdict == VerdictKind::WrongSetup.name()
+    }
+
     /// The proposed formula of a finding, of the first one that has one where none is named, as a file that declares it.
     pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
         let mut all = self.forms.0.iter().filter(|row| row.proposed && finding.is_none_or(|rank| row.rank == rank));

@@ -1,4 +1,4 @@
-//! Set-up errors come before physics: fifteen wrong set-ups of three arms, sound recordings, and a robot file of another arm.
+//! Set-up errors come before physics: twenty wrong set-ups of three arms, sound recordings, and a robot file of another arm.
 
 use super::{CASE, calib, case_with, concealed, refused};
 use crate::desk::{Desk, table};
@@ -97,13 +97,23 @@ fn paired(inputs: &mut Inputs, partner: impl Fn(usize) -> usize) {
 type Wrong = (&'static str, &'static str, fn(&mut Inputs));
 
 /// The frozen cases. Positions are what `mm` and `deg` of the settings make of what stands in the files.
-const WRONG: [Wrong; 15] = [
+const WRONG: [Wrong; 20] = [
     ("points in inches", "unit: in}", |i| points(i, |p| p.map(|x| x / 25.4))),
     ("points in metres", "unit: m}", |i| points(i, |p| p.map(|x| x / 1000.0))),
     ("points in micrometres", "unit: um}", |i| points(i, |p| p.map(|x| x * 1000.0))),
     ("joints in rad", "unit: rad", |i| joints(i, |q| q.iter_mut().for_each(|q| *q *= PI / 180.0))),
     ("sign of joint 3", "joint 3 turns the other way", |i| joints(i, |q| q[2] = -q[2])),
     ("sign of joint 5", "joint 5 turns the other way", |i| joints(i, |q| q[4] = -q[4])),
+    ("signs of joints 1, 4 and 6", "joints 1, 4, 6 turn the other way", |i| joints(i, |q| [0, 3, 5].into_iter().for_each(|k| q[k] = -q[k]))),
+    ("signs of joints 2 and 3", "joints 2, 3 turn the other way", |i| joints(i, |q| (q[1], q[2]) = (-q[1], -q[2]))),
+    ("signs of all joints", "joints 1, 2, 3, 4, 5, 6 turn the other way", |i| joints(i, |q| q.iter_mut().for_each(|q| *q = -*q))),
+    ("zeros of joints 2 and 3 against each other", "90 deg at the zero of joint 2 and ", |i| {
+        joints(i, |q| (q[1], q[2]) = (q[1] - FRAC_PI_2, q[2] + FRAC_PI_2));
+    }),
+    ("points in metres and sign of joint 3", "joint 3 turns the other way", |i| {
+        points(i, |p| p.map(|x| x / 1000.0));
+        joints(i, |q| q[2] = -q[2]);
+    }),
     ("joints 4 and 5 exchanged", "joints 4 and 5 are exchanged", |i| joints(i, |q| q.swap(3, 4))),
     ("zero of joint 2 at 90 deg", "90 deg at the zero of joint 2", |i| joints(i, |q| q[1] += FRAC_PI_2)),
     ("zero of joint 4 at 180 deg", "180 deg at the zero of joint 4", |i| joints(i, |q| q[3] += PI)),
@@ -128,7 +138,7 @@ const WRONG: [Wrong; 15] = [
 ];
 
 #[test]
-fn fifteen_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
+fn twenty_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
     let (mut right, mut lines) = (0, Vec::new());
     for (robot, seed) in arms().iter().zip([11, 22, 33]) {
         let sound = recorded(robot, seed, json!([]));
@@ -158,7 +168,7 @@ fn fifteen_wrong_set_ups_of_three_arms_are_named_before_any_physics() {
         }
     }
     println!("{}\n{right} of {}", lines.join("\n"), 3 * WRONG.len());
-    assert!(right >= 42, "{right} of 45\n{}", lines.join("\n"));
+    assert!(right >= 56, "{right} of 60\n{}", lines.join("\n"));
 }
 
 #[test]
@@ -260,7 +270,8 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     };
     std::fs::write(&file, text.lines().map(inches).collect::<Vec<_>>().join("\n")).expect("written");
     case_with(here, &[]);
-    let told = calib(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
+    let (code, told) = ended(&[&["run", "p.yaml"], &CASE[..]].concat(), here);
+    assert_eq!(code, Some(10), "{told}");
     assert!(told.contains("not accepted: the set-up is wrong: the points are in inches"), "{told}");
     assert!(!told.lines().any(|line| line.starts_with("after")), "{told}");
     let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
