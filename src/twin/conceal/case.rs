@@ -114,7 +114,14 @@ impl Case {
         let points = points::plan(
             kind,
             &ranges,
-            Amount { fit, validate, repeated, near: if beyond_list { NEAR } else { 0.0 }, loaded: !design.bare },
+            Amount {
+                fit,
+                validate,
+                repeated,
+                near: if beyond_list { NEAR } else { 0.0 },
+                loaded: !design.bare,
+                layout: design.layout,
+            },
             &climate,
             seed,
         )?;
