@@ -79,6 +79,9 @@ pub(super) struct ConcealArguments {
     /// order)
     #[arg(long, value_name = "FORM", default_value = "random")]
     layout: String,
+    /// A mass on the flange, kg, that neither the robot file nor the payload column states
+    #[arg(long, value_name = "KG", default_value_t = 0.0)]
+    tool_mass: f64,
     /// Worker threads; no result depends on it [default: all cores]
     #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
@@ -171,6 +174,9 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         faults.push(fault);
         None
     });
+    if !(0.0..=500.0).contains(&arguments.tool_mass) {
+        faults.push(Fault::new("--tool-mass", format!("{} is no mass of a tool; allowed: 0 to 500 kg", arguments.tool_mass)));
+    }
     let layout = LAYOUTS.into_iter().find(|layout| layout.name() == arguments.layout).unwrap_or_else(|| {
         faults.push(unknown("--layout", &arguments.layout, &LAYOUTS.map(Layout::name)));
         Layout::default()
@@ -198,6 +204,7 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         bare: arguments.bare,
         log_step_deg: arguments.log_step,
         layout,
+        tool_mass_kg: arguments.tool_mass,
     })
 }
 

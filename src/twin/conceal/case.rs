@@ -9,7 +9,7 @@ use super::visible::Site;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::twin::effect::{HoldingFriction, Physical};
 use crate::twin::noise::{Noise, Purpose};
-use crate::twin::plan::{Climate, Poses};
+use crate::twin::plan::{Climate, Point, Poses};
 use crate::twin::recorder::{Experiment, Motors, Shot};
 use crate::twin::tracker::{SCATTERS, Scatter, Tracker};
 use crate::twin::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
@@ -161,7 +161,8 @@ impl Case {
             climate: &climate,
             seed,
         };
-        let mut shots = experiment.measure(points, || ());
+        let carried = points.into_iter().map(|point| Point { payload_kg: point.payload_kg + design.tool_mass_kg, ..point });
+        let mut shots = experiment.measure(carried.collect(), || ());
         let mut faults = Noise::new(seed, Purpose::Faults);
         let thermometer_c = warmth.iter().map(|celsius| celsius + THERMOMETER_K * faults.normal()).collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);

@@ -41,6 +41,8 @@ pub struct Design {
     pub log_step_deg: f64,
     /// How poses follow each other.
     pub layout: Layout,
+    /// Mass (kg) on the flange that neither the robot file nor the payload column states.
+    pub tool_mass_kg: f64,
 }
 
 impl Default for Design {
@@ -62,6 +64,7 @@ impl Default for Design {
             bare: false,
             log_step_deg: 0.0,
             layout: Layout::default(),
+            tool_mass_kg: 0.0,
         }
     }
 }

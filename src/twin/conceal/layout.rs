@@ -21,7 +21,7 @@ pub enum Layout {
 pub const LAYOUTS: [Layout; 3] = [Layout::Random, Layout::Path, Layout::Shuffled];
 
 /// Fewest and most points of a line or curve.
-const POINTS: [f64; 2] = [14.0, 40.0];
+const POINTS: [f64; 2] = [15.0, 120.0];
 
 impl Layout {
     /// As it is written.
@@ -53,7 +53,7 @@ impl Layout {
             let (to, _) = plan::allowed(arm, poses, ranges, draw)?;
             let straight: Vec<f64> = from.iter().zip(&to).map(|(a, b)| 0.5 * (a + b)).collect();
             let bend = if draw.chance(0.5) { plan::allowed(arm, poses, ranges, draw)?.0 } else { straight };
-            let points = draw.uniform(POINTS[0], POINTS[1]).round() as usize;
+            let points = draw.size(POINTS[0], POINTS[1]).round() as usize;
             out.extend((0..points).map(|k| curve(&from, &bend, &to, k as f64 / points as f64)));
             from = to;
         }
