@@ -60,10 +60,8 @@ impl Misfit {
         let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
         let not_carried = not_carried.then(|| rms(&judges, &left));
         let rows = if held_out { judges } else { kept.clone() };
-        let stated: f64 = kept
-            .iter()
-            .map(|row| (data.position[*row] - predicted[*row]).component_div(&data.sigma[*row]).norm_squared())
-            .sum();
+        let stated: f64 =
+            kept.iter().map(|row| (data.position[*row] - predicted[*row]).component_div(&data.sigma[*row]).norm_squared()).sum();
         Self {
             held_out,
             noise_floor: rms(&rows, &|row| data.noise(row)),

@@ -40,8 +40,7 @@ impl Cause for PayloadError {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
-        let mut out: Vec<Hypothesis> =
-            forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
+        let mut out: Vec<Hypothesis> = forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
         // Without any mass of the links nothing says how much of a wind-up is the tool's.
         let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
         if yields && weighs {

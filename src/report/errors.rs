@@ -284,7 +284,9 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
         format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
     };
-    let suspects = || format!("mean without {}", if after.suspects == 1 { "a suspect".into() } else { format!("{} suspects", after.suspects) });
+    let suspects = || {
+        format!("mean without {}", if after.suspects == 1 { "a suspect".into() } else { format!("{} suspects", after.suspects) })
+    };
     let without = after.mean_without_mm.map(|mean| (suspects(), mm(mean)));
     VerdictView {
         kind,

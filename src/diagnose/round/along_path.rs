@@ -1,5 +1,6 @@
 //! Rows along a path: each pose is near the one before it, so that what changes with the pose looks like noise that is correlated in time.
 
+use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::robot::Measurements;
 use crate::statistics::nearest;
 
@@ -15,6 +16,14 @@ pub(super) enum PathCorrelation {
     CausesFirst,
     /// Noise and those causes were compared.
     Decided,
+}
+
+/// What noise does from row to row, and what becomes of the causes that were found without it.
+pub(crate) struct CorrelationChange {
+    /// None where it is white.
+    pub noise: Option<AutocorrelatedNoise>,
+    /// Whether causes that do not follow time explain more than such noise would.
+    pub keeps_causes: bool,
 }
 
 /// Whether neighbours in time are neighbours in pose.

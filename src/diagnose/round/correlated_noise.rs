@@ -4,6 +4,7 @@
 //! that is correlated. Searched causes take a part of such noise with them, so that what they leave alone would show too little of it; likelihoods
 //! are restricted ones (Patterson and Thompson, 1971), as the base model takes its part, too.
 
+use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
 use crate::diagnose::pool::{orthonormal, project};
@@ -19,14 +20,6 @@ const CLEARER: f64 = 8.0;
 /// Of autocorrelations whose criterion is within this of the best the longest is taken (95 % of chi-square with one degree of
 /// freedom): too short a noise makes causes of noise.
 const AS_GOOD: f64 = 3.84;
-
-/// What noise does from row to row, and what becomes of the causes that were found without it.
-pub(crate) struct CorrelationChange {
-    /// None where it is white.
-    pub noise: Option<AutocorrelatedNoise>,
-    /// Whether causes that do not follow time explain more than such noise would.
-    pub keeps_causes: bool,
-}
 
 /// What noise does from row to row, if the settled model shows it to be otherwise than believed.
 pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<CorrelationChange> {

@@ -1,8 +1,7 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
-use super::along_path::{PathCorrelation, follow_a_path};
+use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
-use super::correlated_noise::CorrelationChange;
 use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
@@ -176,7 +175,8 @@ impl<'a> Fitter<'a> {
     /// Takes the autocorrelation that a residual showed, and returns the causes to go on with: none, but on a path those that do not follow
     /// time. On a path it is not believed before these have been searched by themselves.
     pub fn take_correlation(&mut self, change: &CorrelationChange, settled: &FitState) -> Vec<EstimatedCause> {
-        let lasting = || settled.causes.iter().filter(|cause| !cause.form.variables().contains(&Variable::Time)).cloned().collect();
+        let lasting =
+            || settled.causes.iter().filter(|cause| !cause.form.variables().contains(&Variable::Time)).cloned().collect();
         match self.on_path {
             PathCorrelation::Unasked if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) => {
                 self.on_path = PathCorrelation::CausesFirst;

@@ -1,7 +1,7 @@
 //! A round: the recording is looked at around the present model, which is then fitted anew with the causes that were found.
 
-mod base_model;
 mod along_path;
+mod base_model;
 mod correlated_noise;
 mod fit_state;
 mod history;

@@ -177,7 +177,10 @@ fn screen(
         let judges = asked.binary_search(&row).is_err();
         if kind == SuspectKind::Outlier && judges && !corroborated::is_wrong(data, row, residual.norm()) {
             crowd += 1;
-        } else if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row)
+        } else if kind == SuspectKind::Outlier
+            && crowded.contains(&set[row])
+            && *distance < BEYOND_CROWD * limit
+            && !held.contains(&row)
         {
             crowd += 1;
         } else {

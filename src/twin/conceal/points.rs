@@ -54,8 +54,9 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
         let payload_kg = if loaded && amount.loaded { robot.payload_mass } else { 0.0 };
         time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
         // A repeat: the arm goes away and comes back as it came before, with the same load.
-        let again =
-            out.last().filter(|last| path.is_empty() && draw.chance(amount.repeated) && last.block == block && last.payload_kg == payload_kg);
+        let again = out.last().filter(|last| {
+            path.is_empty() && draw.chance(amount.repeated) && last.block == block && last.payload_kg == payload_kg
+        });
         let (q, before) = match again {
             Some(last) => (last.q.clone(), last.before.clone()),
             None => {
