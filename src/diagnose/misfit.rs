@@ -17,6 +17,12 @@ pub(crate) struct Misfit {
     /// Rms length of what is left at fitted rows, m, and reduced chi-square there.
     pub leftover_rms: f64,
     pub chi_square: f64,
+    /// Reduced chi-square at fitted rows against the stated or recorded uncertainty alone.
+    pub beyond_stated: f64,
+    /// Rows of the figures, suspects among them: held-out ones, else those that were fitted.
+    pub figures: Vec<usize>,
+    /// Rms length of what is left at `rows`, m.
+    left_here: f64,
     /// Rms length of what is left at held-out rows that belong, m, where it is more than what was fitted and the noise allow.
     pub not_carried: Option<f64>,
 }
@@ -54,14 +60,27 @@ impl Misfit {
         let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
         let not_carried = not_carried.then(|| rms(&judges, &left));
         let rows = if held_out { judges } else { kept.clone() };
+        let stated: f64 =
+            kept.iter().map(|row| (data.position[*row] - predicted[*row]).component_div(&data.sigma[*row]).norm_squared()).sum();
         Self {
             held_out,
             noise_floor: rms(&rows, &|row| data.noise(row)),
             instrument: rms(&rows, &|row| data.sigma[row].norm()),
             leftover_rms: rms(kept, &left),
             chi_square: whitened(kept) / freedom,
+            beyond_stated: stated / freedom,
+            figures: if held_out { question.validate.to_vec() } else { rows.clone() },
+            left_here: rms(&rows, &left),
             not_carried,
             rows,
+        }
+    }
+
+    /// The noise, of which an inferred one is at least the instrument's and no more than what is left.
+    pub fn noise(&self, basis: NoiseBasis) -> f64 {
+        match basis {
+            NoiseBasis::Inferred => self.noise_floor.min(self.left_here.max(self.instrument)),
+            NoiseBasis::Repeats | NoiseBasis::Instrument => self.noise_floor,
         }
     }
 
@@ -73,7 +92,7 @@ impl Misfit {
             nameless,
             basis,
             repeats,
-            noise: self.noise_floor,
+            noise: self.noise(basis),
             instrument: (data.noise_basis != NoiseBasis::Inferred).then_some(self.instrument),
             left: self.leftover_rms,
             in_motion: data.in_motion(&self.rows),

@@ -72,10 +72,10 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = next;
             continue;
         }
-        if let Some(noise) = correlation_left_by(&next, &fitter) {
-            fitter.take_correlation(noise);
+        if let Some(change) = correlation_left_by(&next, &fitter) {
+            let kept = fitter.take_correlation(&change, &next);
             tell(words::of_the_correlation(&fitter));
-            now = fitter.fit(&next.model, Vec::new());
+            now = fitter.fit(&next.model, kept);
             history = RoundHistory::default();
             continue;
         }

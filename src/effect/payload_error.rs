@@ -17,14 +17,20 @@ pub struct PayloadError;
 pub struct WrongPayload {
     /// Whether the centre is wrong too.
     centre: bool,
+    /// Whether it is a mass at the tool that every row carries, beside the declared payload.
+    #[serde(default)]
+    tool: bool,
 }
+
+/// A tool of which nothing is known weighs this much, kg (one sigma), or as much as the heaviest declared payload.
+const TOOL: f64 = 5.0;
 
 impl Cause for PayloadError {
     fn about(&self) -> &'static CauseDescription {
         &CauseDescription {
             name: "payload_error",
             place: "tool",
-            formula: "mass and centre of the payload in the torque model",
+            formula: "mass and centre of the payload, or an unstated mass at the tool, in the torque model",
             size: "3 to 30 %",
             confounded: "joint_hardening",
             needs: "rows with and without the payload",
@@ -34,11 +40,21 @@ impl Cause for PayloadError {
     fn propose(&self, survey: &Survey) -> Vec<Hypothesis> {
         let yields = survey.compliance.iter().any(|compliance| *compliance > 0.0);
         let forms = [false, true].into_iter().filter(|_| yields && survey.heavy_payload() > 0.0);
-        forms.map(|centre| Hypothesis::new(WrongPayload { centre }, 2)).collect()
+        let mut out: Vec<Hypothesis> = forms.map(|centre| Hypothesis::new(WrongPayload { centre, tool: false }, 2)).collect();
+        // Without any mass of the links nothing says how much of a wind-up is the tool's.
+        let weighs = survey.robot.description().joints.iter().any(|joint| joint.mass.is_some());
+        if yields && weighs {
+            out.push(Hypothesis::new(WrongPayload { centre: false, tool: true }, 2).penalised(4.0));
+        }
+        out
     }
 
     fn sentence(&self, summary: &Summary) -> String {
         match summary.parameters.first() {
+            Some(n) if summary.form::<WrongPayload>().is_some_and(|form| form.tool) => {
+                let how = if n.value < 0.0 { "less" } else { "more" };
+                format!("the tool weighs {} kg {how} than the robot file and the payload say", figure(n.value.abs(), 1))
+            }
             Some(n) => {
                 let how = if n.value < 0.0 { "lighter" } else { "heavier" };
                 format!("the payload is {} % {how} than declared", figure(n.value.abs() * 100.0, 1))
@@ -62,7 +78,10 @@ impl Effect for WrongPayload {
     }
 
     /// In shares of the declared payload, so that an empty flange stays empty.
-    fn parameters(&self, _robot: &RobotModel) -> Vec<ParameterSpec> {
+    fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
+        if self.tool {
+            return parameters(self, [("tool_mass", Unit::Kilogram, TOOL.max(robot.description().payload_mass))]);
+        }
         let mass = ("mass", Unit::One, 1.0);
         let centre = ["x", "y", "z"].map(|axis| (axis, Unit::Millimetre, 1.0));
         if self.centre { parameters(self, std::iter::once(mass).chain(centre)) } else { parameters(self, [mass]) }
@@ -71,7 +90,8 @@ impl Effect for WrongPayload {
     fn deflect(&self, robot: &RobotModel, state: &ArmState, _p: &[f64], out: &mut Deflection) {
         let last = robot.joints() - 1;
         for joint in 0..=last {
-            out.load(0, joint, state.posture.torque_of_payload(robot, joint) * state.payload());
+            let carried = if self.tool { 1.0 } else { state.payload() };
+            out.load(0, joint, state.posture.torque_of_payload(robot, joint) * carried);
             if self.centre {
                 let torque = state.posture.torque_of_moment(robot, joint, last) * state.payload();
                 for axis in 0..3 {
@@ -86,7 +106,7 @@ impl Effect for WrongPayload {
     }
 
     fn load_correction(&self, _q: &[f64], payload: f64, p: &[f64], out: &mut LoadCorrection) {
-        out.payload += p[0] * payload;
+        out.payload += p[0] * if self.tool { 1.0 } else { payload };
         if self.centre {
             out.payload_moment += Vector3::new(p[1], p[2], p[3]) * payload;
         }
@@ -103,7 +123,7 @@ impl Placed for WrongPayload {
     }
 
     fn variables(&self) -> Vec<Variable> {
-        vec![Variable::Payload]
+        vec![if self.tool { Variable::ArmLoad } else { Variable::Payload }]
     }
 
     fn is_of_torque_model(&self) -> bool {

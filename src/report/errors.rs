@@ -6,7 +6,7 @@ use super::findings::wrong_setup;
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
+use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, VerdictRow, Withdrawn};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -123,7 +123,7 @@ struct Picture {
 }
 
 impl ErrorsSection {
-    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
+    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>, accepted: bool) -> Result<Self> {
         let rows = &tables.statistics.0;
         let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
         if let Some(wished) = wished
@@ -148,7 +148,7 @@ impl ErrorsSection {
         Ok(Self {
             verdict: match wrong_setup(tables) {
                 Some(wrong) => nothing_known(format!("Nothing is calibrated: {wrong}.")),
-                None => verdict(rows, &last, &tables.withdrawn),
+                None => tempered(verdict(rows, &last, &tables.withdrawn), tables, accepted),
             },
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
@@ -247,6 +247,13 @@ fn nothing_known(sentence: String) -> VerdictView {
     VerdictView { kind: "unknown", sentence, before: None, after: None, facts: Vec::new(), others: Vec::new() }
 }
 
+/// A result that is beyond the limits, or that the diagnosis does not explain, is not shown as good.
+fn tempered(view: VerdictView, tables: &Tables, accepted: bool) -> VerdictView {
+    let unexplained = tables.verdict.iter().flat_map(|table| &table.0).next_back().is_some_and(VerdictRow::is_unexplained);
+    let kind = if view.kind == "better" && (unexplained || !accepted) { "unknown" } else { view.kind };
+    VerdictView { kind, ..view }
+}
+
 fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> VerdictView {
     let Some(after) = last.first() else {
         let sentence = "No point was held out, so the accuracy on new poses is not known. The figures below are for points that \
@@ -277,17 +284,24 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
         format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
     };
+    let suspects = || {
+        format!("mean without {}", if after.suspects == 1 { "a suspect".into() } else { format!("{} suspects", after.suspects) })
+    };
+    let without = after.mean_without_mm.map(|mean| (suspects(), mm(mean)));
     VerdictView {
         kind,
         sentence,
         before: before_row.map(|before| (before.step.clone(), mm(before.mean_mm))),
         after: Some((after.step.clone(), mm(after.mean_mm))),
-        facts: vec![
+        facts: [
             ("95 % of points within".into(), mm(after.p95_mm)),
             ("worst point".into(), mm(after.max_mm)),
             ("rms".into(), mm(after.rms_mm)),
-            (noise(after), mm(after.noise_rms_mm)),
-        ],
+        ]
+        .into_iter()
+        .chain(without)
+        .chain([(noise(after), mm(after.noise_rms_mm))])
+        .collect(),
         others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
     }
 }

@@ -133,7 +133,7 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         diagnosis: findings::FindingsSection::new(tables),
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
-        errors: errors::ErrorsSection::new(tables, &steps, options.set)?,
+        errors: errors::ErrorsSection::new(tables, &steps, options.set, judgement.as_ref().is_none_or(|judged| judged.kept))?,
         workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
         parameters: parameters::ParametersSection::new(&tables.parameters),
         fits: fits::FitsSection::new(tables, &steps),

@@ -89,8 +89,8 @@ pub fn note(context: &Context, screening: &Screening, recording: &Recording) {
     }
     if screening.crowd > 0 {
         context.services.note(format!(
-            "{} rows stand far out: too many for mistakes of the recording, so this model lacks something there; they are kept",
-            screening.crowd
+            "{} far out without evidence beside this model that they are mistakes of the recording: it lacks something there; they are kept",
+            if screening.crowd == 1 { "one row stands".into() } else { format!("{} rows stand", screening.crowd) }
         ));
     }
 }

@@ -49,7 +49,10 @@ fn error(row: &StatisticsRow) -> String {
         true => format!("{} of set {}", counted(row.points as usize, "held-out point"), row.set),
         false => format!("{} of set {}, to which it was fitted: flattered", counted(row.points as usize, "point"), row.set),
     };
-    format!("mean {:.4} mm, max {:.4} mm after `{}`, {rows}", row.mean_mm, row.max_mm, row.step)
+    let without = row.mean_without_mm.zip(row.max_without_mm).map_or_else(String::new, |(mean, max)| {
+        format!("; mean {mean:.4} mm, max {max:.4} mm without {}", counted(row.suspects as usize, "suspect"))
+    });
+    format!("mean {:.4} mm, max {:.4} mm after `{}`, {rows}{without}", row.mean_mm, row.max_mm, row.step)
 }
 
 fn noise(row: &StatisticsRow) -> String {

@@ -141,6 +141,8 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
             "mean_mm": row.mean_mm, "std_mm": row.std_mm, "rms_mm": row.rms_mm, "median_mm": row.median_mm,
             "p95_mm": row.p95_mm, "max_mm": row.max_mm, "noise_rms_mm": row.noise_rms_mm, "expected_rms_mm": row.expected_rms_mm,
             "noise_basis": row.noise_basis,
+            "suspects": row.suspects, "mean_without_mm": row.mean_without_mm, "rms_without_mm": row.rms_without_mm,
+            "max_without_mm": row.max_without_mm,
             "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
             "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
             "fold_expected_mm": row.fold_expected_mm,

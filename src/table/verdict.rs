@@ -1,7 +1,7 @@
 //! The verdict of a diagnosis, with errors before and after.
 
 crate::table::rows! { "verdict",
-    /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects apart.
+    /// One row a diagnosis; key `step`. Errors are of held-out rows where there are any, suspects among them.
     pub struct Verdict of VerdictRow {
         step: String,
         /// `explained`, `nothing_missing`, `unexplained`, `not_asked` of too few rows, or `wrong_setup`.
@@ -51,6 +51,11 @@ use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};
 use crate::robot::NoiseBasis;
 
 impl VerdictRow {
+    /// Whether something is left that neither a finding nor noise explains.
+    pub fn is_unexplained(&self) -> bool {
+        self.verdict == VerdictKind::Unexplained.name()
+    }
+
     /// Whether nothing is known of the noise: neither was it stated nor measured, nor is it what the joints scatter by.
     pub fn is_noise_assumed(&self) -> bool {
         self.is_noise_inferred() && self.repeatability_rad == 0.0

@@ -423,3 +423,23 @@ fn a_stated_twin_is_written_as_a_case_folder_that_the_estimator_reads() {
     let again = record("worn", "all");
     assert!(again.status.code() == Some(2) && String::from_utf8_lossy(&again.stderr).contains("is not empty"));
 }
+
+#[test]
+fn a_path_and_its_shuffled_rows_have_the_same_poses_and_only_the_path_is_smooth() {
+    use calib::twin::conceal::layout::Layout;
+    let poses = |layout| {
+        let design = Design { seed: 31, cases: 1, points: Some(120), faulty: 0.0, layout, ..Design::default() };
+        let case = Case::make(&design, 0, Content::Null).expect("a case");
+        case.shots.iter().take(case.fit).map(|shot| shot.q.clone()).collect::<Vec<Vec<f64>>>()
+    };
+    let step = |poses: &[Vec<f64>]| {
+        let apart = |pair: &[Vec<f64>]| pair[0].iter().zip(&pair[1]).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        poses.windows(2).map(apart).sum::<f64>() / (poses.len() - 1) as f64
+    };
+    let (mut path, mut shuffled) = (poses(Layout::Path), poses(Layout::Shuffled));
+    assert!(step(&path) < 0.35 * step(&shuffled), "{} and {} rad", step(&path), step(&shuffled));
+    let order = |a: &Vec<f64>, b: &Vec<f64>| a.partial_cmp(b).expect("numbers");
+    path.sort_by(order);
+    shuffled.sort_by(order);
+    assert_eq!(path, shuffled);
+}

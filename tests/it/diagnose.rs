@@ -4,6 +4,7 @@ mod flanks;
 mod said;
 mod scrambled;
 mod setup;
+mod tool_mass;
 mod weight;
 
 use crate::desk::{Desk, shared, table};

@@ -6,6 +6,7 @@ use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::proof::{RECORDINGS, SEAL, conceal, vacant};
 use crate::twin::conceal::design::Design;
 use crate::twin::conceal::family::Collection;
+use crate::twin::conceal::layout::{LAYOUTS, Layout};
 use crate::twin::conceal::robots::ALL_KINDS;
 use crate::twin::tracker::{SCATTERS, Scatter};
 use clap::{Args, ValueEnum};
@@ -74,6 +75,13 @@ pub(super) struct ConcealArguments {
     /// Rounds the logged joints to steps of this size, deg
     #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     log_step: f64,
+    /// How poses follow each other: random, path (one after the other along lines and curves), shuffled (those of the same paths in random
+    /// order)
+    #[arg(long, value_name = "FORM", default_value = "random")]
+    layout: String,
+    /// A mass on the flange, kg, that neither the robot file nor the payload column states
+    #[arg(long, value_name = "KG", default_value_t = 0.0)]
+    tool_mass: f64,
     /// Worker threads; no result depends on it [default: all cores]
     #[arg(long, short = 'j', value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
@@ -166,6 +174,13 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         faults.push(fault);
         None
     });
+    if !(0.0..=500.0).contains(&arguments.tool_mass) {
+        faults.push(Fault::new("--tool-mass", format!("{} is no mass of a tool; allowed: 0 to 500 kg", arguments.tool_mass)));
+    }
+    let layout = LAYOUTS.into_iter().find(|layout| layout.name() == arguments.layout).unwrap_or_else(|| {
+        faults.push(unknown("--layout", &arguments.layout, &LAYOUTS.map(Layout::name)));
+        Layout::default()
+    });
     if !(0.0..=1.0).contains(&arguments.log_step) {
         faults.push(Fault::new("--log-step", format!("{} is no step of a log; allowed: 0 to 1 deg", arguments.log_step)));
     }
@@ -188,6 +203,8 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         scatter,
         bare: arguments.bare,
         log_step_deg: arguments.log_step,
+        layout,
+        tool_mass_kg: arguments.tool_mass,
     })
 }
 

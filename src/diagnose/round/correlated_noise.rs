@@ -4,6 +4,7 @@
 //! that is correlated. Searched causes take a part of such noise with them, so that what they leave alone would show too little of it; likelihoods
 //! are restricted ones (Patterson and Thompson, 1971), as the base model takes its part, too.
 
+use super::along_path::CorrelationChange;
 use super::fit_state::{FitState, Fitter};
 use super::stretches::thinned;
 use crate::diagnose::pool::{orthonormal, project};
@@ -20,8 +21,9 @@ const CLEARER: f64 = 8.0;
 /// freedom): too short a noise makes causes of noise.
 const AS_GOOD: f64 = 3.84;
 
-/// What noise does from row to row (nothing: `Some(None)`), if the settled model shows it to be otherwise than believed.
-pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<Option<AutocorrelatedNoise>> {
+/// What noise does from row to row, if the settled model shows it to be otherwise than believed.
+pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option<CorrelationChange> {
+    let change = |noise| CorrelationChange { noise, keeps_causes: false };
     if !fitter.may_estimate_correlation(settled) {
         return None;
     }
@@ -33,15 +35,22 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     let with_all = Regression::of(&problem, settled, fitter, &vec![true; slow.len()]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
+    if fitter.causes_of_the_arm_first() {
+        // What noise alone explains as well has no other name.
+        let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().map(self::numbers).sum::<usize>() as f64;
+        let (alone, of_noise) = Regression::of(&problem, settled, fitter, &vec![false; slow.len()]).likeliest();
+        let keeps_causes = best + price < alone - PLAIN;
+        return Some(CorrelationChange { noise: if keeps_causes { noise } else { of_noise }, keeps_causes });
+    }
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
         let (cost, other) = Regression::of(&problem, settled, fitter, &kept).likeliest();
         if cost < best.min(believed) + CLEARER && other.is_some() {
-            return (other != fitter.correlated).then_some(other);
+            return (other != fitter.correlated).then(|| change(other));
         }
     }
-    (best < believed - PLAIN && noise != fitter.correlated).then_some(noise)
+    (best < believed - PLAIN && noise != fitter.correlated).then(|| change(noise))
 }
 
 fn follows_time(form: &Form) -> bool {

@@ -1,10 +1,11 @@
 //! The model between rounds, and how it is fitted anew with other causes.
 
+use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
 use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
-use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, whole};
+use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
 use crate::estimate::{FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
@@ -96,6 +97,8 @@ pub(crate) struct Fitter<'a> {
     pub correlated: Option<AutocorrelatedNoise>,
     /// How often that was learned.
     estimated: usize,
+    /// Of rows along a path.
+    on_path: PathCorrelation,
 }
 
 /// The autocorrelation is estimated at most so often: what it makes of slow causes changes what it is estimated from.
@@ -116,6 +119,7 @@ impl<'a> Fitter<'a> {
             asked: false,
             correlated: None,
             estimated: 0,
+            on_path: PathCorrelation::Unasked,
         };
         let base = base_model(question.robot, &fitter.data, question.fit);
         let mut now = fitter.fit(&base, Vec::new());
@@ -163,10 +167,27 @@ impl<'a> Fitter<'a> {
         self.estimated < ESTIMATES && !self.data.in_motion(&settled.screening.kept)
     }
 
-    /// Takes the autocorrelation that a residual showed.
-    pub fn take_correlation(&mut self, noise: Option<AutocorrelatedNoise>) {
-        self.correlated = noise;
+    /// Whether causes that do not follow time are searched by themselves: rows follow a path, and something looks correlated.
+    pub fn causes_of_the_arm_first(&self) -> bool {
+        self.on_path == PathCorrelation::CausesFirst
+    }
+
+    /// Takes the autocorrelation that a residual showed, and returns the causes to go on with: none, but on a path those that do not follow
+    /// time. On a path it is not believed before these have been searched by themselves.
+    pub fn take_correlation(&mut self, change: &CorrelationChange, settled: &FitState) -> Vec<EstimatedCause> {
+        let lasting =
+            || settled.causes.iter().filter(|cause| !cause.form.variables().contains(&Variable::Time)).cloned().collect();
+        match self.on_path {
+            PathCorrelation::Unasked if change.noise.is_some() && follow_a_path(&self.data, &settled.screening.kept) => {
+                self.on_path = PathCorrelation::CausesFirst;
+                return Vec::new();
+            }
+            PathCorrelation::CausesFirst => self.on_path = PathCorrelation::Decided,
+            PathCorrelation::Unasked | PathCorrelation::Decided => {}
+        }
+        self.correlated = change.noise;
         self.estimated += 1;
+        if change.keeps_causes { lasting() } else { Vec::new() }
     }
 
     /// The base effects of `from` with other causes, which start at their coefficients, fitted to the rows that belong.

@@ -1,5 +1,6 @@
 //! A round: the recording is looked at around the present model, which is then fitted anew with the causes that were found.
 
+mod along_path;
 mod base_model;
 mod correlated_noise;
 mod fit_state;

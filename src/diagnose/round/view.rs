@@ -4,7 +4,7 @@ use super::fit_state::{EstimatedCause, FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, poses, thinned};
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
-use crate::effect::{DeclaredForm, Hypothesis, Survey, hypotheses};
+use crate::effect::{DeclaredForm, Hypothesis, Survey, Variable, hypotheses};
 use crate::estimate::Model;
 
 /// What is left of the rows that a search looks at, and what moves it.
@@ -51,6 +51,9 @@ impl<'a> RoundView<'a> {
         let tried = |hypothesis: &Hypothesis| !fitter.question.without.iter().any(|name| name == hypothesis.form.cause().name());
         let mut hypotheses: Vec<Hypothesis> = hypotheses(survey).into_iter().filter(tried).collect();
         hypotheses.extend(fitter.question.own.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));
+        if fitter.causes_of_the_arm_first() {
+            hypotheses.retain(|hypothesis| !hypothesis.form.variables().contains(&Variable::Time));
+        }
         hypotheses.iter_mut().for_each(|hypothesis| hypothesis.prior_penalty *= fitter.question.prior_weight);
         HypothesisSet::new(problem, &jacobian, &residual, self.autocorrelation_time, hypotheses).into()
     }

@@ -38,7 +38,12 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let lacking = basis == NoiseBasis::Repeats && lack_of_fit.is_some_and(|(_, chance)| chance <= SIGNIFICANT);
     let structured = last.last <= SIGNIFICANT || lacking;
     let something_left = structured && misfit.chi_square > LOUD || misfit.chi_square > TOO_LOUD || misfit.not_carried.is_some();
-    let verdict = verdict(&findings, &misfit, something_left, fitter.repeatability);
+    let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
+    let above_stated = is_stated && misfit.beyond_stated > LOUD;
+    let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
+        VerdictKind::NothingMissing if above_stated => VerdictKind::Unexplained,
+        other => other,
+    };
     let nameless = !something_left && only_unknown(&findings);
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
     findings.iter_mut().for_each(weigh);
@@ -56,9 +61,9 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         statement: statement(verdict, &ground),
         noise_basis: basis,
         verdict,
-        noise_floor: misfit.noise_floor,
-        before: ErrorLengths::of(data, before, &misfit.rows),
-        after: ErrorLengths::of(data, &predicted, &misfit.rows),
+        noise_floor: misfit.noise(basis),
+        before: ErrorLengths::of(data, before, &misfit.figures),
+        after: ErrorLengths::of(data, &predicted, &misfit.figures),
         held_out: misfit.held_out,
         folds,
         next_measurements: next(&findings, fitter.question.own),

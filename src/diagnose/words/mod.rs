@@ -34,6 +34,11 @@ pub(crate) fn of_the_base(now: &FitState, fitter: &Fitter) -> String {
 /// What the noise does from point to point.
 pub(crate) fn of_the_correlation(fitter: &Fitter) -> String {
     match fitter.correlated {
+        _ if fitter.causes_of_the_arm_first() => {
+            "rows follow a path, on which what changes with the pose looks like noise that is correlated from point to point: causes that do \
+             not follow time are tried first"
+                .into()
+        }
         Some(AutocorrelatedNoise { correlation, share }) => format!(
             "noise is correlated from point to point: {:.0} % of its variance by {correlation:.2}; slow causes are judged against it",
             100.0 * share

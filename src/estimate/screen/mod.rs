@@ -4,6 +4,7 @@
 //! Where too many rows stand out, or several in a row do, it is the model that is wrong, and the rows are kept.
 
 mod apart;
+mod corroborated;
 mod distance;
 mod kind;
 mod tail;
@@ -172,7 +173,14 @@ fn screen(
     for (row, kind, partner) in named.into_iter().filter(|(row, ..)| !slipped.contains_key(row)) {
         let LeaveOneOut { residual, distance, .. } = &standings[row];
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
-        if kind == SuspectKind::Outlier && crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row)
+        // A row that judges the model is not set aside by the model alone.
+        let judges = asked.binary_search(&row).is_err();
+        if kind == SuspectKind::Outlier && judges && !corroborated::is_wrong(data, row, residual.norm()) {
+            crowd += 1;
+        } else if kind == SuspectKind::Outlier
+            && crowded.contains(&set[row])
+            && *distance < BEYOND_CROWD * limit
+            && !held.contains(&row)
         {
             crowd += 1;
         } else {

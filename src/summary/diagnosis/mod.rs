@@ -187,12 +187,12 @@ impl DiagnosisSummary {
         })
     }
 
-    /// Rows that count in no figure.
+    /// Rows that are not fitted.
     fn aside(&self) -> impl Iterator<Item = &SuspectsRow> {
         self.suspects.0.iter().filter(|row| !row.used)
     }
 
-    /// How many rows count in no figure, and the worst of them by name.
+    /// How many rows are not fitted, and the worst of them by name.
     fn set_aside(&self) -> Option<String> {
         let mut all: Vec<&SuspectsRow> = self.aside().collect();
         all.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
@@ -200,7 +200,7 @@ impl DiagnosisSummary {
             all.iter().take(ASIDE).map(|row| format!("{} of set {} {:.3} mm off", row.point_id, row.set, row.size_mm)).collect();
         let more = if all.len() > ASIDE { ", the worst of them" } else { "" };
         let which = counted(all.len(), "row");
-        (!all.is_empty()).then(|| format!("{which} in none of these figures{more}: {}", named.join(", ")))
+        (!all.is_empty()).then(|| format!("{which} (figures of held-out points include theirs){more}: {}", named.join(", ")))
     }
 
     fn located_json(&self, by: &str) -> Vec<Value> {

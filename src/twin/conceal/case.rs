@@ -9,7 +9,7 @@ use super::visible::Site;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::twin::effect::{HoldingFriction, Physical};
 use crate::twin::noise::{Noise, Purpose};
-use crate::twin::plan::{Climate, Poses};
+use crate::twin::plan::{Climate, Point, Poses};
 use crate::twin::recorder::{Experiment, Motors, Shot};
 use crate::twin::tracker::{SCATTERS, Scatter, Tracker};
 use crate::twin::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
@@ -114,7 +114,14 @@ impl Case {
         let points = points::plan(
             kind,
             &ranges,
-            Amount { fit, validate, repeated, near: if beyond_list { NEAR } else { 0.0 }, loaded: !design.bare },
+            Amount {
+                fit,
+                validate,
+                repeated,
+                near: if beyond_list { NEAR } else { 0.0 },
+                loaded: !design.bare,
+                layout: design.layout,
+            },
             &climate,
             seed,
         )?;
@@ -154,7 +161,8 @@ impl Case {
             climate: &climate,
             seed,
         };
-        let mut shots = experiment.measure(points, || ());
+        let carried = points.into_iter().map(|point| Point { payload_kg: point.payload_kg + design.tool_mass_kg, ..point });
+        let mut shots = experiment.measure(carried.collect(), || ());
         let mut faults = Noise::new(seed, Purpose::Faults);
         let thermometer_c = warmth.iter().map(|celsius| celsius + THERMOMETER_K * faults.normal()).collect();
         let tampered = tamper(design, &mut shots, fit, &mut faults);

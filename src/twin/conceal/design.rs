@@ -1,6 +1,7 @@
 //! What a set of concealed recordings is drawn from, and which kind each of its cases is.
 
 use super::family::{Collection, Family};
+use super::layout::Layout;
 use super::robots::Kind;
 use crate::twin::noise::{Noise, Purpose};
 use crate::twin::tracker::Scatter;
@@ -38,6 +39,10 @@ pub struct Design {
     pub bare: bool,
     /// Step (deg) to which joints are rounded in the log; 0: none.
     pub log_step_deg: f64,
+    /// How poses follow each other.
+    pub layout: Layout,
+    /// Mass (kg) on the flange that neither the robot file nor the payload column states.
+    pub tool_mass_kg: f64,
 }
 
 impl Default for Design {
@@ -58,6 +63,8 @@ impl Default for Design {
             scatter: None,
             bare: false,
             log_step_deg: 0.0,
+            layout: Layout::default(),
+            tool_mass_kg: 0.0,
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod case;
 pub mod design;
 pub mod family;
 pub mod folder;
+pub mod layout;
 pub mod points;
 pub mod robots;
 pub mod size;

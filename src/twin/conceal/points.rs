@@ -1,5 +1,6 @@
 //! What is measured: a run without load, one with full load, and held-out points with either, last, while the arm warms up.
 
+use super::layout::Layout;
 use super::robots::Kind;
 use crate::twin::arm::Arm;
 use crate::twin::noise::{Noise, Purpose};
@@ -24,6 +25,8 @@ pub struct Amount {
     pub near: f64,
     /// Whether half of the points carry the full payload.
     pub loaded: bool,
+    /// How poses follow each other; none is repeated on a path.
+    pub layout: Layout,
 }
 
 /// A step of the controller's display, deg; recorded joints are multiples of it, so that writing them loses nothing.
@@ -38,6 +41,9 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
     let ranges: Vec<[f64; 2]> = ranges_deg.iter().map(|range| range.map(f64::to_radians)).collect();
     let mut draw = Noise::new(seed, Purpose::Poses);
     let mut clock = Noise::new(seed, Purpose::Clock);
+    let loaded_from = amount.fit.div_ceil(2);
+    let blocks = [0..loaded_from, loaded_from..amount.fit, amount.fit..amount.fit + amount.validate];
+    let path = amount.layout.poses(&arm, &poses, &ranges, &blocks, &mut draw)?;
     let (mut out, mut time): (Vec<Point>, f64) = (Vec::new(), 0.0);
     for number in 0..amount.fit + amount.validate {
         let block = if number < amount.fit { FIT } else { VALIDATE };
@@ -48,8 +54,9 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
         let payload_kg = if loaded && amount.loaded { robot.payload_mass } else { 0.0 };
         time += clock.uniform(climate.pace_s[0], climate.pace_s[1]);
         // A repeat: the arm goes away and comes back as it came before, with the same load.
-        let again =
-            out.last().filter(|last| draw.chance(amount.repeated) && last.block == block && last.payload_kg == payload_kg);
+        let again = out.last().filter(|last| {
+            path.is_empty() && draw.chance(amount.repeated) && last.block == block && last.payload_kg == payload_kg
+        });
         let (q, before) = match again {
             Some(last) => (last.q.clone(), last.before.clone()),
             None => {
@@ -57,7 +64,10 @@ pub fn plan(kind: Kind, ranges_deg: &[[f64; 2]], amount: Amount, climate: &Clima
                     Some(last) if amount.near > 0.0 && draw.chance(amount.near) => Some(around(&last.q, &ranges, &mut draw)),
                     _ => None,
                 };
-                let (q, _) = plan::allowed(&arm, &poses, close.as_ref().unwrap_or(&ranges), &mut draw)?;
+                let q = match path.get(number) {
+                    Some(q) => q.clone(),
+                    None => plan::allowed(&arm, &poses, close.as_ref().unwrap_or(&ranges), &mut draw)?.0,
+                };
                 let q = q.iter().map(|angle| ((angle.to_degrees() / STEP_DEG).round() * STEP_DEG).to_radians()).collect();
                 (q, out.last().map_or_else(|| vec![0.0; ranges.len()], |last| last.q.clone()))
             }
