@@ -53,6 +53,7 @@ impl Export {
         for LeftOut { effect, place, rms, most } in &self.left_out {
             lines.push(format!("not carried: {effect} at {place}, {:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
         }
+        lines.extend(self.identified.refusals.iter().map(|reason| format!("written because of --force: {}", one_line(reason))));
         if self.identified.correction.is_some() {
             lines.push("not carried: the learned correction".into());
         }
