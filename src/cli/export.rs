@@ -46,7 +46,7 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
     let identified = arguments.model.load(Purpose::Export, command_line)?;
     identified.spare(arguments.out.as_deref())?;
-    let export = Export::of(identified);
+    let export = Export::of(identified, arguments.model.force);
     let text = arguments.format.0.text(&export)?;
     match &arguments.out {
         Some(path) => std::fs::write(path, text)

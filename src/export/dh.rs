@@ -51,7 +51,9 @@ impl Format for Mdh {
 
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
-    refuse_far(&DhTable::of(&RobotModel::new(export.corrected.clone())), &export.identified.origin)?;
+    if !export.insisted {
+        refuse_far(&DhTable::of(&RobotModel::new(export.corrected.clone())), &export.identified.origin)?;
+    }
     let body = body(export, modified);
     let back = read_calib(RobotFileText { label: "exported table", text: &body }, None)?.robot;
     let (now, then) = (RobotModel::new(back), RobotModel::new(export.corrected.clone()));
@@ -73,7 +75,7 @@ fn refuse_far(rows: &DhTable, place: &str) -> Result<()> {
         format!(" (axes {} and {} are {:.1} arcsec from parallel)", joint + 1, joint + 2, angle.to_degrees() * 3600.0)
     });
     let message = format!(
-        "a Denavit-Hartenberg table of this arm has d = {:.0} mm, a = {:.0} mm{pair}: take --format urdf or mjcf, which carry such axes",
+        "a Denavit-Hartenberg table of this arm has d = {:.0} mm, a = {:.0} mm{pair}: take --format urdf or mjcf, which carry such axes, or insist with --force",
         mm(row.d),
         mm(row.a)
     );

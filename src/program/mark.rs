@@ -1,6 +1,6 @@
 //! The mark of a corrected program: a comment line with a hash of the program that was corrected, by which it is known again.
 //!
-//! It stands behind what must come first: the line of DEF or DEFDAT in KRL, of MODULE in RAPID, else the `&` and `%%%` lines of the head.
+//! It stands behind what must come first: the line of DEF or DEFDAT in KRL, of MODULE in RAPID, else the `&` lines of KRL's head.
 
 use super::Language;
 
@@ -53,7 +53,6 @@ fn place(bytes: &[u8], language: Language) -> usize {
         if heads.contains(&word) {
             return end;
         }
-        // RAPID's header stands between two lines of `%%%`.
         leading = leading && (line.starts_with(b"&") || line.starts_with(b"\xef\xbb\xbf&"));
         if leading {
             first = end;
