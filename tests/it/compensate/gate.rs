@@ -104,3 +104,25 @@ fn a_table_whose_common_normals_are_far_from_the_arm_is_refused_with_the_formats
         assert!(err.contains("axes 2 and 3 are") && err.contains("--format urdf or mjcf"), "{err}");
     }
 }
+
+#[test]
+fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    let loaded = PIPELINE
+        .replace("{usage: fit, points: 60}", "{usage: fit, points: 40}, {usage: fit, points: 40, payload_kg: 50}")
+        .replace("{on: [fit]}", "{on: [fit], effects: [base_frame, tool_offset, joint_offset, link_geometry, joint_compliance]}");
+    std::fs::write(here.join("pipeline.yaml"), loaded).expect("a file");
+    std::fs::write(here.join("p.src"), "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n").expect("a file");
+    for file in ["-", "p.src"] {
+        let output = calib(here, &["compensate", "pipeline.yaml", file, "--quiet"], HEADER);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!((output.status.code(), output.stdout.len()), (Some(10), 0), "{said}");
+        assert!(said.contains("states no payload") && said.contains("measured up to 50 kg"), "{said}");
+        let stated = calib(here, &["compensate", "pipeline.yaml", file, "--quiet", "--payload", "0"], HEADER);
+        assert_eq!(stated.status.code(), Some(0), "{}", String::from_utf8_lossy(&stated.stderr));
+    }
+    let column = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg\n10,20,-30,5,40,0,50\n";
+    assert_eq!(calib(here, &["compensate", "pipeline.yaml", "--quiet"], column).status.code(), Some(0));
+}
