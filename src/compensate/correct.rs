@@ -1,7 +1,7 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, Coverage, Gate, IdentifiedArm, Nominal, PositionUncertainty, Reach, Remark, ToolGoal,
+    Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark, ToolGoal,
     Uncertainty, beyond_limits, inverse, least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
@@ -64,32 +64,6 @@ pub struct CorrectionOptions {
     pub start: Option<Vec<f64>>,
     /// Which corrections are refused.
     pub gate: Gate,
-}
-
-/// A command and what is known of it, SI.
-#[derive(Debug, Clone)]
-pub struct CorrectedCommand {
-    /// None where the target is not reached: no joints are better than wrong ones.
-    pub q: Option<Vec<f64>>,
-    /// How far the uncorrected command would be off by the model.
-    pub uncorrected: f64,
-    /// How far the uncorrected command would turn the tool away by the model, rad.
-    pub turn: f64,
-    /// Distance from the wanted point that the model leaves, m.
-    pub residual: f64,
-    /// Steps of the solution.
-    pub iterations: usize,
-    /// Of the point that is reached; none where the model has no covariance.
-    pub uncertainty: Option<PositionUncertainty>,
-    /// What is wrong with it.
-    pub remarks: Vec<Remark>,
-}
-
-impl CorrectedCommand {
-    /// What is wrong with it, in words; empty if nothing.
-    pub fn remark(&self) -> String {
-        self.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ")
-    }
 }
 
 /// Corrects targets in their order: what a target does not say follows from the one before.

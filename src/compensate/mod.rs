@@ -6,6 +6,7 @@
 //! every step gains about three digits. Frames: targets are in the robot's base frame, as identified.
 
 mod arm;
+mod command;
 mod correct;
 mod coverage;
 mod gate;
@@ -18,7 +19,8 @@ mod stated;
 mod uncertainty;
 
 pub use arm::{Circumstance, IdentifiedArm, Reach};
-pub use correct::{CommandTarget, CorrectedCommand, CorrectionOptions, CorrectionTotals, Corrector, turns};
+pub use command::CorrectedCommand;
+pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
 pub use coverage::Coverage;
 use coverage::beyond_limits;
 pub use gate::{Gate, GateLimits};
