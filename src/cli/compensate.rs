@@ -1,14 +1,14 @@
 //! `calib compensate`: joint or Cartesian targets in, commands out that bring the real arm there.
 
 use super::model_arguments::ModelArguments;
-use crate::compensate::{CorrectionOptions, Corrector, IdentifiedArm, Stated};
+use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, IdentifiedArm, Stated, load_matters};
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
-use crate::program::{self, Language, Partial, ProgramFile};
+use crate::program::{self, Frames, Language, Partial, ProgramFile, mark};
 use crate::raw;
 use crate::robot::Measurements;
-use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
+use crate::targets::{Layout, Units, Unreached, parquet, text, unstated_payload, unwritten, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
@@ -27,10 +27,14 @@ use std::path::{Path, PathBuf};
 ///
 /// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
 /// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, near the
-/// posture of the target before (or --start); status and turn are not read. A target that is not understood exactly, not reached, or that
+/// posture of the target before (or --start); status and turn are not read. Programs that set $BASE or $TOOL, name a work object or displace
+/// their targets are refused (--assume-frames), and so are programs and tables without a payload where the model depends on load (--payload).
+/// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
+/// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
 /// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program
 /// computes, Offs and RelTool of RAPID among them (the controller adds the offset to the corrected target, so that the shifted point
-/// gets the correction of the unshifted one). Warnings also name the lines that set $BASE or $TOOL, name a work object, or move external axes.
+/// gets the correction of the unshifted one). Warnings also name the lines that move by a distance
+/// (PTP_REL, LIN_REL) or move external axes.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct CompensateArguments {
@@ -57,9 +61,19 @@ pub(super) struct CompensateArguments {
     /// Leaves targets of a program that state some of their numbers as they are (`LIN {X 10}`), with a warning for each, instead of refusing it
     #[arg(long)]
     leave_partial: bool,
-    /// Payload where the targets do not say, kg
-    #[arg(long, value_name = "KG", default_value_t = 0.0)]
-    payload: f64,
+    /// Payload where the targets do not say, kg; needed where the model depends on load and was measured under one (0: none is carried)
+    #[arg(long, value_name = "KG")]
+    payload: Option<f64>,
+    /// Largest displacement by which a target is corrected, mm: one that needs more is refused, as those that are not reached
+    #[arg(long, value_name = "MM", default_value_t = 20.0)]
+    max_correction: f64,
+    /// Largest turn by which a target is corrected, deg
+    #[arg(long, value_name = "DEG", default_value_t = 2.0)]
+    max_turn: f64,
+    /// Takes frames of a program that are not applied (work object, $BASE, $TOOL, displacement) as those of the robot file, with a warning
+    /// for each, instead of refusing the program
+    #[arg(long)]
+    assume_frames: bool,
     /// Temperature where the targets do not say, C [default: that at the start of the recording]
     #[arg(long, value_name = "C", allow_hyphen_values = true)]
     temperature: Option<f64>,
@@ -105,6 +119,7 @@ const EXAMPLES: &str = "Examples:
 pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -> Result<()> {
     check(arguments)?;
     let identified = arguments.model.load(Purpose::Compensate, command_line)?;
+    identified.spare(arguments.out.as_deref())?;
     let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
     let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
@@ -114,9 +129,10 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
         .build()
         .map_err(|error| Error::store("--jobs", error.to_string()))?;
     let place = if arguments.targets.as_os_str() == "-" { "stdin".into() } else { arguments.targets.display().to_string() };
+    let load = if arguments.payload.is_some() { None } else { identified.heaviest().filter(|load| load_matters(&arm, *load)) };
     let units = Units { angle: unit(arguments.angle.as_deref()), length: unit(arguments.length.as_deref()) };
     let cartesian = arguments.target == What::Pose;
-    let layout = Layout { place: &place, robot: &identified.robot, units, plain: arguments.plain, cartesian };
+    let layout = Layout { place: &place, robot: &identified.robot, units, plain: arguments.plain, cartesian, load, force: arguments.model.force };
     let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {
@@ -137,7 +153,13 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
             faults.push(Fault::new(option, format!("unknown unit `{given}`; allowed: {}", Unit::symbols(quantity).join(", "))));
         }
     }
-    faults.extend(Stated::Payload.fault(arguments.payload).map(|message| Fault::new("--payload", message)));
+    let payload = arguments.payload.and_then(|payload| Stated::Payload.fault(payload));
+    faults.extend(payload.map(|message| Fault::new("--payload", message)));
+    for (option, given) in [("--max-correction", arguments.max_correction), ("--max-turn", arguments.max_turn)] {
+        if !(given.is_finite() && given > 0.0) {
+            faults.push(Fault::new(option, format!("expected a number above 0, found {given}")));
+        }
+    }
     let temperature = arguments.temperature.and_then(|temperature| Stated::Temperature.fault(temperature));
     faults.extend(temperature.map(|message| Fault::new("--temperature", message)));
     if let Some(direction) = arguments.direction.filter(|direction| direction.abs() != 1.0) {
@@ -201,13 +223,24 @@ fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Resu
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,
-        payload: arguments.payload,
+        payload: arguments.payload.unwrap_or(0.0),
         temperature: arguments.temperature,
         time: arguments.time,
         clock,
         direction: arguments.direction,
         start,
+        gate: gate(arguments, identified),
     })
+}
+
+fn gate(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Gate {
+    let limits = GateLimits {
+        correction: arguments.max_correction * 1e-3,
+        turn: arguments.max_turn.to_radians(),
+        ..GateLimits::default()
+    };
+    let insisted = arguments.model.force;
+    Gate { limits, insisted, model: if insisted { identified.refusals.clone() } else { Vec::new() } }
 }
 
 fn is_parquet(path: &Path) -> bool {
@@ -223,7 +256,16 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
     let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
     let source = ProgramFile { place: layout.place, text: &text, language };
-    let rewritten = program::corrected(&source, partial, layout.robot, corrector)?;
+    if mark::stands_in(&text, language) && !arguments.model.force {
+        let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
+        return Err(Error::data(layout.place, message));
+    }
+    if let Some(load) = layout.load {
+        return Err(Error::data(layout.place, unstated_payload(load)));
+    }
+    let frames = if arguments.assume_frames { Frames::Assumed } else { Frames::Refused };
+    let mut rewritten = program::corrected(&source, partial, frames, layout.robot, corrector)?;
+    rewritten.bytes = mark::written(&rewritten.bytes, &text, language, arguments.model.force);
     let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
     let Some(out) = &arguments.out else {

@@ -44,7 +44,9 @@ const EXAMPLES: &str = "Examples:
   calib export parameters.parquet --robot robot.yaml --format controller";
 
 pub(super) fn main(arguments: &ExportArguments, command_line: &[OsString]) -> Result<()> {
-    let export = Export::of(arguments.model.load(Purpose::Export, command_line)?);
+    let identified = arguments.model.load(Purpose::Export, command_line)?;
+    identified.spare(arguments.out.as_deref())?;
+    let export = Export::of(identified, arguments.model.force);
     let text = arguments.format.0.text(&export)?;
     match &arguments.out {
         Some(path) => std::fs::write(path, text)

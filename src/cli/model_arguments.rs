@@ -1,11 +1,13 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::means::{CommandTask, Means};
-use crate::error::{Error, Result};
+use crate::compensate::Gate;
+use crate::error::{Error, Fault, Result};
 use crate::identified::{Files, IdentifiedModel, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
 use crate::raw::ending;
 use crate::store::Store;
+use crate::summary::LimitsSummary;
 use clap::Args;
 use std::ffi::OsString;
 use std::io::Write;
@@ -28,6 +30,10 @@ pub(super) struct ModelArguments {
     /// Takes tables without a content hash, which another program wrote, as they are; a hash that does not hold is refused all the same
     #[arg(long)]
     unchecked: bool,
+    /// Insists on a model that is refused (set-up wrong, limits of the report exceeded, further from the robot file than 50 mm or 5 deg in
+    /// its tool, a link or a joint's zero), and on commands and files that are refused; what is written says so
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     means: Means,
     /// Prints no progress and no summary; warnings and errors remain
@@ -46,7 +52,23 @@ impl ModelArguments {
         for warning in &identified.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
         }
-        Ok(identified)
+        self.judged(identified)
+    }
+
+    /// A model that no commands are to be made of is refused, or insisted on.
+    fn judged(&self, mut identified: IdentifiedModel) -> Result<IdentifiedModel> {
+        identified.refusals.extend(Gate::default().beyond(&identified.model));
+        if identified.refusals.is_empty() {
+            return Ok(identified);
+        }
+        if self.force {
+            for reason in &identified.refusals {
+                let _ = writeln!(std::io::stderr(), "warning: used because of --force: {reason}");
+            }
+            return Ok(identified);
+        }
+        let fault = |reason: &String| Fault::new(&identified.origin, format!("refused: {reason}. Correct that, or insist with --force"));
+        Err(Error::Data(identified.refusals.iter().map(fault).collect()))
     }
 
     fn identified(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
@@ -60,7 +82,9 @@ impl ModelArguments {
         }
         let (store, step) = (self.means.store()?, self.step.as_deref());
         if !matches!(ending.as_str(), "yaml" | "yml") {
-            let mut identified = IdentifiedModel::of_run(&store, &Manifest::of(&store, &self.run(&store)?)?, step)?;
+            let manifest = Manifest::of(&store, &self.run(&store)?)?;
+            let mut identified = IdentifiedModel::of_run(&store, &manifest, step)?;
+            identified.refusals.extend(LimitsSummary::of(&manifest, &store)?.exceeded());
             // A pipeline's stages say it themselves.
             identified.warnings.append(&mut identified.stage_warnings);
             return Ok(identified);

@@ -1,7 +1,7 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, Coverage, IdentifiedArm, Nominal, PositionUncertainty, Reach, Remark, ToolGoal,
+    Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark, ToolGoal,
     Uncertainty, beyond_limits, inverse, least_change, one_step,
 };
 use crate::effect::LONG_AFTER;
@@ -62,30 +62,8 @@ pub struct CorrectionOptions {
     pub direction: Option<f64>,
     /// Where the first Cartesian target is searched from.
     pub start: Option<Vec<f64>>,
-}
-
-/// A command and what is known of it, SI.
-#[derive(Debug, Clone)]
-pub struct CorrectedCommand {
-    /// None where the target is not reached: no joints are better than wrong ones.
-    pub q: Option<Vec<f64>>,
-    /// How far the uncorrected command would be off by the model.
-    pub uncorrected: f64,
-    /// Distance from the wanted point that the model leaves, m.
-    pub residual: f64,
-    /// Steps of the solution.
-    pub iterations: usize,
-    /// Of the point that is reached; none where the model has no covariance.
-    pub uncertainty: Option<PositionUncertainty>,
-    /// What is wrong with it.
-    pub remarks: Vec<Remark>,
-}
-
-impl CorrectedCommand {
-    /// What is wrong with it, in words; empty if nothing.
-    pub fn remark(&self) -> String {
-        self.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ")
-    }
+    /// Which corrections are refused.
+    pub gate: Gate,
 }
 
 /// Corrects targets in their order: what a target does not say follows from the one before.
@@ -114,6 +92,10 @@ pub struct CorrectionTotals {
     pub residual_max: f64,
     /// Targets without a solution.
     pub not_reached: u64,
+    /// Targets whose correction is beyond a limit: no joints.
+    pub refused: u64,
+    /// Targets beyond a limit that were written because someone insisted.
+    pub insisted: u64,
     /// Targets that are reached but for their orientation.
     pub turned: u64,
     /// Targets beyond the limits of a joint.
@@ -138,6 +120,8 @@ impl CorrectionTotals {
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let all = [
             (self.not_reached, "could not be reached and has", "could not be reached and have", "no joints"),
+            (self.refused, "is", "are", "beyond the limits of corrections and refused; --force writes them all the same"),
+            (self.insisted, "is", "are", "beyond the limits of corrections and written because of --force"),
             (self.turned, "is", "are", "reached in position but not in orientation: the wrist is singular there"),
             (self.beyond_limits, "leaves", "leave", "the joint limits"),
             (self.beyond_measured, "is", "are", "outside of what was measured: the model extrapolates there"),
@@ -251,14 +235,19 @@ impl<'a> Corrector<'a> {
                 remarks.push(Remark::Faded(share));
             }
         }
-        CorrectedCommand {
+        let nominal_pose = nominal.place(&job.home);
+        let turn = ToolGoal { pose: nominal_pose, oriented: true }.turn_left(&reach.place(&job.home));
+        let mut command = CorrectedCommand {
             q: reached.then_some(found.q),
             uncorrected: found.before,
+            turn,
             residual: found.residual,
             iterations: found.iterations,
             uncertainty,
             remarks,
-        }
+        };
+        self.manner.gate.judge(&mut command);
+        command
     }
 }
 
@@ -284,8 +273,11 @@ impl CorrectionTotals {
         if answer.q.is_some() {
             self.residual_max = self.residual_max.max(answer.residual);
         }
-        self.not_reached += u64::from(answer.q.is_none());
         let any = |is: fn(&Remark) -> bool| u64::from(answer.remarks.iter().any(is));
+        let refused = any(|remark| matches!(remark, Remark::Refused(_)));
+        self.refused += refused;
+        self.insisted += any(|remark| matches!(remark, Remark::Insisted(_)));
+        self.not_reached += u64::from(answer.q.is_none()) - refused;
         self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
         self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));

@@ -6,9 +6,12 @@
 //! every step gains about three digits. Frames: targets are in the robot's base frame, as identified.
 
 mod arm;
+mod command;
 mod correct;
 mod coverage;
+mod gate;
 mod inverse;
+mod load;
 mod remark;
 mod rigid;
 mod solve;
@@ -16,10 +19,13 @@ mod stated;
 mod uncertainty;
 
 pub use arm::{Circumstance, IdentifiedArm, Reach};
-pub use correct::{CommandTarget, CorrectedCommand, CorrectionOptions, CorrectionTotals, Corrector, turns};
+pub use command::CorrectedCommand;
+pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
 pub use coverage::Coverage;
 use coverage::beyond_limits;
+pub use gate::{Gate, GateLimits};
 pub use inverse::inverse;
+pub use load::load_matters;
 pub use remark::Remark;
 pub use rigid::{LeftOut, distance, left_out, rigid};
 pub use solve::{Chain, CommandSolution, Nominal, SETTLED, ToolGoal, least_change, one_step};

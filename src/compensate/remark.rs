@@ -16,6 +16,10 @@ pub enum Remark {
     BeyondMeasured(Unmeasured),
     /// The share of the learned correction that applies.
     Faded(f64),
+    /// Beyond a limit: no joints are written.
+    Refused(String),
+    /// Beyond a limit, and written because someone insisted.
+    Insisted(String),
 }
 
 impl fmt::Display for Remark {
@@ -27,6 +31,8 @@ impl fmt::Display for Remark {
             Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", numbered(joints)),
             Self::BeyondMeasured(what) => what.fmt(f),
             Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
+            Self::Refused(reason) => write!(f, "refused: {reason}"),
+            Self::Insisted(reason) => write!(f, "written because of --force: {reason}"),
         }
     }
 }

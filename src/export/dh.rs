@@ -1,7 +1,7 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
 use super::{Export, Format};
-use crate::error::{Result, one_line};
+use crate::error::{Error, Result, one_line};
 use crate::estimate::choose::spread;
 use crate::robot::description::JointKind;
 use crate::robot::import::{RobotFileText, read_calib};
@@ -11,6 +11,9 @@ use nalgebra::{Rotation3, UnitQuaternion};
 
 /// arcsec: neighbouring axes nearer to parallel than this make a table worth a warning.
 const FLAT_ARCSEC: f64 = 3600.0;
+
+/// m: a row farther from its neighbours than this holds no length of an arm, and no controller takes it.
+const FARTHEST: f64 = 100.0;
 
 /// Poses at which the table that is read back is compared with the geometry.
 const POSES: usize = 500;
@@ -48,6 +51,9 @@ impl Format for Mdh {
 
 /// The table with what its reader must know, and how well it stands for the corrected geometry when read back.
 fn text(export: &Export, modified: bool) -> Result<String> {
+    if !export.insisted {
+        refuse_far(&DhTable::of(&RobotModel::new(export.corrected.clone())), &export.identified.origin)?;
+    }
     let body = body(export, modified);
     let back = read_calib(RobotFileText { label: "exported table", text: &body }, None)?.robot;
     let (now, then) = (RobotModel::new(back), RobotModel::new(export.corrected.clone()));
@@ -59,6 +65,21 @@ fn text(export: &Export, modified: bool) -> Result<String> {
     out.push_str(&format!("# conversion to this table: {most:.1e} mm at most over {} poses\n", poses.rows()));
     out.push_str("# masses, payload and couplings are not part of it: they stand in the original robot file\n");
     Ok(out + &body)
+}
+
+/// Refuses a table whose rows are far from the arm: neighbouring axes nearly parallel have their common normal there.
+fn refuse_far(rows: &DhTable, place: &str) -> Result<()> {
+    let far = |row: &&DhRow| row.d.abs() > FARTHEST || row.a.abs() > FARTHEST;
+    let Some(row) = std::iter::once(&rows.base).chain(&rows.joints).find(far) else { return Ok(()) };
+    let pair = rows.flattest().map_or(String::new(), |(joint, angle)| {
+        format!(" (axes {} and {} are {:.1} arcsec from parallel)", joint + 1, joint + 2, angle.to_degrees() * 3600.0)
+    });
+    let message = format!(
+        "a Denavit-Hartenberg table of this arm has d = {:.0} mm, a = {:.0} mm{pair}: take --format urdf or mjcf, which carry such axes, or insist with --force",
+        mm(row.d),
+        mm(row.a)
+    );
+    Err(Error::data(place, message))
 }
 
 fn body(export: &Export, modified: bool) -> String {

@@ -17,13 +17,16 @@ pub struct Export {
     /// Rms and maximum distance of the corrected description from the model, m, and over how many poses.
     pub(super) residual: (f64, f64),
     pub(super) poses: usize,
+    /// Whether someone insists on what is refused.
+    pub(super) insisted: bool,
     /// Whether these are the recorded ones.
     recorded: bool,
 }
 
 impl Export {
     /// Splits the model into the rigid geometry that formats hold, and the rest, which is listed.
-    pub fn of(identified: IdentifiedModel) -> Self {
+    /// `insisted`: a format that holds the arm badly is written all the same.
+    pub fn of(identified: IdentifiedModel, insisted: bool) -> Self {
         let recording = identified.data.as_ref().filter(|data| data.rows() > 0);
         let recorded = recording.is_some();
         let data = recording.cloned().unwrap_or_else(|| spread(&identified.model.robot, POSES));
@@ -34,6 +37,7 @@ impl Export {
             corrected,
             poses: data.rows(),
             recorded,
+            insisted,
             identified,
         }
     }
@@ -53,6 +57,7 @@ impl Export {
         for LeftOut { effect, place, rms, most } in &self.left_out {
             lines.push(format!("not carried: {effect} at {place}, {:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
         }
+        lines.extend(self.identified.refusals.iter().map(|reason| format!("written because of --force: {}", one_line(reason))));
         if self.identified.correction.is_some() {
             lines.push("not carried: the learned correction".into());
         }

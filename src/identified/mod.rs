@@ -24,6 +24,9 @@ use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recor
 use std::path::{Path, PathBuf};
 use written::written;
 
+/// How a stage's warning of a wrong set-up begins.
+const WRONG_SETUP: &str = "the set-up is wrong";
+
 /// What was identified, and from what.
 pub struct IdentifiedModel {
     /// The nominal arm.
@@ -46,6 +49,10 @@ pub struct IdentifiedModel {
     pub warnings: Vec<String>,
     /// What the stage that identified it, or learned on top, warned of when it ran.
     pub stage_warnings: Vec<String>,
+    /// Why no commands are to be made of it, a sentence each.
+    pub refusals: Vec<String>,
+    /// The files that it was made from.
+    pub sources: Vec<PathBuf>,
 }
 
 /// A table of parameters as a file, and the robot that they are of.
@@ -80,7 +87,7 @@ impl IdentifiedModel {
         let wrong = wrong_setup_of(manifest, store)?;
         if let (None, Some(wrong)) = (step, &wrong) {
             let message = format!(
-                "none of its models is usable: {wrong}. Correct that and run again, or choose a step explicitly with --step"
+                "none of its models is usable: {wrong}. Correct that and run again, or choose a step explicitly with --step and --force"
             );
             return Err(Error::data(run, message));
         }
@@ -107,7 +114,11 @@ impl IdentifiedModel {
         };
         let data = recording.map(|table| table.measurements());
         let origin = format!("run {run}, stage {}", stage.id);
-        let warnings = stands.iter().flat_map(Standing::warnings).chain(wrong).collect();
+        let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
+        let sources = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
+        let warnings = stands.iter().flat_map(Standing::warnings).collect();
+        let told = manifest.stages.iter().flat_map(|stage| &stage.warnings).find(|line| line.starts_with(WRONG_SETUP)).cloned();
+        let refusals = wrong.or(told).into_iter().collect();
         let learned = learned.filter(|_| correction.is_some());
         let said = |stage: &StageReport| stage.warnings.iter().map(|line| format!("{}: {line}", stage.id)).collect::<Vec<_>>();
         let stage_warnings = std::iter::once(stage).chain(learned).flat_map(said).collect();
@@ -115,7 +126,7 @@ impl IdentifiedModel {
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
-        Ok(Self { correction, covariance, scatter, data, warnings, stage_warnings, ..own })
+        Ok(Self { correction, covariance, scatter, data, warnings, stage_warnings, refusals, sources, ..own })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -130,7 +141,8 @@ impl IdentifiedModel {
             robot_file(&files.robot, None)?
         };
         let origin = format!("table {}", files.parameters.display());
-        Ok(Self { warnings, ..Self::of(robot, parameters, origin)? })
+        let sources = vec![files.parameters.clone(), files.robot.clone()];
+        Ok(Self { warnings, sources, ..Self::of(robot, parameters, origin)? })
     }
 
     fn of(robot: RobotDescription, parameters: Parameters, origin: String) -> Result<Self> {
@@ -152,7 +164,26 @@ impl IdentifiedModel {
             origin,
             warnings: Vec::new(),
             stage_warnings: Vec::new(),
+            refusals: Vec::new(),
+            sources: Vec::new(),
         })
+    }
+
+    /// The largest load that was measured, kg; none where all rows carried nothing, or no recording is at hand.
+    pub fn heaviest(&self) -> Option<f64> {
+        let loads = self.data.iter().flat_map(|data| &data.payload).copied();
+        loads.filter(|load| *load > 0.0).max_by(f64::total_cmp)
+    }
+
+    /// Refuses to write over a file that the model was made from.
+    pub fn spare(&self, out: Option<&Path>) -> Result<()> {
+        let Some(out) = out else { return Ok(()) };
+        let Ok(place) = out.canonicalize() else { return Ok(()) };
+        if self.sources.iter().any(|source| source.canonicalize().is_ok_and(|source| source == place)) {
+            let message = format!("{} is a file that the model was made from: name another file", out.display());
+            return Err(Error::spec("--out", message));
+        }
+        Ok(())
     }
 
     /// What the uncertainty of a target is made of; none where a table alone was given.

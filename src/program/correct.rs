@@ -1,6 +1,6 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
-use super::{Language, Note, Partial, Program, ProgramRefusal, Rewritten, solve};
+use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
 use crate::compensate::Corrector;
 use crate::error::{Error, Fault, Result};
 use crate::robot::RobotModel;
@@ -45,6 +45,7 @@ impl ProgramFile<'_> {
 pub fn corrected(
     source: &ProgramFile,
     partial: Partial,
+    frames: Frames,
     robot: &RobotDescription,
     corrector: &mut Corrector,
 ) -> Result<Rewritten> {
@@ -56,6 +57,13 @@ pub fn corrected(
     let program = Program::parse(source.text, source.language, partial).map_err(|refusal| source.refused(refusal))?;
     if program.literals().is_empty() {
         return Err(Error::data(source.place, "has no targets"));
+    }
+    // Joint targets are the same in every frame.
+    let cartesian = program.literals().iter().any(|literal| literal.kind != TargetKind::Joints);
+    if frames == Frames::Refused && cartesian && !program.frames().is_empty() {
+        let refused = |note: &Note| Note { message: format!("{}; --assume-frames accepts it", note.message), ..note.clone() };
+        let faults = program.frames().iter().map(refused).collect();
+        return Err(source.refused(ProgramRefusal { faults, partial: 0 }));
     }
     let answers = solve(program.literals(), &robot, corrector);
     program.rewritten(answers).map_err(|refusal| source.refused(refusal))

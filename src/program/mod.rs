@@ -9,6 +9,7 @@ mod correct;
 mod krl;
 mod list;
 mod literal;
+pub mod mark;
 mod pose;
 mod rapid;
 mod token;
@@ -49,6 +50,15 @@ pub enum Partial {
     Left,
 }
 
+/// What becomes of a program that uses frames which are not applied: work objects, $BASE, $TOOL, displacements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frames {
+    /// It is refused, with the lines.
+    Refused,
+    /// They are taken as those of the robot file, with a warning for each.
+    Assumed,
+}
+
 /// Brackets in brackets, at most: targets in arrays of three dimensions have six.
 const DEPTH: usize = 16;
 
@@ -79,6 +89,8 @@ pub struct Program<'p> {
     /// In the order of the program.
     literals: Vec<Literal>,
     warnings: Vec<Note>,
+    /// Frames that are not applied.
+    frames: Vec<Note>,
 }
 
 /// The answer to one literal.
@@ -106,6 +118,7 @@ struct Gathered {
     warnings: Vec<(usize, String)>,
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
+    frames: Vec<(usize, String)>,
 }
 
 /// What a language's reader finds declared under names: one for each literal.
@@ -123,6 +136,11 @@ impl Gathered {
 
     fn fault(&mut self, at: usize, message: impl Into<String>) {
         self.faults.push((at, message.into()));
+    }
+
+    /// A frame that is not applied.
+    fn frame(&mut self, at: usize, message: impl Into<String>) {
+        self.frames.push((at, message.into()));
     }
 
     fn partial(&mut self, at: usize, message: impl Into<String>) {
@@ -153,12 +171,21 @@ impl<'p> Program<'p> {
             return Err(refusal);
         }
         found.literals.sort_by_key(|literal| literal.at());
-        Ok(Self { bytes, literals: found.literals, warnings: placed(bytes, found.warnings) })
+        let frames = placed(bytes, found.frames);
+        let mut warnings = placed(bytes, found.warnings);
+        warnings.extend(frames.iter().cloned());
+        warnings.sort_by_key(|note| (note.line, note.column));
+        Ok(Self { bytes, literals: found.literals, warnings, frames })
     }
 
     /// The targets that are to be corrected.
     pub fn literals(&self) -> &[Literal] {
         &self.literals
+    }
+
+    /// The lines that use frames which are not applied; they are among the warnings, too.
+    pub fn frames(&self) -> &[Note] {
+        &self.frames
     }
 
     /// What was assumed, or left as it is.

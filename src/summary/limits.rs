@@ -2,7 +2,7 @@
 
 use super::labelled;
 use crate::error::{Error, Result};
-use crate::pipeline::CompletedRun;
+use crate::pipeline::{CompletedRun, Manifest};
 use crate::store::Store;
 use crate::table::{Document, Table};
 use serde::{Deserialize, Serialize};
@@ -34,8 +34,13 @@ struct Figure {
 impl LimitsSummary {
     /// Of all reports of a run. Fails where a document has left the store.
     pub fn read(outcome: &CompletedRun, store: &Store) -> Result<Self> {
+        Self::of(&outcome.manifest, store)
+    }
+
+    /// Of all reports of the record of a run.
+    pub fn of(manifest: &Manifest, store: &Store) -> Result<Self> {
         let mut all = Vec::new();
-        for stage in &outcome.manifest.stages {
+        for stage in &manifest.stages {
             for output in stage.outputs.iter().filter(|output| output.kind == Document::KIND) {
                 let documents = Document::from_frame(&store.load(&output.table)?)?.0;
                 for document in documents.iter().filter(|document| document.media_type == "application/json") {
@@ -49,6 +54,11 @@ impl LimitsSummary {
     /// Whether all limits are kept; none where there are none.
     pub fn accepted(&self) -> Option<bool> {
         (!self.0.is_empty()).then(|| self.0.iter().all(|judged| judged.kept))
+    }
+
+    /// What is not accepted, a sentence a report.
+    pub fn exceeded(&self) -> Vec<String> {
+        self.0.iter().filter(|judged| !judged.kept).map(Judged::words).collect()
     }
 
     /// A line for each report with limits.

@@ -12,7 +12,7 @@ mod whole;
 pub use columns::Units;
 pub use whole::{unwritten, whole};
 
-use crate::error::Fault;
+use crate::error::{Error, Fault, Result};
 use crate::robot::description::RobotDescription;
 
 /// Rows that are told of one file.
@@ -30,6 +30,31 @@ pub struct Layout<'a> {
     pub plain: bool,
     /// Poses are the targets though there are joints.
     pub cartesian: bool,
+    /// The largest load that was measured (kg), where the model depends on it and none is stated for targets without a payload.
+    pub load: Option<f64>,
+    /// Takes a table that calib corrected already.
+    pub force: bool,
+}
+
+/// Columns that calib appends, and that no other table of targets has together.
+const APPENDED: [&str; 3] = ["uncorrected_mm", "residual_mm", "iterations"];
+
+/// Why targets without a payload are refused.
+pub fn unstated_payload(load: f64) -> String {
+    format!(
+        "states no payload, and the identified arm depends on it (measured up to {load} kg): give --payload KG, 0 where nothing is carried; a table may have a column payload_kg"
+    )
+}
+
+impl Layout<'_> {
+    /// Why a table is refused by its columns: it was corrected already.
+    fn refused(&self, names: &[String]) -> Result<()> {
+        if !self.force && APPENDED.iter().all(|own| names.iter().any(|name| name == own)) {
+            let message = "was compensated by calib already (columns uncorrected_mm, residual_mm, iterations): a second correction would move the robot twice as far. Take the table of before, or insist with --force";
+            return Err(Error::data(self.place, message));
+        }
+        Ok(())
+    }
 }
 
 /// The targets of a table that are not reached; their joints are empty.

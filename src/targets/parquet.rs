@@ -25,6 +25,7 @@ pub fn stream(input: File, output: impl Write + Send, layout: &Layout, corrector
     let reader = raw::parquet(input, BATCH).map_err(fault)?;
     let schema = reader.schema.clone();
     let names: Vec<String> = schema.fields().iter().map(|field| field.name().clone()).collect();
+    layout.refused(&names)?;
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let out_schema = Arc::new(described(&schema, &columns, layout, corrector.has_uncertainty()));
     let mut writer = ArrowWriter::try_new(output, out_schema.clone(), None).map_err(|error| Error::Bug(error.to_string()))?;
@@ -114,7 +115,7 @@ fn targets(batch: &RecordBatch, columns: &TargetColumns, layout: &Layout, before
                 }
             }
             let faulty = |message: String| Error::data(layout.place, format!("row {}: {message}", before + row + 1));
-            taken.target(columns, layout.cartesian).map_err(faulty)
+            taken.target(columns, layout).map_err(faulty)
         })
         .collect()
 }

@@ -1,6 +1,7 @@
 //! One row of targets as numbers, and what holds of the rows of a whole table.
 
 use super::columns::{ColumnRole, TargetColumns};
+use super::{Layout, unstated_payload};
 use crate::compensate::{CommandTarget, turns};
 use crate::error::{Fault, counted};
 use crate::robot::description::{JointKind, RobotDescription};
@@ -34,7 +35,7 @@ impl TargetRow {
         }
     }
 
-    pub fn target(mut self, columns: &TargetColumns, cartesian: bool) -> Result<CommandTarget, String> {
+    pub fn target(mut self, columns: &TargetColumns, layout: &Layout) -> Result<CommandTarget, String> {
         let joints = self.target.q.iter().flatten().zip(&columns.joints);
         let joints =
             joints.map(|(q, (_, unit))| (if unit.quantity() == Quantity::Length { Bound::Length } else { Bound::Angle }, *q));
@@ -42,8 +43,11 @@ impl TargetRow {
         if let Some(message) = joints.chain(others).find_map(|(bound, value)| bound.fault(value)) {
             return Err(message);
         }
+        if let (Some(load), None) = (layout.load, self.target.payload) {
+            return Err(unstated_payload(load));
+        }
         // Where joints are the targets, what else stands there is not the tool's place in the base frame, e.g. measured points.
-        if columns.point && (cartesian || columns.joints.is_empty()) {
+        if columns.point && (layout.cartesian || columns.joints.is_empty()) {
             self.target.point = Some(Vector3::from(self.point));
             if columns.quaternion {
                 self.target.rotation = Some(self.rotation()?);

@@ -46,6 +46,7 @@ pub fn stream(input: &mut dyn BufRead, output: &mut dyn Write, layout: &Layout, 
     let cells = fields(body.trim_start_matches('\u{feff}'), delimiter)
         .map_err(|message| Error::Data(vec![Fault::new(format!("{}:{number}", layout.place), message)]))?;
     let names: Vec<String> = cells.into_iter().map(|field| field.1.into_owned()).collect();
+    layout.refused(&names)?;
     let columns = TargetColumns::read(layout.place, &names, layout.robot, layout.units)?;
     let mut joints: Vec<(usize, usize, Unit)> =
         columns.joints.iter().enumerate().map(|(joint, (index, unit))| (*index, joint, *unit)).collect();
@@ -243,7 +244,7 @@ impl TextTable<'_> {
         }
         let comma = self.delimiter != ',' && body.contains(',') && cells.iter().any(|(_, text)| is_comma_number(text));
         let joints = self.joints.iter().map(|(index, ..)| cells[*index].0.clone()).collect();
-        Ok((row.target(self.columns, self.layout.cartesian)?, Spans { joints, comma }))
+        Ok((row.target(self.columns, self.layout)?, Spans { joints, comma }))
     }
 
     /// Lines with their targets' results; lines without one as they are.

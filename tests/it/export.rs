@@ -6,7 +6,7 @@ use calib::robot::import::{RobotFileText, read_calib};
 use serde_json::Value;
 
 fn exported(format: &str) -> String {
-    let output = calib(cell(), &["export", "latest", "--format", format], "");
+    let output = calib(cell(), &["export", "latest", "--format", format, "--force"], "");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
     assert!(said.contains("not carried: reduction_ratio at joint 3"), "{said}");
@@ -150,7 +150,7 @@ const RAPID: &str = "MODULE m\n  ! [[1,2\n  CONST jointtarget home:=[[0,-10,20,5
 fn program(name: &str, text: &str) -> (Option<i32>, String, String) {
     let path = cell().join(name);
     std::fs::write(&path, text).expect("a file");
-    let output = calib(cell(), &["compensate", "latest", name, "--quiet"], "");
+    let output = calib(cell(), &["compensate", "latest", name, "--quiet", "--assume-frames"], "");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (output.status.code(), text(output.stdout), text(output.stderr))
 }
@@ -167,6 +167,10 @@ fn programs_differ_in_the_numbers_of_targets_and_nothing_else() {
         let (code, corrected, said) = program(name, text);
         assert_eq!(code, Some(0), "{said}");
         assert_ne!(corrected, text);
+        // The second line is the mark of what was corrected.
+        let mark = corrected.split('\n').nth(1).expect("a line");
+        assert!(mark.starts_with("; corrected by calib") || mark.starts_with("! corrected by calib"), "{mark}");
+        let corrected = corrected.replacen(&format!("{mark}\n"), "", 1);
         assert_eq!(without_numbers(&corrected, &targets), without_numbers(text, &targets));
         for k in targets {
             assert_ne!(corrected.split('\n').nth(k), text.split('\n').nth(k), "line {k} has a target");

@@ -75,6 +75,10 @@ impl Reader<'_> {
         frames::set(self.source, line, &mut self.found);
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
+            if head.ends_with("_REL") {
+                let message = format!("left as it is: {head} moves by a distance from where the target before, as corrected, has led");
+                self.found.warn(line[0].span.start, message);
+            }
             return;
         }
         if let Some((_, positions)) = MOTIONS.iter().find(|(name, _)| *name == head) {
@@ -249,7 +253,7 @@ impl Reader<'_> {
             return;
         }
         if FRAME_TABLES.contains(&name.as_str()) {
-            self.found.warn(at, frames::assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
+            self.found.frame(at, frames::assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
             return;
         }
         let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);

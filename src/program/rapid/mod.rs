@@ -214,15 +214,15 @@ impl Reader<'_> {
             let Some(name) = rest.first() else { continue };
             let value = quoted(self.source.bytes, rest.get(2).map_or(name.span.clone(), |value| value.span.clone()));
             if self.source.is_word(name, &["WOBJ"]) && !rest.get(2).is_some_and(|value| self.source.is_word(value, &["WOBJ0"])) {
-                self.found.warn(token.span.start, format!("work object {value}: {BASE}"));
+                self.found.frame(token.span.start, format!("work object {value}: {BASE}"));
             } else if self.source.is_word(name, &["TOOL"]) {
-                self.found.warn(token.span.start, format!("tool {value}: calib assumed that it is the tool of the robot file"));
+                self.found.frame(token.span.start, format!("tool {value}: calib assumed that it is the tool of the robot file"));
             }
         }
         let head = &statement[0];
         if self.source.is_word(head, &["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
             let name = quoted(self.source.bytes, head.span.clone());
-            self.found.warn(head.span.start, format!("{name} displaces what follows: {BASE}"));
+            self.found.frame(head.span.start, format!("{name} displaces what follows: {BASE}"));
         }
     }
 
