@@ -132,7 +132,15 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let load = if arguments.payload.is_some() { None } else { identified.heaviest().filter(|load| load_matters(&arm, *load)) };
     let units = Units { angle: unit(arguments.angle.as_deref()), length: unit(arguments.length.as_deref()) };
     let cartesian = arguments.target == What::Pose;
-    let layout = Layout { place: &place, robot: &identified.robot, units, plain: arguments.plain, cartesian, load, force: arguments.model.force };
+    let layout = Layout {
+        place: &place,
+        robot: &identified.robot,
+        units,
+        plain: arguments.plain,
+        cartesian,
+        load,
+        force: arguments.model.force,
+    };
     let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {

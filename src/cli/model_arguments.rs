@@ -67,7 +67,8 @@ impl ModelArguments {
             }
             return Ok(identified);
         }
-        let fault = |reason: &String| Fault::new(&identified.origin, format!("refused: {reason}. Correct that, or insist with --force"));
+        let fault =
+            |reason: &String| Fault::new(&identified.origin, format!("refused: {reason}. Correct that, or insist with --force"));
         Err(Error::Data(identified.refusals.iter().map(fault).collect()))
     }
 

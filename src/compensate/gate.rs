@@ -89,9 +89,8 @@ impl Gate {
 
     fn too_far(&self, what: &str, shift: f64, tilt: f64) -> Option<String> {
         let far = |by: f64, most: f64, unit: &str| {
-            (by.is_nan() || by > most).then(|| {
-                format!("{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed", round(most))
-            })
+            (by.is_nan() || by > most)
+                .then(|| format!("{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed", round(most)))
         };
         let GateLimits { shift: most, tilt: most_tilt, .. } = self.limits;
         far(shift * 1e3, most * 1e3, "mm").or_else(|| far(tilt.to_degrees(), most_tilt.to_degrees(), "deg"))

@@ -50,9 +50,10 @@ fn unopened(path: &Path, error: &io::Error) -> Error {
     let place = path.display().to_string();
     match error.kind() {
         io::ErrorKind::NotFound => Error::store(place, "the table is gone; `calib run` of its pipeline writes it anew"),
-        io::ErrorKind::IsADirectory => {
-            Error::store(place, "a folder stands in the table's place; remove it, and `calib run` of its pipeline writes the table anew")
-        }
+        io::ErrorKind::IsADirectory => Error::store(
+            place,
+            "a folder stands in the table's place; remove it, and `calib run` of its pipeline writes the table anew",
+        ),
         _ => refused(path, "read", error),
     }
 }
@@ -129,7 +130,9 @@ fn of_the_data(place: &str, error: Error) -> Error {
 fn set_aside(path: &Path, why: &str) -> Error {
     let place = path.display().to_string();
     match fs::rename(path, path.with_extension("damaged")) {
-        Ok(()) => Error::store(place, format!("damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew")),
+        Ok(()) => {
+            Error::store(place, format!("damaged: {why}; it was set aside, and `calib run` of its pipeline writes it anew"))
+        }
         Err(e) => Error::store(place, format!("damaged: {why}; remove it, and `calib run` of its pipeline writes it anew ({e})")),
     }
 }

@@ -68,6 +68,12 @@ fn calib(arguments: &[&str], folder: &Path) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
+/// The exit code and what is printed on stdout.
+fn ended(arguments: &[&str], folder: &Path) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_calib")).args(arguments).current_dir(folder).output().expect("calib");
+    (output.status.code(), String::from_utf8(output.stdout).expect("UTF-8"))
+}
+
 /// Diagnoses a concealed recording of the twin: the document, and what the seal holds.
 fn blind(family: &str, seed: &str) -> (Value, Value) {
     let folder = tempfile::tempdir().expect("a folder");

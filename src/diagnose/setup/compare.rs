@@ -101,10 +101,7 @@ impl<'a> AsStated<'a> {
         let share = placed.left / pairs.cloud().max(f64::MIN_POSITIVE);
         let counts = number.is_none_or(|number| beyond_manufacture(number, &placed.values, self.question.robot, self.reach));
         let own = if number.is_some() { OWN_NUMBERS } else { 1.0 };
-        let explains = counts
-            && BETTER * own * share < self.share()
-            && share < CLOUD
-            && placed.left < NOMINAL * pairs.reach();
+        let explains = counts && BETTER * own * share < self.share() && share < CLOUD && placed.left < NOMINAL * pairs.reach();
         Try { wrong, placed, share: own * share, explains }
     }
 

@@ -1,7 +1,7 @@
 //! Joints that a controller counts the other way together: makers reverse joints by the role of their axes, not one by one.
 //!
 //! Of an upright arm the axes of pitch are parallel to that of the first pitch joint, the others (swivel and roll) lie in the arm's
-//! plane: joints 1, 4 and 6 of the usual six. Then come all joints, and every two.
+//! plane: joints 1, 4 and 6 of the usual six, which are tried whatever the wrist. Then come all joints, and every two.
 
 use crate::robot::RobotModel;
 
@@ -15,7 +15,7 @@ impl SignGroup {
         let turning: Vec<usize> = (0..robot.joints().min(64)).filter(|joint| robot.is_revolute(*joint)).collect();
         let pitch = turning.windows(2).find(|pair| robot.is_parallel(pair[0], pair[1])).map(|pair| pair[0]);
         let of = |choose: &dyn Fn(usize) -> bool| Self::of(turning.iter().copied().filter(|joint| choose(*joint)));
-        let mut out = Vec::new();
+        let mut out = vec![of(&|joint| robot.joints() == 6 && [0, 3, 5].contains(&joint))];
         if let Some(pitch) = pitch {
             let is_pitch = |joint: usize| robot.is_parallel(pitch, joint);
             let wrist = (pitch..robot.joints()).find(|joint| !is_pitch(*joint)).unwrap_or(robot.joints());

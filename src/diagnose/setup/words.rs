@@ -103,8 +103,15 @@ fn of_signs(reversed: &[usize], joints: usize) -> (String, String) {
     let signs: Vec<&str> = (0..joints).map(|joint| if reversed.contains(&joint) { "-1" } else { "1" }).collect();
     let (verb, axes) = if reversed.len() == 1 { ("turns", "axis") } else { ("turn", "axes") };
     (
-        format!("joint{} {} {verb} the other way than the robot file says", if reversed.len() == 1 { "" } else { "s" }, numbered(reversed)),
-        format!("in `ingest`: `columns: {{q: {{.., sign: [{}]}}}}`, or turn the {axes} round in the robot file", signs.join(", ")),
+        format!(
+            "joint{} {} {verb} the other way than the robot file says",
+            if reversed.len() == 1 { "" } else { "s" },
+            numbered(reversed)
+        ),
+        format!(
+            "in `ingest`: `columns: {{q: {{.., sign: [{}]}}}}`, or turn the {axes} round in the robot file",
+            signs.join(", ")
+        ),
     )
 }
 

@@ -76,7 +76,8 @@ impl Reader<'_> {
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
             if head.ends_with("_REL") {
-                let message = format!("left as it is: {head} moves by a distance from where the target before, as corrected, has led");
+                let message =
+                    format!("left as it is: {head} moves by a distance from where the target before, as corrected, has led");
                 self.found.warn(line[0].span.start, message);
             }
             return;

@@ -36,8 +36,18 @@ fn what_calib_corrected_is_not_corrected_once_more() {
     assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
     assert!(said.contains("was compensated by calib already") && said.contains("--force"), "{said}");
     for (name, head, target, second) in [
-        ("twice.src", "&ACCESS RVP\r\nDEF twice( )\r\n", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nEND\r\n", "&ACCESS RVP\r\nDEF twice( )\r\n; "),
-        ("twice.mod", "MODULE m\n", "MoveAbsJ [[1,-10,20,5,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\nENDMODULE\n", "MODULE m\n! "),
+        (
+            "twice.src",
+            "&ACCESS RVP\r\nDEF twice( )\r\n",
+            "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\r\nEND\r\n",
+            "&ACCESS RVP\r\nDEF twice( )\r\n; ",
+        ),
+        (
+            "twice.mod",
+            "MODULE m\n",
+            "MoveAbsJ [[1,-10,20,5,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\nENDMODULE\n",
+            "MODULE m\n! ",
+        ),
     ] {
         std::fs::write(cell().join(name), format!("{head}{target}")).expect("a file");
         let (code, once, err) = run(&["compensate", "latest", name], "");
@@ -91,7 +101,10 @@ fn an_arm_far_from_the_robot_file_is_refused_before_anything_is_written() {
         let output = calib(here, verb, HEADER);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!((output.status.code(), output.stdout.len()), (Some(10), 0), "{said}");
-        assert!(said.contains(" from the robot file's") && said.contains("refused: the set-up is wrong") && said.contains("--force"), "{said}");
+        assert!(
+            said.contains(" from the robot file's") && said.contains("refused: the set-up is wrong") && said.contains("--force"),
+            "{said}"
+        );
         assert!(calib(here, &[verb, &["--force"]].concat(), HEADER).status.code() != Some(2));
     }
 }

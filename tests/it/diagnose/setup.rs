@@ -1,6 +1,6 @@
 //! Set-up errors come before physics: twenty wrong set-ups of three arms, sound recordings, and a robot file of another arm.
 
-use super::{CASE, calib, case_with, concealed, refused};
+use super::{CASE, calib, case_with, concealed, ended, refused};
 use crate::desk::{Desk, table};
 use crate::fixture;
 use calib::error::Error;
@@ -104,7 +104,9 @@ const WRONG: [Wrong; 20] = [
     ("joints in rad", "unit: rad", |i| joints(i, |q| q.iter_mut().for_each(|q| *q *= PI / 180.0))),
     ("sign of joint 3", "joint 3 turns the other way", |i| joints(i, |q| q[2] = -q[2])),
     ("sign of joint 5", "joint 5 turns the other way", |i| joints(i, |q| q[4] = -q[4])),
-    ("signs of joints 1, 4 and 6", "joints 1, 4, 6 turn the other way", |i| joints(i, |q| [0, 3, 5].into_iter().for_each(|k| q[k] = -q[k]))),
+    ("signs of joints 1, 4 and 6", "joints 1, 4, 6 turn the other way", |i| {
+        joints(i, |q| [0, 3, 5].into_iter().for_each(|k| q[k] = -q[k]))
+    }),
     ("signs of joints 2 and 3", "joints 2, 3 turn the other way", |i| joints(i, |q| (q[1], q[2]) = (-q[1], -q[2]))),
     ("signs of all joints", "joints 1, 2, 3, 4, 5, 6 turn the other way", |i| joints(i, |q| q.iter_mut().for_each(|q| *q = -*q))),
     ("zeros of joints 2 and 3 against each other", "90 deg at the zero of joint 2 and ", |i| {
@@ -202,11 +204,17 @@ fn two_set_up_errors_are_named_together_and_two_reflectors_hide_none() {
     joints(&mut both, |q| (q[1], q[3]) = (-q[1], -q[3]));
     let said = diagnosed(&both).expect("a diagnosis");
     let statement = &said.findings[0].statement;
+    assert!(statement.starts_with("joints 2, 4 turn the other way"), "{statement}");
+    assert!(statement.contains("sign: [1, -1, 1, -1, 1, 1]"), "{statement}");
+    // Two of different kinds.
+    let mut both = recorded(&fixture::offset_wrist(), 44, json!([]));
+    joints(&mut both, |q| (q[2], q[4]) = (-q[2], q[4] + FRAC_PI_2));
+    let said = diagnosed(&both).expect("a diagnosis");
+    let statement = &said.findings[0].statement;
     assert!(
-        statement.starts_with("joint 2 turns the other way") || statement.starts_with("joint 4 turns the other way"),
+        statement.contains("joint 3 turns the other way") && statement.contains("90 deg at the zero of joint 5"),
         "{statement}"
     );
-    assert!(statement.contains("sign: [1, -1, 1, 1, 1, 1]") && statement.contains("sign: [1, 1, 1, -1, 1, 1]"), "{statement}");
 
     let mut named = recorded(&shouldered(), 45, json!([]));
     named.recording.target = Some((0..72).map(|row| Some(if row % 2 == 0 { "A" } else { "B" }.to_string())).collect());
@@ -279,10 +287,11 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     // A step that is asked for by its name says what it warned of when it ran.
     let (code, said) = refused(&["export", "HEAD", "--step", "joint", "--format", "json", "--quiet"], here);
     assert!(code == Some(0) && said.contains("warning: joint: the set-up is wrong: the points are in inches"), "{code:?} {said}");
-    let said: Value = serde_json::from_str(&calib(&["diagnose", "HEAD", "--json"], here)).expect("JSON");
+    let said: Value = serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
     assert_eq!((&said["verdict"], &said["findings"][0]["effect"]), (&"wrong_setup".into(), &"setup".into()));
-    let run: Value =
-        serde_json::from_str(&calib(&[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here)).expect("JSON");
+    let (code, run) = ended(&[&["run", "p.yaml", "--json", "--quiet"], &CASE[..]].concat(), here);
+    assert_eq!(code, Some(10), "{run}");
+    let run: Value = serde_json::from_str(&run).expect("JSON");
     let page = std::fs::read_to_string(here.join(run["report"].as_str().expect("a report"))).expect("the page");
     assert!(
         page.contains("Not accepted: the set-up is wrong") && !page.contains("The mean position error fell"),
