@@ -30,13 +30,13 @@
 //! | [`stage`] | one file per step of a pipeline | program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
 //! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
-//! | [`export`] | the identified model for other programs, one file per format | compensate, estimate, identified, robot, yaml |
+//! | [`export`] | the identified model for other programs, one file per format | compensate, effect, estimate, identified, robot, yaml |
 //! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, stage, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |
 //! | [`poses`] | which poses to measure, for a robot file or for a finding of a run | audit, identified, numerics, pipeline, raw, store, table |
-//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diff, effect, pipeline, shell, stage, store, table |
+//! | [`summary`] | what runs, tables and diagnoses say, as text and as JSON | audit, diagnose, diff, effect, pipeline, shell, stage, store, table |
 //! | [`cli`], [`progress`] | the only places that print, and the only ones that know a terminal | all |
 //!
 //! # A measurement, from file to report

@@ -7,7 +7,7 @@ use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
 use crate::program::{self, Frames, Language, Partial, ProgramFile, mark};
 use crate::raw;
-use crate::robot::Measurements;
+use crate::robot::{JointConvention, Measurements};
 use crate::targets::{Layout, Units, Unreached, parquet, text, unstated_payload, unwritten, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
@@ -144,7 +144,8 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {
-        text = format!("model: {}\n{}", identified.origin, corrector.tally.summary());
+        let counting = identified.counting().map(|line| format!("{line}\n")).unwrap_or_default();
+        text = format!("model: {}\n{counting}{}", identified.origin, corrector.tally.summary());
     }
     let remarks = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
     text.extend(corrector.tally.warnings().map(|line| format!("warning: {line}{remarks}\n")));
@@ -227,7 +228,9 @@ fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Resu
     if arguments.time.is_some() && !clock {
         return Err(Error::spec("--time", "the recording of the model has no clock: its steps and drifts are known by row only"));
     }
+    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
     Ok(CorrectionOptions {
+        convention,
         cartesian: arguments.target == What::Pose,
         oriented: arguments.orientation == OrientationUse::Keep,
         one_step: arguments.one_step,

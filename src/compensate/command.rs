@@ -5,7 +5,7 @@ use super::{PositionUncertainty, Remark};
 /// A command and what is known of it, SI.
 #[derive(Debug, Clone)]
 pub struct CorrectedCommand {
-    /// None where the target is not reached: no joints are better than wrong ones.
+    /// As the controller counts its joints, rad or m. None where the target is not reached: no joints are better than wrong ones.
     pub q: Option<Vec<f64>>,
     /// How far the uncorrected command would be off by the model.
     pub uncorrected: f64,

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
-use crate::robot::RobotModel;
+use crate::robot::{JointConvention, RobotModel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ const TURNED_AWAY: f64 = std::f64::consts::PI / 180.0;
 /// rad or m: a smaller move has no direction.
 const STILL: f64 = 1e-9;
 
-/// A target as it was given, SI.
+/// A target as it was given, SI; joints and sides of approach as the controller counts them.
 #[derive(Debug, Clone, Default)]
 pub struct CommandTarget {
     /// Joints, rad or m, of a joint target or near a Cartesian one.
@@ -44,6 +44,8 @@ pub struct CommandTarget {
 /// How to correct, and what holds where a target does not say.
 #[derive(Debug, Clone)]
 pub struct CorrectionOptions {
+    /// How targets and commands count the joints.
+    pub convention: JointConvention,
     /// Cartesian columns are the targets though there are joints; these then say near which posture.
     pub cartesian: bool,
     /// Whether joint targets keep the nominal orientation.
@@ -58,9 +60,9 @@ pub struct CorrectionOptions {
     pub time: Option<f64>,
     /// Whether the model knows times: one of a recording without a clock knows rows.
     pub clock: bool,
-    /// Side of every joint, where a target does not say; else the order of the targets tells.
+    /// Side of every joint as the controller counts, where a target does not say; else the order of the targets tells.
     pub direction: Option<f64>,
-    /// Where the first Cartesian target is searched from.
+    /// Where the first Cartesian target is searched from, as the controller counts.
     pub start: Option<Vec<f64>>,
     /// Which corrections are refused.
     pub gate: Gate,
@@ -155,19 +157,27 @@ impl<'a> Corrector<'a> {
         self.uncertainty.is_some()
     }
 
-    /// Answers in the order of the targets, which follow those of the batch before.
+    /// How targets and commands count the joints.
+    pub fn convention(&self) -> &JointConvention {
+        &self.manner.convention
+    }
+
+    /// Answers in the order of the targets, which follow those of the batch before; their joints are as the controller counts them.
     pub fn batch(&mut self, targets: Vec<CommandTarget>) -> Vec<CorrectedCommand> {
         let jobs: Vec<Job> = targets.into_iter().map(|target| self.prepare(target)).collect();
         let this: &Self = self;
-        let answers: Vec<CorrectedCommand> = jobs
+        let mut answers: Vec<CorrectedCommand> = jobs
             .par_iter()
             .map_init(
                 || (this.arm.reach(), Nominal::new(&this.arm.model().robot)),
                 |(reach, nominal), job| this.solve(reach, nominal, job),
             )
             .collect();
-        for answer in &answers {
+        for answer in &mut answers {
             self.tally.add(answer);
+            if let Some(q) = &mut answer.q {
+                self.manner.convention.to_controller(q);
+            }
         }
         answers
     }
@@ -175,10 +185,12 @@ impl<'a> Corrector<'a> {
     fn prepare(&mut self, target: CommandTarget) -> Job {
         let robot: &RobotModel = &self.arm.model().robot;
         let n = robot.joints();
-        let (wanted, home) = match (target.q, target.point) {
+        let convention = &self.manner.convention;
+        let of_robot = |q: Vec<f64>| changed(q, |q| convention.to_robot(q));
+        let (wanted, home) = match (target.q.map(of_robot), target.point) {
             (Some(q), point) if !(self.manner.cartesian && point.is_some()) => (None, q),
             (q, point) => {
-                let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone());
+                let seed = q.or_else(|| self.last.clone()).or_else(|| self.manner.start.clone().map(of_robot));
                 let oriented = target.rotation.is_some();
                 let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
                 let wanted = ToolGoal { pose, oriented };
@@ -195,11 +207,12 @@ impl<'a> Corrector<'a> {
         }
         self.last.get_or_insert_default().clone_from(&home);
         let fixed = self.manner.direction.map(|direction| vec![direction; n]);
+        let stated = target.direction.or(fixed).map(|sides| changed(sides, |sides| self.manner.convention.turn_sides(sides)));
         let circumstance = Circumstance {
             payload: target.payload.unwrap_or(self.manner.payload),
             temperature: target.temperature.or(self.manner.temperature),
             time: target.time.or(self.manner.time).filter(|_| self.manner.clock).unwrap_or(LONG_AFTER),
-            direction: target.direction.or(fixed).unwrap_or_else(|| self.direction.clone()),
+            direction: stated.unwrap_or_else(|| self.direction.clone()),
             current: target.current,
         };
         Job { wanted, home, circumstance }
@@ -282,6 +295,11 @@ impl CorrectionTotals {
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
         self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
     }
+}
+
+fn changed(mut values: Vec<f64>, change: impl Fn(&mut [f64])) -> Vec<f64> {
+    change(&mut values);
+    values
 }
 
 /// How far (m) the nominal robot stays away from a Cartesian target: one step does not say whether there is a way.

@@ -54,6 +54,14 @@ impl Export {
                 self.poses
             ),
         ];
+        let robot = &self.identified.model.robot;
+        let difference = self.identified.convention.as_ref().and_then(|convention| convention.difference(robot));
+        lines.extend(difference.map(|difference| {
+            format!(
+                "the controller counts its joints otherwise than the robot file: {difference}. Geometry is exported in the counting of the \
+                 robot file, the list of numbers for the controller in the controller's"
+            )
+        }));
         for LeftOut { effect, place, rms, most } in &self.left_out {
             lines.push(format!("not carried: {effect} at {place}, {:.4} mm rms, {:.4} mm at most", rms * 1e3, most * 1e3));
         }

@@ -16,11 +16,14 @@ use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::description::RobotDescription;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::stage::ingest::Ingest;
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
-use crate::table::{Corrected, CovarianceTable, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file};
+use crate::table::{
+    Corrected, CovarianceTable, JointConventions, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file,
+};
 use std::path::{Path, PathBuf};
 use written::written;
 
@@ -43,6 +46,8 @@ pub struct IdentifiedModel {
     pub scatter: Scatter,
     /// The recording, where it is known.
     pub data: Option<Measurements>,
+    /// How the controller counts its joints; none where a table alone was given, which does not say.
+    pub convention: Option<JointConvention>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
     pub origin: String,
     /// What the person must know of it.
@@ -105,6 +110,18 @@ impl IdentifiedModel {
                 && stage.outputs.iter().any(|output| output.kind == Network::KIND)
         });
         let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
+        let convention =
+            last(JointConventions::KIND).map(|output| JointConventions::from_frame(&load(&output.table)?)?.to_convention());
+        let ingested = manifest.stages.iter().any(|stage| stage.uses == Ingest::NAME);
+        if ingested && convention.is_none() {
+            let message = format!(
+                "the run does not say how the controller counts its joints: an earlier calib made it. `calib run {}` writes it anew",
+                manifest.pipeline.file
+            );
+            return Err(Error::data(run, message));
+        }
+        // The twin logs its joints as its robot file counts them.
+        let convention = convention.transpose()?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
         let recording = last(Recording::KIND).map(|output| Recording::from_frame(&load(&output.table)?)).transpose()?;
         let prismatic: Vec<bool> =
             (0..robot.joints.len()).map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint)).collect();
@@ -126,7 +143,8 @@ impl IdentifiedModel {
         let own = Self::of(robot, parameters, origin)?;
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
-        Ok(Self { correction, covariance, scatter, data, warnings, stage_warnings, refusals, sources, ..own })
+        let convention = Some(convention);
+        Ok(Self { correction, covariance, scatter, data, convention, warnings, stage_warnings, refusals, sources, ..own })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -161,6 +179,7 @@ impl IdentifiedModel {
             covariance: None,
             scatter,
             data: None,
+            convention: None,
             origin,
             warnings: Vec::new(),
             stage_warnings: Vec::new(),
@@ -173,6 +192,17 @@ impl IdentifiedModel {
     pub fn heaviest(&self) -> Option<f64> {
         let loads = self.data.iter().flat_map(|data| &data.payload).copied();
         loads.filter(|load| *load > 0.0).max_by(f64::total_cmp)
+    }
+
+    /// How joints are counted in what goes out, where that is to be said: none where controller and robot file count alike.
+    pub fn counting(&self) -> Option<String> {
+        let Some(convention) = &self.convention else {
+            return Some(
+                "joints are counted as in the robot file; a table of parameters does not say how the controller counts".into(),
+            );
+        };
+        let difference = convention.difference(&self.model.robot)?;
+        Some(format!("joints are counted as at the controller: {difference}"))
     }
 
     /// Refuses to write over a file that the model was made from.

@@ -5,7 +5,7 @@
 
 use super::{Literal, SolvedLiteral, TargetKind};
 use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, turns};
-use crate::robot::RobotModel;
+use crate::robot::{JointConvention, RobotModel};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
     let answers = corrector.batch(literals.iter().map(target).collect());
     let solved = |(literal, answer): (&Literal, &CorrectedCommand)| match &answer.q {
-        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, q), remark: answer.remark() }),
+        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), remark: answer.remark() }),
         None => Err(answer.remark()),
     };
     literals.iter().zip(&answers).map(solved).collect()
@@ -37,11 +37,13 @@ fn target(literal: &Literal) -> CommandTarget {
     }
 }
 
-fn values(literal: &Literal, robot: &RobotModel, q: &[f64]) -> Vec<f64> {
+fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q: &[f64]) -> Vec<f64> {
     if literal.kind == TargetKind::Joints {
         return q.iter().map(|q| q.to_degrees()).collect();
     }
-    let pose = Nominal::new(robot).place(q);
+    let mut own = q.to_vec();
+    convention.to_robot(&mut own);
+    let pose = Nominal::new(robot).place(&own);
     let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];

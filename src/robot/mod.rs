@@ -4,6 +4,7 @@ mod bound;
 pub mod description;
 pub mod import;
 mod instrument;
+mod joint_convention;
 mod measurements;
 mod memories;
 mod memory;
@@ -19,6 +20,7 @@ mod visited;
 
 pub use bound::{Bound, ONE_AND_A_HALF_TURNS};
 pub use instrument::{INSTRUMENTS, Instrument, NoiseBasis, PublishedInstrument, START, SigmaSource};
+pub use joint_convention::{CountedCoupling, JointConvention};
 pub use measurements::Measurements;
 pub use memories::Memories;
 pub use memory::Memory;

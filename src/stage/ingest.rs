@@ -44,8 +44,10 @@ pub use noise::{InstrumentSetting, instruments};
 pub use wide::WideTargets;
 
 use crate::error::{Error, Result, counted};
+use crate::robot::{CountedCoupling, JointConvention};
 use crate::stage::{Context, RawFile, Stage, StreamedTable, reads, writes};
-use crate::table::{Intake, IntakeRow, Recording, Rejected, Robot};
+use crate::table::{Intake, IntakeRow, JointConventions, Recording, Rejected, Robot};
+use crate::units::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -104,13 +106,14 @@ writes! {
         recording: StreamedTable<Recording>,
         rejected: StreamedTable<Rejected>,
         intake: Intake,
+        convention: JointConventions,
     }
 }
 
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 5;
+    const IMPLEMENTATION: u32 = 6;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 
@@ -160,7 +163,29 @@ impl Stage for Ingest {
             .collect();
         let gaps: Vec<f64> = self.later.iter().map(|later| later.gap_s).collect();
         let (recording, rejected) = write::write(&decided, &gaps, &names, context)?;
-        Ok(IngestWrites { recording, rejected, intake: intake(&decided, context) })
+        let convention = JointConventions::of(&self.convention(&arm), &arm.prismatic);
+        Ok(IngestWrites { recording, rejected, intake: intake(&decided, context), convention })
+    }
+}
+
+impl Ingest {
+    /// How the file that holds the joints counts them.
+    fn convention(&self, arm: &arm::RobotJoints) -> JointConvention {
+        let Some(joints) = self.files.iter().find_map(|file| file.columns.joint("q")) else {
+            return JointConvention::of_the_robot_file(arm.joints());
+        };
+        let unit = |joint: usize| match arm.prismatic[joint] {
+            true => joints.linear_unit.as_deref(),
+            false => joints.unit.as_deref(),
+        };
+        let zero = |joint: usize| match (joints.zero.get(joint), unit(joint).and_then(Unit::parse)) {
+            (Some(zero), Some(unit)) => unit.to_si(*zero),
+            _ => 0.0,
+        };
+        let all = 0..arm.joints();
+        let sign = all.clone().map(|joint| joints.sign.get(joint).copied().unwrap_or(1.0)).collect();
+        let coupled = joints.coupled.iter().map(|one| CountedCoupling { joint: one.joint - 1, by: one.by - 1, ratio: one.ratio });
+        JointConvention::new(sign, all.map(zero).collect(), coupled.collect())
     }
 }
 

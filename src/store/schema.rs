@@ -16,6 +16,7 @@ use crate::units::Unit;
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/changes.json"),
+    include_str!("../../schemas/convention.json"),
     include_str!("../../schemas/corrections.json"),
     include_str!("../../schemas/covariance.json"),
     include_str!("../../schemas/curves.json"),

@@ -68,6 +68,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 mod changes;
+mod convention;
 mod corrections;
 mod covariance;
 mod curves;
@@ -96,6 +97,7 @@ mod truth;
 mod verdict;
 
 pub use changes::{ChangeRow, Changes};
+pub use convention::{JointConventionRow, JointConventions};
 pub use corrections::{Corrections, CorrectionsRow};
 pub use covariance::{CovarianceRow, CovarianceTable};
 pub use curves::{CurveRow, Curves};
@@ -127,6 +129,7 @@ pub use verdict::{Verdict, VerdictRow};
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
     Changes::KIND,
+    JointConventions::KIND,
     Corrections::KIND,
     CovarianceTable::KIND,
     Curves::KIND,

@@ -37,15 +37,19 @@ pub struct Recorded {
 
 impl Cell {
     pub fn new(kind: Kind, effects: Vec<Physical>) -> Self {
-        let robot = kind.description([60.0, -45.0, 35.0]);
+        Self::of(kind.description([60.0, -45.0, 35.0]), kind.reach_m(), kind.room_mm(), effects)
+    }
+
+    /// A cell of a robot of this reach, with room around it.
+    pub fn of(robot: RobotDescription, reach_m: f64, room_mm: [f64; 2], effects: Vec<Physical>) -> Self {
         let n = robot.joints.len();
-        let scale = kind.reach_m();
+        let scale = reach_m;
         let link = |link: usize| LinkError {
             link,
             shift_mm: [0.4 * scale, -0.3 * scale, 0.2 * scale],
             tilt_arcsec: [60.0, -40.0, 30.0],
         };
-        let [floor_mm, clearance_mm] = kind.room_mm();
+        let [floor_mm, clearance_mm] = room_mm;
         let truth = TrueRobot {
             links: (1..n).map(link).collect(),
             offset_deg: (0..n).map(|j| 0.03 - 0.01 * j as f64).collect(),
@@ -145,6 +149,12 @@ impl Cell {
         let network: Network = table(&desk.run(&learn, reads).expect("a correction")).remove(0);
         let model = parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model");
         (model, network.correction(&prismatic).expect("a correction"))
+    }
+
+    /// Where (m) the true robot puts its tool in its own base, without the noise of measurement; `base` as it was identified or set up.
+    pub fn places(&self, points: Vec<Point>) -> Vec<Vector3<f64>> {
+        let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..self.tracker.clone() };
+        self.measure(points, &exact, 77).iter().map(|shot| Vector3::from(shot.position)).collect()
     }
 
     /// Unseen targets: later than the recording, with another seed.
