@@ -178,7 +178,9 @@ fn a_joint_of_the_wrong_sign_is_named_with_the_line_that_mends_it() {
     let turned: Vec<String> = text.lines().enumerate().map(reverse).collect();
     std::fs::write(&file, turned.join("\n")).expect("written");
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/case/pipeline.yaml").display().to_string();
-    let said = calib(&["diagnose", &pipeline, "--set", "case=sealed/recordings/c0001", "--json", "--quiet"], folder.path());
+    let asked = ["diagnose", &pipeline, "--set", "case=sealed/recordings/c0001", "--json", "--quiet"];
+    let (code, said) = ended(&asked, folder.path());
+    assert_eq!(code, Some(10), "{said}");
     let said: Value = serde_json::from_str(&said).expect("JSON");
     let findings = said["findings"].as_array().expect("a list");
     assert_eq!(findings.len(), 1, "{said:#}");

@@ -46,7 +46,7 @@ fn what_other_verbs_run_is_not_head_and_is_listed_as_what_it_is() {
     }
     let runs = ["HEAD~1", "HEAD"].map(|name| json(here, &["show", name])["run_id"].as_str().unwrap().to_string());
     done(here, &["compensate", "pipeline.yaml", "--quiet", "--set", "seed=5"]);
-    done(here, &["export", "pipeline.yaml", "--format", "dh", "--quiet", "--set", "seed=6"]);
+    done(here, &["export", "pipeline.yaml", "--format", "urdf", "--quiet", "--set", "seed=6"]);
     done(here, &["run", "pipeline.yaml", "--quiet", "--until", "split", "--set", "seed=7"]);
     assert_eq!(said(here, &["run", "pipeline.yaml", "--quiet", "--set", "identify.on=[fit, none]"]).0, Some(10));
     assert_eq!(said(here, &["compensate", "pipeline.yaml", "--quiet", "--set", "identify.on=[fit, none]"]).0, Some(10));

@@ -240,7 +240,7 @@ fn a_flipped_byte_is_found_on_reading_and_the_object_is_set_aside() {
     fs::write(&object, bytes).unwrap();
     let error = store.load(&record.tables["out"]).unwrap_err();
     assert_eq!(error.exit_code(), 75);
-    assert!(error.to_string().contains("run again"), "{error}");
+    assert!(error.to_string().contains("`calib run` of its pipeline writes it anew"), "{error}");
     assert!(matches!(store.action(&key("split", 1)).unwrap(), Lookup::Damaged(_)));
 }
 

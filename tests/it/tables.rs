@@ -108,7 +108,7 @@ macro_rules! kinds {
         }
     };
 }
-kinds! { Changes Corrections CovarianceTable Curves Document FindingNumbers Findings Fit FleetTable FleetChanges Forms Intake Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
+kinds! { Changes JointConventions Corrections CovarianceTable Curves Document FindingNumbers Findings Fit FleetTable FleetChanges Forms Intake Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
 Statistics Suspects Training Truth Verdict }
 
 #[test]

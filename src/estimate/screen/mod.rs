@@ -175,13 +175,9 @@ fn screen(
         let kind = if kind == SuspectKind::Event && held.contains(&row) { SuspectKind::Outlier } else { kind };
         // A row that judges the model is not set aside by the model alone.
         let judges = asked.binary_search(&row).is_err();
-        if kind == SuspectKind::Outlier && judges && !corroborated::is_wrong(data, row, residual.norm()) {
-            crowd += 1;
-        } else if kind == SuspectKind::Outlier
-            && crowded.contains(&set[row])
-            && *distance < BEYOND_CROWD * limit
-            && !held.contains(&row)
-        {
+        let uncorroborated = judges && !corroborated::is_wrong(data, row, residual.norm());
+        let among_many = crowded.contains(&set[row]) && *distance < BEYOND_CROWD * limit && !held.contains(&row);
+        if kind == SuspectKind::Outlier && (uncorroborated || among_many) {
             crowd += 1;
         } else {
             suspects.push(Suspect { row, kind, partner, size: residual.norm(), statistic: *distance });

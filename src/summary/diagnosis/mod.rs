@@ -200,7 +200,8 @@ impl DiagnosisSummary {
             all.iter().take(ASIDE).map(|row| format!("{} of set {} {:.3} mm off", row.point_id, row.set, row.size_mm)).collect();
         let more = if all.len() > ASIDE { ", the worst of them" } else { "" };
         let which = counted(all.len(), "row");
-        (!all.is_empty()).then(|| format!("{which} (figures of held-out points include theirs){more}: {}", named.join(", ")))
+        (!all.is_empty())
+            .then(|| format!("{which} (not fitted; figures include those that are held out){more}: {}", named.join(", ")))
     }
 
     fn located_json(&self, by: &str) -> Vec<Value> {

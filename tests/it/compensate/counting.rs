@@ -133,7 +133,7 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
     let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
 
     let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {
-        let number = |part: &str| part.trim().trim_start_matches(|c: char| c == 'A').to_string();
+        let number = |part: &str| part.trim().trim_start_matches('A').to_string();
         text.lines()
             .filter_map(|line| line.split_once(start))
             .filter_map(|(_, rest)| rest.split_once(end))

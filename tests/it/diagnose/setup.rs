@@ -284,8 +284,11 @@ fn points_in_inches_are_not_accepted_and_the_line_that_is_named_mends_them() {
     assert!(!told.lines().any(|line| line.starts_with("after")), "{told}");
     let (code, said) = refused(&["compensate", "HEAD", "p.yaml"], here);
     assert!(code == Some(10) && said.contains("the set-up is wrong: the points are in inches"), "{code:?} {said}");
-    // A step that is asked for by its name says what it warned of when it ran.
-    let (code, said) = refused(&["export", "HEAD", "--step", "joint", "--format", "json", "--quiet"], here);
+    // A step that is asked for by its name is refused as well; one who insists is told what it warned of when it ran.
+    let step = ["export", "HEAD", "--step", "joint", "--format", "json", "--quiet"];
+    let (code, said) = refused(&step, here);
+    assert!(code == Some(10) && said.contains("refused: the set-up is wrong: the points are in inches"), "{code:?} {said}");
+    let (code, said) = refused(&[&step[..], &["--force"]].concat(), here);
     assert!(code == Some(0) && said.contains("warning: joint: the set-up is wrong: the points are in inches"), "{code:?} {said}");
     let said: Value = serde_json::from_str(&ended(&["diagnose", "HEAD", "--json"], here).1).expect("JSON");
     assert_eq!((&said["verdict"], &said["findings"][0]["effect"]), (&"wrong_setup".into(), &"setup".into()));

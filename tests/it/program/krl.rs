@@ -150,7 +150,10 @@ fn what_is_no_target_stays_and_what_may_be_one_is_refused() {
     let text = format!(
         "LIN_REL {frame}\nPTP_REL {{A1 5}}\nASYPTP {{E1 5}}\nDECL FRAME F={frame}\nF={frame}\nDECL LOAD L={{M 5,CM {frame},J {{X 0,Y 0,Z 0}}}}\n$VEL={{CP 2,ORI1 200}}\nDECL PDAT P={{VEL 100,ACC 100,APO_DIST 100}}\nMsg(\"{{A1 5\")\n"
     );
-    assert_eq!(accepted(Language::Krl, &text), (vec![], vec![]));
+    let moves = |line: usize, what: &str| {
+        format!("{line}:1: left as it is: {what} moves by a distance from where the target before, as corrected, has led")
+    };
+    assert_eq!(accepted(Language::Krl, &text), (vec![], vec![moves(1, "LIN_REL"), moves(2, "PTP_REL")]));
     let unstated = |what: &str, advice: &str| format!("the type of {what} is not stated in this file; write {advice}");
     let pose = "`{E6POS: ...}` for a target, `{FRAME: ...}` for a frame, which stays as it is";
     assert_eq!(faults(&format!("XP1={frame}")), [format!("1:5: {}", unstated("`XP1`", pose))]);
