@@ -85,6 +85,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
             now = fitter.fit(&next.model, next.causes);
             continue;
         }
+        let next = fitter.held_to_a_common_size(next);
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));

@@ -222,6 +222,10 @@ impl Placed for UnweighedWindup {
         self.cause
     }
 
+    fn of_one_size(&self) -> std::ops::Range<usize> {
+        0..self.shape.moments.len()
+    }
+
     fn variables(&self) -> Vec<Variable> {
         vec![Variable::Load { joint: self.shape.joint }]
     }

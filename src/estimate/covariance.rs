@@ -61,6 +61,14 @@ impl Covariance {
         })
     }
 
+    /// The covariance (SI) of some of the parameters, in their order; `None` where one of them was not estimated.
+    pub fn block(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
+        let rows: Option<Vec<usize>> =
+            parameters.iter().map(|parameter| self.free.iter().position(|free| free == parameter)).collect();
+        let rows = rows?;
+        Some(DMatrix::from_fn(rows.len(), rows.len(), |a, b| self.product(rows[a], rows[b])))
+    }
+
     /// Covariance (m2) of a point with these derivatives (m per unit) by [`Covariance::parameters`].
     pub fn of_point(&self, jacobian: &[Vector3<f64>]) -> Matrix3<f64> {
         let along = |k: usize| -> Vector3<f64> { self.root.column(k).iter().zip(jacobian).map(|(root, by)| by * *root).sum() };

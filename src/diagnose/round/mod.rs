@@ -2,6 +2,7 @@
 
 mod along_path;
 mod base_model;
+mod common_size;
 mod correlated_noise;
 mod fit_state;
 mod history;

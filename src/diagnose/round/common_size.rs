@@ -1,0 +1,67 @@
+//! Coefficients of one size: where rows determine some combinations of them and not others, those that they do determine say how large
+//! the others may be (empirical Bayes).
+//!
+//! With the data's information P and vector b about the coefficients c, everything else fitted beside them, and c ~ N(0, s^2 I), the
+//! logarithm of the evidence is half the sum over eigenvalues p of P of b^2 / (p + 1/s^2) - ln(1 + s^2 p).
+
+use super::fit_state::{EstimatedCause, FitState, Fitter};
+use crate::estimate::{Covariance, Model, Prior};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::ops::Range;
+
+/// The size is searched from the plausible one downwards over so many e-folds, in so many steps.
+const FOLDS: f64 = 12.0;
+const STEPS: usize = 120;
+/// Sizes are asked anew after each fit with priors, so often at most.
+const FITS: usize = 2;
+
+impl Fitter<'_> {
+    /// The state with coefficients of one size held to the size that the rows show; itself where no cause has any.
+    pub fn held_to_a_common_size(&self, state: FitState) -> FitState {
+        let mut now = state;
+        for _ in 0..FITS {
+            let Some(causes) = held(&now) else { return now };
+            now = self.fit(&now.model, causes);
+        }
+        now
+    }
+}
+
+/// The causes with the priors of their common size; none where no cause has one.
+fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
+    let covariance = state.fitted.covariance.as_ref()?;
+    let mut causes = state.causes.clone();
+    let mut any = false;
+    for (cause, range) in causes.iter_mut().zip(&state.ranges) {
+        let family = cause.form.of_one_size();
+        if family.len() < 2 {
+            continue;
+        }
+        let own = range.start + family.start..range.start + family.end;
+        let specs = cause.form.parameters(&state.model.robot);
+        let Some(size) = size(&state.model, covariance, own, specs[family.start].prior_sigma) else { continue };
+        any = true;
+        let sigma = |k: usize| if family.contains(&k) { size } else { specs[k].prior_sigma };
+        cause.priors = (0..specs.len()).map(|k| Prior { mean: 0.0, sigma: sigma(k) }).collect();
+    }
+    any.then_some(causes)
+}
+
+/// The size (SI) of the greatest evidence, at most `plausible`; none where the parameters were not all estimated.
+fn size(model: &Model, covariance: &Covariance, own: Range<usize>, plausible: f64) -> Option<f64> {
+    let own: Vec<usize> = own.collect();
+    let block = covariance.block(&own)?;
+    let values = DVector::from_iterator(own.len(), own.iter().map(|k| model.x[*k]));
+    let prior = |k: usize| model.known(k).prior.map_or(0.0, |prior| prior.sigma.powi(-2));
+    let posterior = block.try_inverse()?;
+    let about = &posterior * values;
+    let data = posterior - DMatrix::from_diagonal(&DVector::from_iterator(own.len(), own.iter().map(|k| prior(*k))));
+    let SymmetricEigen { eigenvectors, eigenvalues } = data.symmetric_eigen();
+    let along = eigenvectors.transpose() * about;
+    let evidence = |size: f64| -> f64 {
+        let each = eigenvalues.iter().zip(along.iter());
+        each.map(|(p, b)| (p.max(0.0), b)).map(|(p, b)| b * b / (p + size.powi(-2)) - (size * size * p).ln_1p()).sum()
+    };
+    let sizes = (0..=STEPS).map(|step| plausible * (-FOLDS * step as f64 / STEPS as f64).exp());
+    sizes.max_by(|a, b| evidence(*a).total_cmp(&evidence(*b)))
+}

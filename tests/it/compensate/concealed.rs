@@ -1,0 +1,377 @@
+//! Commands after concealed recordings: where the simulated arm really goes with them, inside and outside of what was measured.
+//!
+//! `CALIB_RECORDINGS=100 cargo test --release --test it -- compensate::concealed --nocapture` prints the whole table.
+
+use crate::desk::{Desk, table};
+use calib::compensate::{
+    CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, Gate, IdentifiedArm, Scatter, Uncertainty,
+};
+use calib::effect::Load;
+use calib::estimate::Model;
+use calib::robot::description::RobotDescription;
+use calib::robot::{JointConvention, RobotModel};
+use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads};
+use calib::table::{CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};
+use calib::twin::arm::Arm;
+use calib::twin::conceal::case::Case;
+use calib::twin::conceal::design::{Content, Design};
+use calib::twin::conceal::family::Column;
+use calib::twin::conceal::layout::Layout;
+use calib::twin::conceal::points::{Amount, FIT, plan};
+use calib::twin::conceal::robots::Kind;
+use calib::twin::effect::{GearCyclic, JointCompliance, Physical};
+use calib::twin::noise::{Noise, Purpose};
+use calib::twin::plan::{Point, Poses, allowed};
+use calib::twin::recorder::{Experiment, Shot};
+use calib::twin::tracker::Tracker;
+use nalgebra::Vector3;
+use serde_json::json;
+
+/// Causes of the arm: those of the measurement move no robot.
+const OF_THE_ARM: [&str; 13] = [
+    "joint_compliance",
+    "joint_hardening",
+    "link_compliance",
+    "base_compliance",
+    "backlash",
+    "gear_cyclic",
+    "gear_motor_cyclic",
+    "gear_load",
+    "thermal_growth",
+    "joint_warming",
+    "zero_shift",
+    "axis_wobble",
+    "counterbalance",
+];
+
+/// Targets of a recording; every third is outside of what was measured.
+const TARGETS: usize = 500;
+
+/// A target and what came of it.
+struct Outcome {
+    outside: bool,
+    /// mm; with all findings, and with geometry alone.
+    miss: f64,
+    plain: f64,
+    u95: f64,
+    remarked: bool,
+    refused: bool,
+}
+
+/// What the tool says of a target, and where the arm goes then.
+fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
+    let recording = recording(case);
+    let row = |k: usize| SplitRow {
+        sequence: k as i64,
+        point_id: recording.point_id[k].clone(),
+        set: if case.shots[k].block == FIT { "fit" } else { "validate" }.into(),
+    };
+    let split = Split((0..recording.rows()).map(row).collect());
+    let mut robot = case.robot.clone();
+    if case.bare {
+        robot.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
+    }
+    let table_of_robot = Robot::from_description(&robot);
+    let geometry: Identify = serde_json::from_value(json!({"effects": GEOMETRY})).expect("settings");
+    let reads = IdentifyReads { robot: table_of_robot.clone(), recording: recording.clone(), split: split.clone() };
+    let tables = Desk::default().run(&geometry, reads).expect("an identification");
+    let plain = IdentifiedArm::new(model(&robot, &table::<Parameters>(&tables).remove(0)), None);
+
+    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let reads = DiagnoseReads { robot: table_of_robot, recording: recording.clone(), split };
+    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let model = model(&robot, &table::<Parameters>(&tables).remove(0));
+    let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
+    let verdict = table::<Verdict>(&tables).remove(0);
+    let unexplained = table::<Prediction>(&tables).remove(0).unexplained_mm() * 1e-3;
+    let findings = table::<Findings>(&tables).remove(0);
+    if std::env::var("CALIB_SHOW").is_ok() {
+        for row in &table::<Parameters>(&tables)[0].0 {
+            if !GEOMETRY.contains(&row.effect.as_str()) || row.effect == "reduction_ratio" || row.effect == "joint_offset" {
+                println!(
+                    "   {:40} {:12.6e} +- {:?} {} {} {:?}",
+                    row.name, row.value, row.sigma, row.unit, row.status, row.remark
+                );
+            }
+        }
+    }
+    let named: Vec<String> = findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
+    let scatter = Scatter { unexplained, repeatability: verdict.0[0].repeatability_rad };
+    let arm = IdentifiedArm::new(model, None);
+    let data = recording.measurements();
+
+    let (targets, outside) = targets(case);
+    let options = || CorrectionOptions {
+        convention: JointConvention::of_the_robot_file(robot.joints.len()),
+        cartesian: false,
+        oriented: false,
+        one_step: false,
+        payload: 0.0,
+        temperature: None,
+        time: None,
+        clock: data.has_clock(),
+        direction: None,
+        start: None,
+        gate: Gate::default(),
+    };
+    let uncertainty = covariance.map(|covariance| Uncertainty::new(&arm, covariance, scatter));
+    let mut corrector = Corrector::new(&arm, Some(Coverage::of(&data)), uncertainty, options());
+    let commands = corrector.batch(targets.iter().map(|target| command(case, target)).collect());
+    let geometry = Corrector::new(&plain, None, None, options()).batch(targets.iter().map(|t| command(case, t)).collect());
+    let misses = misses(case, &arm, &targets, &commands);
+    let without = misses_of(case, &plain, &targets, &geometry);
+    let each = commands.iter().zip(&outside).zip(misses.iter().zip(&without));
+    let outcome = |((command, outside), (miss, plain)): ((&CorrectedCommand, &bool), (&Option<f64>, &Option<f64>))| Outcome {
+        outside: *outside,
+        miss: miss.unwrap_or(f64::NAN),
+        plain: plain.unwrap_or(f64::NAN),
+        u95: command.uncertainty.map_or(f64::NAN, |uncertainty| uncertainty.u95 * 1e3),
+        remarked: !command.remarks.is_empty(),
+        refused: command.q.is_none(),
+    };
+    (each.map(outcome).collect(), named.join(", "))
+}
+
+const GEOMETRY: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
+
+fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
+    parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model")
+}
+
+fn recording(case: &Case) -> Recording {
+    let shown = |column: Column| !case.hidden.contains(&column);
+    let rows = case.shots.len();
+    Recording {
+        joints: case.robot.joints.len(),
+        prismatic: vec![false; case.robot.joints.len()],
+        sequence: (0..rows as i64).collect(),
+        point_id: (0..rows).map(|row| format!("P{row}")).collect(),
+        usage: vec![None; rows],
+        q: case.shots.iter().flat_map(|shot| shot.q.iter().copied()).collect(),
+        position: case.shots.iter().map(|shot| shot.position).collect(),
+        position_sigma: Some(case.shots.iter().map(|shot| [shot.sigma; 3]).collect()),
+        time: shown(Column::Time).then(|| case.shots.iter().map(|shot| shot.time_s).collect()),
+        payload: Some(case.payload_kg.clone()),
+        temperature: shown(Column::Temperature).then(|| case.thermometer_c.clone()),
+        current: shown(Column::Current).then(|| case.shots.iter().flat_map(|shot| shot.current.iter().copied()).collect()),
+        direction: shown(Column::Direction).then(|| case.shots.iter().flat_map(|shot| shot.direction.iter().copied()).collect()),
+        ..Recording::default()
+    }
+}
+
+/// Two thirds in the joints' recorded ranges, loads and times, then one third over all that the joints can do, with other loads, later.
+fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
+    let fitted: Vec<_> = case.shots.iter().filter(|shot| shot.block == FIT).collect();
+    let joints = case.robot.joints.len();
+    let recorded: Vec<[f64; 2]> = (0..joints)
+        .map(|joint| {
+            let all = fitted.iter().map(|shot| shot.q[joint].to_degrees());
+            all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(q), high.max(q)])
+        })
+        .collect();
+    let whole: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits").map(f64::to_degrees)).collect();
+    let amount = |fit| Amount { fit, validate: 0, repeated: 0.0, near: 0.0, loaded: !case.bare, layout: Layout::default() };
+    let far = TARGETS / 3;
+    let mut inside = plan(case.kind, &recorded, amount(TARGETS - far), &case.climate, case.seed ^ 0xA5).expect("poses");
+    let mut outside = plan(case.kind, &whole, amount(far), &case.climate, case.seed ^ 0x5A).expect("poses");
+    for (k, target) in inside.iter_mut().enumerate() {
+        let shot = fitted[k * 7 % fitted.len()];
+        (target.time_s, target.temperature_c) = (shot.time_s, shot.temperature_c);
+    }
+    let last = case.shots.last().map_or(0.0, |shot| shot.time_s);
+    for (k, target) in outside.iter_mut().enumerate() {
+        target.time_s = last * (1.0 + k as f64 / far as f64);
+        target.temperature_c = case.climate.temperature(target.time_s);
+        target.payload_kg *= 1.3;
+    }
+    let is_outside = inside.iter().map(|_| false).chain(outside.iter().map(|_| true)).collect();
+    inside.append(&mut outside);
+    (inside, is_outside)
+}
+
+fn command(case: &Case, target: &Point) -> CommandTarget {
+    let shown = |column: Column| !case.hidden.contains(&column);
+    CommandTarget {
+        q: Some(target.q.clone()),
+        payload: Some(target.payload_kg),
+        temperature: shown(Column::Temperature).then_some(target.temperature_c),
+        time: shown(Column::Time).then_some(target.time_s),
+        direction: Some(target.direction.clone()),
+        ..CommandTarget::default()
+    }
+}
+
+fn misses(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[CorrectedCommand]) -> Vec<Option<f64>> {
+    misses_of(case, arm, targets, commands)
+}
+
+/// By how much (mm) the true arm misses each target, in the base that was identified; none where there is no command.
+fn misses_of(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[CorrectedCommand]) -> Vec<Option<f64>> {
+    let effects: Vec<Physical> =
+        case.concealed.iter().flat_map(|one| one.cause.physical.clone()).chain(case.friction.iter().cloned()).collect();
+    let exact = Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..case.tracker.clone() };
+    let experiment = Experiment {
+        robot: &case.robot,
+        truth: &case.truth,
+        effects: &effects,
+        tracker: &exact,
+        motors: &case.motors,
+        repeatability_arcsec: &[],
+        poses: &Poses::default(),
+        blocks: &[],
+        climate: &case.climate,
+        seed: 1,
+    };
+    let driven = targets
+        .iter()
+        .zip(commands)
+        .map(|(target, command)| Point { q: command.q.clone().unwrap_or_else(|| target.q.clone()), ..target.clone() });
+    let shots = experiment.measure(driven.collect(), || ());
+    let robot = RobotModel::new(case.robot.clone());
+    let each = shots.iter().zip(targets).zip(commands);
+    each.map(|((shot, target), command)| {
+        command.q.as_ref()?;
+        let wanted = arm.base().point(&robot.forward(&target.q).translation);
+        Some((Vector3::from(shot.position) - wanted).norm() * 1e3)
+    })
+    .collect()
+}
+
+fn from_environment(name: &str, usual: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+/// A line of the table.
+fn print(case: &Case, floor: f64, outcomes: &[Outcome], named: &str) {
+    let want: Vec<String> = case.want().iter().map(|(effect, place)| format!("{effect} at {place}")).collect();
+    let harmed = |one: &&Outcome| one.miss > (1.5 * one.plain).max(2.0 * floor) && !one.remarked;
+    let harm = outcomes.iter().filter(harmed).count();
+    let rms = |outside: bool, of: fn(&Outcome) -> f64| {
+        let values: Vec<f64> = outcomes.iter().filter(|one| one.outside == outside && !one.refused).map(of).collect();
+        (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    };
+    println!(
+        "{} {:8} wanted [{}], named [{named}]: inside {:.3} (geometry {:.3}), outside {:.3} ({:.3}) mm rms, floor {floor:.3}; harmed {harm}, remarked {} + {}, refused {}",
+        case.name,
+        case.kind.name(),
+        want.join(", "),
+        rms(false, |one| one.miss),
+        rms(false, |one| one.plain),
+        rms(true, |one| one.miss),
+        rms(true, |one| one.plain),
+        outcomes.iter().filter(|one| one.remarked && !one.outside).count(),
+        outcomes.iter().filter(|one| one.remarked && one.outside).count(),
+        outcomes.iter().filter(|one| one.refused).count()
+    );
+}
+
+#[test]
+fn a_correction_never_harms_unless_it_says_so() {
+    let (count, seed) = (from_environment("CALIB_RECORDINGS", 3) as usize, from_environment("CALIB_SEED", 29));
+    let design = Design {
+        seed,
+        cases: count,
+        families: OF_THE_ARM.map(String::from).to_vec(),
+        pairs: 0.3,
+        nulls: 0.1,
+        bare: from_environment("CALIB_BARE", 0) == 1,
+        ..Design::default()
+    };
+    let mut all = Vec::new();
+    for (number, content) in design.contents().into_iter().enumerate() {
+        let case = Case::make(&design, number, content).expect("a case");
+        let floor = case.noise_mm[0] * 3f64.sqrt();
+        let (outcomes, named) = outcomes(&case);
+        print(&case, floor, &outcomes, &named);
+        all.extend(outcomes.into_iter().map(|one| (floor, one)));
+    }
+    for outside in [false, true] {
+        let these: Vec<&(f64, Outcome)> = all.iter().filter(|(_, one)| one.outside == outside && !one.refused).collect();
+        let share = |is: &dyn Fn(f64, &Outcome) -> bool| {
+            100.0 * these.iter().filter(|(floor, one)| is(*floor, one)).count() as f64 / these.len() as f64
+        };
+        println!(
+            "{}: {} targets, within u95 {:.1} %, remarked {:.1} %, harmed without a remark {:.2} %, by noise and 1.5 x {:.2} %",
+            if outside { "outside" } else { "inside" },
+            these.len(),
+            share(&|_, one| one.miss <= one.u95),
+            share(&|_, one| one.remarked),
+            share(&|_, one| one.miss > 1.5 * one.plain && !one.remarked),
+            share(&|floor, one| one.miss > (1.5 * one.plain).max(2.0 * floor) && !one.remarked),
+        );
+    }
+}
+
+/// Rows that keep the tool upright, up or down: the arm's moment across the sum of three angles loads no row. The robot file gives no
+/// masses, gears wave at all joints.
+fn upright(seed: u64) -> Case {
+    let design =
+        Design { seed, cases: 1, robots: vec![Kind::Compact6], nulls: 1.0, bare: true, faulty: 0.0, ..Design::default() };
+    let mut case = Case::make(&design, 0, Content::Null).expect("a case");
+    let mut draw = Noise::new(seed, Purpose::Design);
+    let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let arm = Arm::new(&case.robot, &case.truth);
+    let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
+    let mut q_of = |_: usize| loop {
+        let (mut q, _) = allowed(&arm, &poses, &limits, &mut draw).expect("a pose");
+        let turned = if draw.chance(0.5) { 90.0f64 } else { -90.0 };
+        q[3] = turned.to_radians() - q[1] - q[2];
+        q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
+        q[4] = if draw.chance(0.5) { 90.0f64 } else { -90.0 }.to_radians();
+        if (limits[3][0]..=limits[3][1]).contains(&q[3]) {
+            return q;
+        }
+    };
+    let mut points = std::mem::take(&mut case.shots);
+    let mut before = vec![0.0; 6];
+    let mut planned = Vec::new();
+    for (k, shot) in points.drain(..).enumerate() {
+        let q: Vec<f64> = q_of(k);
+        let direction = calib::twin::plan::direction(&q, &before);
+        let Shot { block, time_s, temperature_c, .. } = shot;
+        planned.push(Point { block, q: q.clone(), before, direction, time_s, temperature_c, payload_kg: 0.0 });
+        before = q;
+    }
+    let yields = [(2, 6e-6), (3, 8e-6), (4, 1e-5)]
+        .map(|(joint, rad_per_nm)| Physical::JointCompliance(JointCompliance { joint, rad_per_nm }));
+    let gears = (1..=5).map(|joint| {
+        Physical::GearCyclic(GearCyclic {
+            joint,
+            order: draw.uniform(1.5, 4.0).round(),
+            amplitude_arcsec: draw.uniform(50.0, 100.0),
+            arcsec_per_nm: 0.0,
+            phase_deg: draw.uniform(0.0, 360.0),
+        })
+    });
+    case.friction.clear();
+    case.friction.extend(yields.into_iter().chain(gears));
+    let experiment = Experiment {
+        robot: &case.robot,
+        truth: &case.truth,
+        effects: &case.friction,
+        tracker: &case.tracker,
+        motors: &case.motors,
+        repeatability_arcsec: &[],
+        poses: &Poses::default(),
+        blocks: &[],
+        climate: &case.climate,
+        seed,
+    };
+    let shots = experiment.measure(planned, || ());
+    case.payload_kg = vec![0.0; shots.len()];
+    case.shots = shots;
+    case
+}
+
+#[test]
+fn what_no_row_shows_moves_no_robot() {
+    for seed in 0..from_environment("CALIB_RECORDINGS", 3) {
+        let case = upright(500 + seed);
+        let floor = case.noise_mm[0] * 3f64.sqrt();
+        let (outcomes, named) = outcomes(&case);
+        print(&case, floor, &outcomes, &named);
+        let within = outcomes.iter().filter(|one| one.miss <= one.u95).count();
+        let u95 = (outcomes.iter().map(|one| one.u95 * one.u95).sum::<f64>() / outcomes.len() as f64).sqrt();
+        println!("  within u95 {:.1} %, u95 {u95:.3} mm rms", 100.0 * within as f64 / outcomes.len() as f64);
+    }
+}
