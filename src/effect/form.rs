@@ -46,6 +46,10 @@ pub trait Placed: Effect + Any {
     fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {
         None
     }
+    /// The same with its laws held at the ends of what the fitted rows have of their variables; itself where it has none.
+    fn held_within(&self, _range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {
+        None
+    }
     /// The law, where it is one at a place.
     fn term(&self) -> Option<&Term> {
         None

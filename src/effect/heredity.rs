@@ -54,14 +54,14 @@ fn followed(motion: Motion, survey: &Survey) -> Vec<Factor> {
         Motion::Joint { joint } => {
             out.push(angle(joint));
             if survey.is_loaded(joint) {
-                out.push(Factor { of: Variable::Load { joint }, basis: Basis::PROPORTIONAL });
+                out.push(Factor::new(Variable::Load { joint }, Basis::PROPORTIONAL));
             }
             if survey.both_directions(joint) {
-                out.push(Factor { of: Variable::Approach { joint }, basis: Basis::PROPORTIONAL });
+                out.push(Factor::new(Variable::Approach { joint }, Basis::PROPORTIONAL));
             }
             let width = interactions::move_of(survey, joint, START);
             if width > 0.0 {
-                out.push(Factor { of: Variable::Move { joint }, basis: Basis::Bump { centre: 0.0, width } });
+                out.push(Factor::new(Variable::Move { joint }, Basis::Bump { centre: 0.0, width }));
             }
         }
         Motion::Links { last, .. } if last + 1 < survey.joints() => out.push(angle(last + 1)),
@@ -79,5 +79,5 @@ fn followed(motion: Motion, survey: &Survey) -> Vec<Factor> {
 
 /// From -1 to 1 over a range.
 fn centred(of: Variable, [low, high]: [f64; 2]) -> Factor {
-    Factor { of, basis: Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * (high - low) } }
+    Factor::new(of, Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * (high - low) })
 }

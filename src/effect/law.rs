@@ -4,16 +4,43 @@ use super::{ArmState, Basis, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
-/// Functions of one variable.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// Functions of one variable; the same whatever the rows that they were fitted to.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
     /// Of what.
     pub of: Variable,
     /// Which functions of it.
     pub basis: Basis,
+    /// What the fitted rows have of the variable (SI), beyond which the functions hold their values at its ends; none while it is sought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within: Option<[f64; 2]>,
+}
+
+impl PartialEq for Factor {
+    fn eq(&self, other: &Self) -> bool {
+        (self.of, self.basis) == (other.of, other.basis)
+    }
 }
 
 impl Factor {
+    /// Functions of a variable, wherever it is.
+    pub const fn new(of: Variable, basis: Basis) -> Self {
+        Self { of, basis, within: None }
+    }
+
+    /// The same, held at the ends of a range; a variable of several numbers has none.
+    pub fn held_within(self, [low, high]: [f64; 2]) -> Self {
+        let held = self.of.components() == 1 && low <= high;
+        Self { within: held.then_some([low, high]), ..self }
+    }
+
+    /// By how much the variable is beyond the fitted range in a row, as a share of that range, at most 1; 0 inside.
+    pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> f64 {
+        let (Some([low, high]), Some(u)) = (self.within, self.of.value(0, robot, state)) else { return 0.0 };
+        let off = (low - u).max(u - high).max(0.0);
+        if off == 0.0 { 0.0 } else { (off / (high - low)).min(1.0) }
+    }
+
     /// How many functions it has.
     pub fn count(&self) -> usize {
         self.of.components() * self.basis.count()
@@ -22,6 +49,7 @@ impl Factor {
     fn values(&self, robot: &RobotModel, state: &ArmState, each: &mut dyn FnMut(usize, f64)) {
         for component in 0..self.of.components() {
             if let Some(u) = self.of.value(component, robot, state) {
+                let u = self.within.map_or(u, |[low, high]| u.clamp(low, high));
                 self.basis.values(u, &mut |k, value| each(component * self.basis.count() + k, value));
             }
         }
@@ -42,7 +70,7 @@ pub struct Law {
 impl Law {
     /// Functions of one variable.
     pub const fn new(of: Variable, basis: Basis) -> Self {
-        Self { first: Factor { of, basis }, times: None }
+        Self { first: Factor::new(of, basis), times: None }
     }
 
     /// In proportion to a variable.
@@ -52,7 +80,7 @@ impl Law {
 
     /// Multiplied by functions of another variable.
     pub const fn times(self, of: Variable, basis: Basis) -> Self {
-        Self { times: Some(Factor { of, basis }), ..self }
+        Self { times: Some(Factor::new(of, basis)), ..self }
     }
 
     /// With another basis of the first variable.
@@ -62,7 +90,7 @@ impl Law {
 
     /// With another first variable.
     pub fn by(self, of: Variable) -> Self {
-        Self { first: Factor { of, ..self.first }, ..self }
+        Self { first: Factor::new(of, self.first.basis), ..self }
     }
 
     /// How many functions it has.

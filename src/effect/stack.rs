@@ -3,15 +3,16 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::placed_row::{PlacedRow, PlacementBuffers, Station, along};
-use super::{ArmState, Deflection, Effect, ParameterSpec};
+use super::{ArmState, Deflection, Effect, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3x6, Vector3};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Effects in a fixed order with their parameters numbered through.
 pub struct EffectStack {
-    effects: Vec<(Box<dyn Effect>, Range<usize>)>,
+    effects: Vec<(Arc<dyn Effect>, Range<usize>)>,
     specs: Vec<ParameterSpec>,
     base: Pose,
     needs_torque: bool,
@@ -25,12 +26,61 @@ impl EffectStack {
         let mut numbered = Vec::new();
         for effect in effects {
             let own = effect.parameters(robot);
-            numbered.push((effect, specs.len()..specs.len() + own.len()));
+            numbered.push((Arc::from(effect), specs.len()..specs.len() + own.len()));
             specs.extend(own);
         }
+        Self::numbered(numbered, specs, base)
+    }
+
+    fn numbered(numbered: Vec<(Arc<dyn Effect>, Range<usize>)>, specs: Vec<ParameterSpec>, base: Pose) -> Self {
         let needs_torque = numbered.iter().any(|(effect, _)| effect.needs_torque());
         let needs_sight = numbered.iter().any(|(effect, _)| effect.needs_sight());
         Self { effects: numbered, specs, base, needs_torque, needs_sight }
+    }
+
+    /// The same stack with the laws of its forms held at the ends of what some rows have of their variables.
+    pub(crate) fn held_within(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], x: &[f64]) -> Self {
+        let forms = || self.effects.iter().filter_map(|(effect, _)| effect.form());
+        let terms = || forms().filter_map(|form| form.term());
+        let variables: Vec<Variable> = terms().flat_map(|term| term.law().factors()).map(|factor| factor.of).collect();
+        let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; variables.len()];
+        let mut scratch = self.scratch(robot);
+        for row in rows {
+            let point = self.place(robot, data, *row, x, &mut scratch).point;
+            let state = ArmState::new(data, *row, &scratch.posture, point);
+            for (variable, [low, high]) in variables.iter().zip(&mut ranges) {
+                if let Some(value) = variable.value(0, robot, &state).filter(|value| value.is_finite()) {
+                    (*low, *high) = (low.min(value), high.max(value));
+                }
+            }
+        }
+        let range = |variable: Variable| variables.iter().zip(&ranges).find(|(of, _)| **of == variable).map(|(_, range)| *range);
+        let held = |effect: &Arc<dyn Effect>| -> Arc<dyn Effect> {
+            let form = effect.form().and_then(|form| form.held_within(&range));
+            form.map_or_else(|| effect.clone(), |form| Arc::new(form))
+        };
+        let effects = self.effects.iter().map(|(effect, range)| (held(effect), range.clone()));
+        Self::numbered(effects.collect(), self.specs.clone(), self.base)
+    }
+
+    /// The forms with a law whose variable the row placed last takes beyond its fitted range: their parameters, the variable, and by what
+    /// share of that range (at most 1).
+    pub(crate) fn beyond(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        scratch: &PlacementBuffers,
+    ) -> Vec<(Range<usize>, Variable, f64)> {
+        let state = ArmState::new(data, 0, &scratch.posture, Vector3::zeros());
+        let mut out = Vec::new();
+        for (effect, range) in &self.effects {
+            let Some(term) = effect.form().and_then(|form| form.term()) else { continue };
+            let shares = term.law().factors().map(|factor| (factor.of, factor.beyond(robot, &state)));
+            if let Some((of, share)) = shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| *share > 0.0) {
+                out.push((range.clone(), of, share));
+            }
+        }
+        out
     }
 
     /// All parameters in the order of `x`.

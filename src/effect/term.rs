@@ -1,6 +1,7 @@
 //! Terms: effect = sum_k c_k * direction(place, row) * law_k(variables of the row; shape numbers).
 
 use super::form::Placed;
+use super::law::Factor;
 use super::{ArmState, Basis, Cause, Deflection, Effect, Form, Law, Motion, ParameterSpec, Place, Survey, Variable};
 use crate::robot::{Measurements, RobotModel};
 use serde::{Deserialize, Serialize};
@@ -143,6 +144,12 @@ impl Placed for Term {
 
     fn term(&self) -> Option<&Term> {
         Some(self)
+    }
+
+    fn held_within(&self, range: &dyn Fn(Variable) -> Option<[f64; 2]>) -> Option<Form> {
+        let held = |factor: Factor| range(factor.of).map_or(factor, |range| factor.held_within(range));
+        let law = Law { first: held(self.law.first), times: self.law.times.map(held) };
+        Some(self.with(law).into())
     }
 
     fn held(&self) -> Option<(std::ops::Range<usize>, f64)> {

@@ -37,6 +37,12 @@ impl Model {
             .map_or(*self.stack.base(), |(_, range)| BasePlacement::new(*self.stack.base()).pose(&self.x[range]))
     }
 
+    /// The same model with every law held at the ends of what these rows have of its variables: beyond, nothing was fitted.
+    pub fn held_within(&self, data: &Measurements, rows: &[usize]) -> Self {
+        let stack = self.stack.held_within(&self.robot, data, rows, &self.x);
+        Self { stack: Arc::new(stack), ..self.clone() }
+    }
+
     /// Places the arm of a row.
     pub(crate) fn place<'a>(&'a self, data: &Measurements, row: usize, scratch: &'a mut PlacementBuffers) -> PlacedRow<'a> {
         self.stack.place(&self.robot, data, row, &self.x, scratch)

@@ -14,7 +14,7 @@ use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
 use crate::diagnose::verdict_statement::statement;
 use crate::effect::Unknown;
-use crate::estimate::cross_validate;
+use crate::estimate::{Model, cross_validate};
 use crate::robot::NoiseBasis;
 use nalgebra::Vector3;
 
@@ -29,7 +29,9 @@ const WEAK: f64 = 60.0;
 /// Draws the conclusions of the last round; `before` is what the base model predicts.
 pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]) -> Diagnosis {
     let (data, state) = (&fitter.data, &last.judged.state);
-    let predicted = state.model.predict(data);
+    // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
+    let model = state.model.held_within(data, &state.screening.kept);
+    let predicted = model.predict(data);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
     let (rest, mut findings) = without_small_rests(findings(&last));
     let basis = basis(fitter);
@@ -67,7 +69,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         held_out: misfit.held_out,
         folds,
         next_measurements: next(&findings, fitter.question.own),
-        findings,
+        findings: within(findings, &model),
         formulas,
         withdrawn: last.judged.withdrawn,
         clock: data.has_clock(),
@@ -82,9 +84,20 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
         located_after,
         kept: state.screening.kept.clone(),
         screening: state.screening,
-        model: state.model,
+        model,
         fitted: state.fitted,
     }
+}
+
+/// The findings with their forms as the model has them.
+fn within(mut findings: Vec<Finding>, model: &Model) -> Vec<Finding> {
+    for form in findings.iter_mut().flat_map(|finding| &mut finding.forms) {
+        let own = model.stack.effects().filter_map(|(effect, _)| effect.form()).find(|own| *own == form);
+        if let Some(own) = own {
+            *form = own.clone();
+        }
+    }
+    findings
 }
 
 /// What the noise rests on: enough repeats, or what is stated where that is all of it.

@@ -345,6 +345,9 @@ fn upright(seed: u64) -> Case {
     });
     case.friction.clear();
     case.friction.extend(yields.into_iter().chain(gears));
+    if std::env::var("CALIB_SHOW").is_ok() {
+        println!("{:?}", case.friction);
+    }
     let experiment = Experiment {
         robot: &case.robot,
         truth: &case.truth,
