@@ -70,6 +70,10 @@ pub(super) struct CompensateArguments {
     /// Largest turn by which a target is corrected, deg
     #[arg(long, value_name = "DEG", default_value_t = 2.0)]
     max_turn: f64,
+    /// Largest uncertainty (95 %) of a target's correction along its direction, mm [default: the size of the correction, or six times what is
+    /// usual at the recorded poses where that is more]
+    #[arg(long, value_name = "MM")]
+    max_uncertainty: Option<f64>,
     /// Takes frames of a program that are not applied (work object, $BASE, $TOOL, displacement) as those of the robot file, with a warning
     /// for each, instead of refusing the program
     #[arg(long)]
@@ -122,7 +126,7 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
     identified.spare(arguments.out.as_deref())?;
     let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
     let coverage = identified.coverage();
-    let uncertainty = if arguments.no_sigma { None } else { identified.uncertainty(&arm) };
+    let uncertainty = identified.uncertainty(&arm);
     let mut corrector = Corrector::new(&arm, coverage, uncertainty, manner(arguments, &identified)?);
     let threads = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.model.jobs())
@@ -164,7 +168,8 @@ fn check(arguments: &CompensateArguments) -> Result<()> {
     }
     let payload = arguments.payload.and_then(|payload| Stated::Payload.fault(payload));
     faults.extend(payload.map(|message| Fault::new("--payload", message)));
-    for (option, given) in [("--max-correction", arguments.max_correction), ("--max-turn", arguments.max_turn)] {
+    let limits = [("--max-correction", arguments.max_correction), ("--max-turn", arguments.max_turn)];
+    for (option, given) in limits.into_iter().chain(arguments.max_uncertainty.map(|most| ("--max-uncertainty", most))) {
         if !(given.is_finite() && given > 0.0) {
             faults.push(Fault::new(option, format!("expected a number above 0, found {given}")));
         }
@@ -240,6 +245,7 @@ fn manner(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Resu
         clock,
         direction: arguments.direction,
         start,
+        uncertainty: !arguments.no_sigma,
         gate: gate(arguments, identified),
     })
 }
@@ -248,6 +254,7 @@ fn gate(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Gate {
     let limits = GateLimits {
         correction: arguments.max_correction * 1e-3,
         turn: arguments.max_turn.to_radians(),
+        uncertainty: arguments.max_uncertainty.map(|mm| mm * 1e-3),
         ..GateLimits::default()
     };
     let insisted = arguments.model.force;

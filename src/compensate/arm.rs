@@ -1,12 +1,13 @@
 //! The arm as identified: where it really puts the tool, in its own base frame, under stated circumstances.
 
 use super::solve::Chain;
-use crate::effect::{Form, LONG_AFTER, PlacementBuffers};
+use crate::effect::{Form, LONG_AFTER, PlacementBuffers, Variable};
 use crate::estimate::Model;
 use crate::estimate::network::Correction;
 use crate::robot::{Measurements, Memories};
 use crate::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// Under which conditions a command will be carried out.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +93,18 @@ impl IdentifiedArm {
     }
 }
 
+/// A law that a command takes beyond the rows that it was fitted to.
+pub(super) struct BeyondFitted {
+    /// Of its form, in the stack.
+    pub parameters: Range<usize>,
+    /// What it is a function of.
+    pub variable: Variable,
+    /// By how much, as a share of the fitted range, at most 1.
+    pub share: f64,
+    /// What the form does to the point there, m, tracker frame.
+    pub displacement: Vector3<f64>,
+}
+
 /// One arm being placed.
 pub struct Reach<'a> {
     arm: &'a IdentifiedArm,
@@ -132,6 +145,23 @@ impl Reach<'_> {
         self.scratch.points_and_partials();
         stack.derivatives(robot, &self.data, 0, x, &mut self.scratch, emit);
         stack.only_points(robot, &self.data, x, &mut self.scratch);
+    }
+
+    /// Laws that command `q` takes beyond the rows that they were fitted to.
+    pub(super) fn beyond_fitted(&mut self, q: &[f64]) -> Vec<BeyondFitted> {
+        self.data.q.copy_from_slice(q);
+        let Model { robot, stack, x, .. } = &self.arm.model;
+        let point = stack.point(robot, &self.data, 0, x, &mut self.scratch);
+        let beyond = stack.beyond(robot, &self.data, &self.scratch);
+        let mut without = x.clone();
+        let mut out = Vec::with_capacity(beyond.len());
+        for (parameters, variable, share) in beyond {
+            without[parameters.clone()].fill(0.0);
+            let displacement = point - stack.point(robot, &self.data, 0, &without, &mut self.scratch);
+            without[parameters.clone()].copy_from_slice(&x[parameters.clone()]);
+            out.push(BeyondFitted { parameters, variable, share, displacement });
+        }
+        out
     }
 
     /// Sum over the revolute joints of the outer products of the point's derivatives (m per rad, base frame) at command `q`.

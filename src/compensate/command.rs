@@ -1,6 +1,6 @@
 //! The answer to a target: a command, and what is known of it.
 
-use super::{PositionUncertainty, Remark};
+use super::{CorrectionUncertainty, PositionUncertainty, Remark};
 
 /// A command and what is known of it, SI.
 #[derive(Debug, Clone)]
@@ -17,6 +17,8 @@ pub struct CorrectedCommand {
     pub iterations: usize,
     /// Of the point that is reached; none where the model has no covariance.
     pub uncertainty: Option<PositionUncertainty>,
+    /// How certain its correction is along its own direction; none where the model has no covariance.
+    pub certainty: Option<CorrectionUncertainty>,
     /// What is wrong with it.
     pub remarks: Vec<Remark>,
 }

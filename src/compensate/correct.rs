@@ -64,6 +64,8 @@ pub struct CorrectionOptions {
     pub direction: Option<f64>,
     /// Where the first Cartesian target is searched from, as the controller counts.
     pub start: Option<Vec<f64>>,
+    /// Whether answers tell the uncertainty of the point.
+    pub uncertainty: bool,
     /// Which corrections are refused.
     pub gate: Gate,
 }
@@ -104,6 +106,8 @@ pub struct CorrectionTotals {
     pub beyond_limits: u64,
     /// Targets beyond what was measured.
     pub beyond_measured: u64,
+    /// Targets whose correction is uncertain, or uses a finding beyond what was fitted.
+    pub uncertain: u64,
 }
 
 impl CorrectionTotals {
@@ -126,6 +130,12 @@ impl CorrectionTotals {
             (self.insisted, "is", "are", "beyond the limits of corrections and written because of --force"),
             (self.turned, "is", "are", "reached in position but not in orientation: the wrist is singular there"),
             (self.beyond_limits, "leaves", "leave", "the joint limits"),
+            (
+                self.uncertain,
+                "has",
+                "have",
+                "a correction that is uncertain by more than half, or uses a finding beyond what was fitted",
+            ),
             (self.beyond_measured, "is", "are", "outside of what was measured: the model extrapolates there"),
         ];
         let said = all.into_iter().filter(|(count, ..)| *count > 0);
@@ -154,7 +164,7 @@ impl<'a> Corrector<'a> {
 
     /// Whether targets get an uncertainty.
     pub fn has_uncertainty(&self) -> bool {
-        self.uncertainty.is_some()
+        self.uncertainty.is_some() && self.manner.uncertainty
     }
 
     /// How targets and commands count the joints.
@@ -228,6 +238,8 @@ impl<'a> Corrector<'a> {
         };
         let turned = wanted.oriented && (found.turn > REACHED || found.turn.is_nan());
         let uncertainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.at(reach, &found.q));
+        let correction = self.arm.base().rotation * (reach.place(&job.home).translation - wanted.pose.translation);
+        let certainty = self.uncertainty.as_ref().map(|uncertainty| uncertainty.of_correction(reach, &found.q, &correction));
         let mut remarks = Vec::new();
         let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
         let faces = !turned || found.turn <= TURNED_AWAY;
@@ -243,6 +255,10 @@ impl<'a> Corrector<'a> {
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
+            let doubtful = certainty.iter().filter(|certainty| certainty.is_remarkable());
+            remarks.extend(doubtful.map(|one| Remark::Uncertain(one.correction, one.u95, one.finding.clone())));
+            let beyond = certainty.iter().flat_map(|certainty| &certainty.beyond);
+            remarks.extend(beyond.map(|(finding, variable)| Remark::BeyondFitted(finding.clone(), variable.clone())));
             let share = reach.share();
             if share < 1.0 {
                 remarks.push(Remark::Faded(share));
@@ -256,7 +272,8 @@ impl<'a> Corrector<'a> {
             turn,
             residual: found.residual,
             iterations: found.iterations,
-            uncertainty,
+            uncertainty: uncertainty.filter(|_| self.manner.uncertainty),
+            certainty,
             remarks,
         };
         self.manner.gate.judge(&mut command);
@@ -293,6 +310,7 @@ impl CorrectionTotals {
         self.not_reached += u64::from(answer.q.is_none()) - refused;
         self.turned += if answer.q.is_some() { any(|remark| matches!(remark, Remark::Turned(_))) } else { 0 };
         self.beyond_limits += any(|remark| matches!(remark, Remark::BeyondLimits(_)));
+        self.uncertain += any(|remark| matches!(remark, Remark::Uncertain(..) | Remark::BeyondFitted(..)));
         self.beyond_measured += any(|remark| matches!(remark, Remark::BeyondMeasured(_)));
     }
 }

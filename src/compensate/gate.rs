@@ -17,6 +17,8 @@ pub struct GateLimits {
     pub correction: f64,
     /// Turn by which a command is corrected, rad.
     pub turn: f64,
+    /// 95 % uncertainty of a correction along its direction, m; none: the size of the correction itself.
+    pub uncertainty: Option<f64>,
     /// Distance of the tool, or of a link, from the robot file's, m.
     pub shift: f64,
     /// Turn of the tool, of a link, or of a joint's zero, rad.
@@ -26,7 +28,7 @@ pub struct GateLimits {
 impl Default for GateLimits {
     fn default() -> Self {
         let deg = std::f64::consts::PI / 180.0;
-        Self { correction: 20e-3, turn: 2.0 * deg, shift: 50e-3, tilt: 5.0 * deg }
+        Self { correction: 20e-3, turn: 2.0 * deg, uncertainty: None, shift: 50e-3, tilt: 5.0 * deg }
     }
 }
 
@@ -59,10 +61,21 @@ impl Gate {
     /// Why a command is refused; none where it is within the limits. What is no number is not.
     fn reason(&self, command: &CorrectedCommand) -> Option<String> {
         let beyond = |by: f64, most: f64| by.is_nan() || by > most;
-        let GateLimits { correction, turn, .. } = self.limits;
+        let GateLimits { correction, turn, uncertainty, .. } = self.limits;
         if beyond(command.uncorrected, correction) {
             let (by, most) = (command.uncorrected * 1e3, round(correction * 1e3));
             return Some(format!("corrected by {by:.3} mm, at most {most} mm allowed (--max-correction)"));
+        }
+        if let Some(certainty) = &command.certainty {
+            let limit = uncertainty.unwrap_or_else(|| certainty.limit());
+            if beyond(certainty.u95, limit) {
+                let by = certainty.finding.as_ref().map(|finding| format!(", most of it by {finding}")).unwrap_or_default();
+                let (u95, size) = (certainty.u95 * 1e3, certainty.correction * 1e3);
+                return Some(format!(
+                    "the correction of {size:.3} mm is uncertain by {u95:.3} mm{by}, at most {:.3} mm allowed (--max-uncertainty)",
+                    limit * 1e3
+                ));
+            }
         }
         let (by, most) = (command.turn.to_degrees(), round(turn.to_degrees()));
         beyond(command.turn, turn).then(|| format!("turned by {by:.3} deg, at most {most} deg allowed (--max-turn)"))

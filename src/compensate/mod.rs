@@ -8,6 +8,7 @@
 mod arm;
 mod command;
 mod correct;
+mod correction_uncertainty;
 mod coverage;
 mod gate;
 mod inverse;
@@ -21,6 +22,7 @@ mod uncertainty;
 pub use arm::{Circumstance, IdentifiedArm, Reach};
 pub use command::CorrectedCommand;
 pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector, turns};
+pub use correction_uncertainty::CorrectionUncertainty;
 pub use coverage::Coverage;
 use coverage::beyond_limits;
 pub use gate::{Gate, GateLimits};

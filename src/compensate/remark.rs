@@ -14,6 +14,10 @@ pub enum Remark {
     BeyondLimits(Vec<usize>),
     /// Outside of what was measured.
     BeyondMeasured(Unmeasured),
+    /// Correction and its uncertainty (m, 95 %), and the finding that most of it comes from.
+    Uncertain(f64, f64, Option<String>),
+    /// A finding that is used beyond what was fitted, and over what.
+    BeyondFitted(String, String),
     /// The share of the learned correction that applies.
     Faded(f64),
     /// Beyond a limit: no joints are written.
@@ -30,6 +34,11 @@ impl fmt::Display for Remark {
             Self::Turned(turn) => write!(f, "orientation off by {:.4} deg", turn.to_degrees()),
             Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", numbered(joints)),
             Self::BeyondMeasured(what) => what.fmt(f),
+            Self::Uncertain(correction, u95, finding) => {
+                write!(f, "the correction of {:.3} mm is uncertain by {:.3} mm", correction * 1e3, u95 * 1e3)?;
+                finding.as_ref().map_or(Ok(()), |finding| write!(f, ", most of it by {finding}"))
+            }
+            Self::BeyondFitted(finding, variable) => write!(f, "{finding} beyond the {variable} that was fitted"),
             Self::Faded(share) => write!(f, "learned correction applies by {:.0} %", 100.0 * share),
             Self::Refused(reason) => write!(f, "refused: {reason}"),
             Self::Insisted(reason) => write!(f, "written because of --force: {reason}"),

@@ -2,6 +2,7 @@
 
 use super::arm::{IdentifiedArm, Reach};
 use crate::estimate::Covariance;
+use crate::robot::Measurements;
 use crate::statistics::radius_95;
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,8 +20,15 @@ pub struct Scatter {
 pub struct PositionUncertainty {
     /// One-sigma length by the parameters' covariance alone: root of the summed variances.
     pub sigma: f64,
-    /// Radius of the sphere about the target that holds the tool with 95 %: parameters and scatter.
+    /// Radius of the sphere about the target that holds the tool with 95 %: parameters, scatter, and laws beyond the rows that they were
+    /// fitted to.
     pub u95: f64,
+}
+
+/// An effect at a place, and its own parameters in the covariance.
+struct Source {
+    name: String,
+    parameters: Vec<usize>,
 }
 
 /// What the rows that were fitted leave open of the parameters, and how the arm scatters.
@@ -29,6 +37,12 @@ pub struct Uncertainty {
     scatter: Scatter,
     /// Row of each parameter of the stack in the covariance.
     row: Vec<Option<usize>>,
+    /// Effects at places, those of the arm.
+    sources: Vec<Source>,
+    /// Of the stack.
+    names: Vec<String>,
+    /// m, 95 %: what is usual at the recorded poses.
+    pub(super) usual: f64,
 }
 
 impl Uncertainty {
@@ -37,20 +51,68 @@ impl Uncertainty {
         let mut row = vec![None; arm.model().x.len()];
         covariance.parameters().iter().enumerate().for_each(|(k, parameter)| row[*parameter] = Some(k));
         arm.of_the_measurement().iter().for_each(|parameter| row[*parameter] = None);
-        Self { covariance, scatter, row }
+        let specs = arm.model().stack.specs();
+        let mut names = vec![String::new(); specs.len()];
+        let mut sources: Vec<Source> = Vec::new();
+        for (effect, range) in arm.model().stack.effects() {
+            for k in range {
+                names[k] = format!("{} at {}", effect.name(), specs[k].place);
+                let Some(row) = row[k] else { continue };
+                match sources.iter_mut().find(|source| source.name == names[k]) {
+                    Some(source) => source.parameters.push(row),
+                    None => sources.push(Source { name: names[k].clone(), parameters: vec![row] }),
+                }
+            }
+        }
+        Self { covariance, scatter, row, sources, names, usual: 0.0 }
     }
 
-    /// At command `q`, under the circumstances that `reach` is set to.
-    pub fn at(&self, reach: &mut Reach, q: &[f64]) -> PositionUncertainty {
+    /// The same, beside what is usual at the poses of a recording.
+    pub fn beside(mut self, arm: &IdentifiedArm, data: &Measurements) -> Self {
+        self.usual = self.usual(arm, data);
+        self
+    }
+
+    /// The effect and place of a parameter of the stack.
+    pub(super) fn name(&self, parameter: usize) -> String {
+        self.names[parameter].clone()
+    }
+
+    fn jacobian(&self, reach: &mut Reach, q: &[f64]) -> Vec<Vector3<f64>> {
         let mut jacobian = vec![Vector3::zeros(); self.covariance.parameters().len()];
         reach.derivatives(q, |parameter, derivative| {
             if let Some(k) = self.row[parameter] {
                 jacobian[k] += derivative;
             }
         });
-        let parameters = self.covariance.of_point(&jacobian);
+        jacobian
+    }
+
+    /// Covariance (m2, tracker frame) of the point at command `q` by the parameters.
+    pub(super) fn of_parameters(&self, reach: &mut Reach, q: &[f64]) -> Matrix3<f64> {
+        self.covariance.of_point(&self.jacobian(reach, q))
+    }
+
+    /// Variance (m2) along a direction by each effect at a place alone.
+    pub(super) fn by_effect(&self, reach: &mut Reach, q: &[f64], along: &Vector3<f64>) -> Vec<(String, f64)> {
+        let jacobian = self.jacobian(reach, q);
+        let variance = |source: &Source| {
+            let mut own = vec![Vector3::zeros(); jacobian.len()];
+            source.parameters.iter().for_each(|row| own[*row] = jacobian[*row]);
+            along.dot(&(self.covariance.of_point(&own) * along))
+        };
+        self.sources.iter().map(|source| (source.name.clone(), variance(source))).collect()
+    }
+
+    /// At command `q`, under the circumstances that `reach` is set to.
+    pub fn at(&self, reach: &mut Reach, q: &[f64]) -> PositionUncertainty {
+        let parameters = self.of_parameters(reach, q);
         let Scatter { unexplained, repeatability } = self.scatter;
         let mut all = parameters + Matrix3::from_diagonal_element(unexplained * unexplained);
+        for law in reach.beyond_fitted(q) {
+            let off = law.share * law.displacement;
+            all += off * off.transpose();
+        }
         if repeatability > 0.0 {
             all += reach.joint_scatter(q) * (repeatability * repeatability);
         }

@@ -1,6 +1,6 @@
 //! Laws: a basis of a variable, or the product of two.
 
-use super::{ArmState, Basis, Variable};
+use super::{ArmState, Basis, LONG_AFTER, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +37,10 @@ impl Factor {
     /// By how much the variable is beyond the fitted range in a row, as a share of that range, at most 1; 0 inside.
     pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> f64 {
         let (Some([low, high]), Some(u)) = (self.within, self.of.value(0, robot, state)) else { return 0.0 };
+        // A step has happened, and a command whose time nobody states is long after the recording.
+        if matches!(self.basis, Basis::After { .. }) || (self.of == Variable::Time && u == LONG_AFTER) {
+            return 0.0;
+        }
         let off = (low - u).max(u - high).max(0.0);
         if off == 0.0 { 0.0 } else { (off / (high - low)).min(1.0) }
     }

@@ -223,7 +223,11 @@ impl IdentifiedModel {
 
     /// How far a commanded position may be off, from the rows that the model was fitted to; none for a table of parameters alone.
     pub fn uncertainty(&self, arm: &IdentifiedArm) -> Option<Uncertainty> {
-        self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance, self.scatter))
+        let own = self.covariance.clone().map(|covariance| Uncertainty::new(arm, covariance, self.scatter));
+        own.map(|own| match &self.data {
+            Some(data) => own.beside(arm, data),
+            None => own,
+        })
     }
 }
 
