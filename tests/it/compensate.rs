@@ -1,6 +1,6 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
-mod concealed;
+pub mod concealed;
 mod counting;
 mod gate;
 mod standing;

@@ -61,12 +61,7 @@ struct Outcome {
 /// What the tool says of a target, and where the arm goes then.
 fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
     let recording = recording(case);
-    let row = |k: usize| SplitRow {
-        sequence: k as i64,
-        point_id: recording.point_id[k].clone(),
-        set: if case.shots[k].block == FIT { "fit" } else { "validate" }.into(),
-    };
-    let split = Split((0..recording.rows()).map(row).collect());
+    let split = split(case, &recording);
     let mut robot = case.robot.clone();
     if case.bare {
         robot.joints.iter_mut().for_each(|joint| (joint.mass, joint.centre) = (None, None));
@@ -129,7 +124,16 @@ fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
     parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model")
 }
 
-fn recording(case: &Case) -> Recording {
+pub fn split(case: &Case, recording: &Recording) -> Split {
+    let row = |k: usize| SplitRow {
+        sequence: k as i64,
+        point_id: recording.point_id[k].clone(),
+        set: if case.shots[k].block == FIT { "fit" } else { "validate" }.into(),
+    };
+    Split((0..recording.rows()).map(row).collect())
+}
+
+pub fn recording(case: &Case) -> Recording {
     let shown = |column: Column| !case.hidden.contains(&column);
     let rows = case.shots.len();
     Recording {
@@ -224,7 +228,7 @@ fn misses(case: &Case, arm: &IdentifiedArm, targets: &[Point], commands: &[Corre
     .collect()
 }
 
-fn from_environment(name: &str, usual: u64) -> u64 {
+pub fn from_environment(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 

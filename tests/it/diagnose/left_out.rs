@@ -1,0 +1,93 @@
+//! Causes taken out of the list: physics that nobody listed gets no name of another.
+//!
+//! `CALIB_RECORDINGS=100 cargo test --test it -- diagnose::left_out --nocapture` prints every recording.
+
+use crate::compensate::concealed::{from_environment, recording, split};
+use crate::desk::{Desk, table};
+use calib::stage::{Diagnose, DiagnoseReads};
+use calib::table::{Findings, Robot, Verdict};
+use calib::twin::conceal::case::Case;
+use calib::twin::conceal::design::{Content, Design};
+use serde_json::json;
+
+/// Found: name, place and probability each, strongest first; verdict; rms (mm) at held-out rows; squared residual per degree of freedom.
+struct Said {
+    found: Vec<(String, String, f64, f64)>,
+    verdict: String,
+    after: f64,
+    chi_square: f64,
+}
+
+fn said(case: &Case, without: &[&str]) -> Said {
+    let recording = recording(case);
+    let split = split(case, &recording);
+    let stage: Diagnose = serde_json::from_value(json!({"without": without})).expect("settings");
+    let reads = DiagnoseReads { robot: Robot::from_description(&case.robot), recording, split };
+    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let verdict = table::<Verdict>(&tables).remove(0).0.remove(0);
+    let findings = table::<Findings>(&tables).remove(0);
+    let found = findings.0.iter().filter(|row| row.forms != "[]");
+    Said {
+        found: found
+            .map(|row| (row.effect.clone(), row.place.clone(), row.probability.unwrap_or(0.0), row.delta_bic.unwrap_or(0.0)))
+            .collect(),
+        verdict: verdict.verdict,
+        after: verdict.after_rms_mm.unwrap_or(f64::NAN),
+        chi_square: verdict.chi_square,
+    }
+}
+
+#[test]
+fn what_is_left_out_gets_no_other_name() {
+    let (count, seed) = (from_environment("CALIB_RECORDINGS", 2) as usize, from_environment("CALIB_SEED", 31));
+    let design = Design { seed, cases: 6 * count, faulty: 0.0, ..Design::default() };
+    let (mut tellable, mut wrong, mut sound, mut other, mut confident, mut listed, mut right, mut back) =
+        (0, 0, 0, 0, 0, 0, 0, 0);
+    for (number, content) in design.contents().into_iter().enumerate() {
+        if !matches!(content, Content::Single(_)) || listed >= count {
+            continue;
+        }
+        let case = Case::make(&design, number, content).expect("a case");
+        let one = &case.concealed[0];
+        if one.strength < 50.0 || case.concealed.len() > 1 {
+            continue;
+        }
+        let cause = one.cause.effect;
+        let whole = said(&case, &[]);
+        if !whole.found.iter().any(|(name, ..)| name == cause) {
+            continue;
+        }
+        listed += 1;
+        right += usize::from(whole.found.iter().any(|(name, _, probability, _)| name == cause && *probability >= 0.5));
+        let left_out = said(&case, &[cause]);
+        let named: Vec<_> =
+            left_out.found.iter().filter(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5).collect();
+        let can_tell = left_out.after > 1.1 * whole.after;
+        let floor = 3f64.sqrt() * case.noise_mm[1];
+        println!(
+            "{cause} at {}: L {:.0}, {} rows, held out {:.4} -> {:.4} (noise {floor:.4}), chi-square {:.2} -> {:.2}, {}{}: {:?}",
+            one.cause.place,
+            one.strength,
+            case.fit,
+            whole.after,
+            left_out.after,
+            whole.chi_square,
+            left_out.chi_square,
+            if can_tell { "TELL " } else { "" },
+            left_out.verdict,
+            left_out.found
+        );
+        if can_tell {
+            tellable += 1;
+            wrong += usize::from(!named.is_empty());
+            sound += usize::from(left_out.verdict != "unexplained");
+        } else {
+            other += 1;
+            confident += usize::from(named.iter().any(|(_, _, probability, _)| *probability >= 0.9));
+        }
+        back += usize::from(left_out.found.iter().any(|(name, ..)| name == cause));
+    }
+    println!(
+        "{listed} recordings, in the list {right} named with 0.5 or more; left out: {tellable} can be told, {wrong} wrong names with 0.5 or more, {sound} explained or nothing missing; of {other} others {confident} wrong names with 0.9 or more; {back} come back"
+    );
+}
