@@ -26,8 +26,10 @@ use std::path::{Path, PathBuf};
 /// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
 /// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
-/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, near the
-/// posture of the target before (or --start); status and turn are not read. Programs that set $BASE or $TOOL, name a work object or displace
+/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, in the
+/// posture that they state: the quadrants cf1, cf4, cf6 of RAPID, the signs T of KRL, in the controller's counting; cfx and S are not
+/// checked. Of what that leaves open, and where nothing is stated, the posture nearest to the target before (or --start) is taken. A target
+/// that cannot be reached in its posture is refused. Programs that set $BASE or $TOOL, name a work object or displace
 /// their targets are refused (--assume-frames), and so are programs and tables without a payload where the model depends on load (--payload).
 /// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
 /// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
@@ -145,14 +147,15 @@ pub(super) fn main(arguments: &CompensateArguments, command_line: &[OsString]) -
         load,
         force: arguments.model.force,
     };
-    let unreached = threads.install(|| corrected(arguments, &layout, &mut corrector))?;
+    let remarks = remarks(arguments, &identified);
+    let unreached = threads.install(|| corrected(arguments, &layout, &remarks, &mut corrector))?;
     let mut text = String::new();
     if !arguments.model.quiet {
         let counting = identified.counting().map(|line| format!("{line}\n")).unwrap_or_default();
         text = format!("model: {}\n{counting}{}", identified.origin, corrector.tally.summary());
     }
-    let remarks = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
-    text.extend(corrector.tally.warnings().map(|line| format!("warning: {line}{remarks}\n")));
+    let column = if language(&arguments.targets).is_some() || arguments.plain { "" } else { " (column `remark`)" };
+    text.extend(corrector.tally.warnings().map(|line| format!("warning: {line}{column}\n")));
     let _ = std::io::stderr().write_all(text.as_bytes());
     if unreached.faults.is_empty() { Ok(()) } else { Err(Error::Data(unreached.faults)) }
 }
@@ -269,8 +272,21 @@ fn language(targets: &Path) -> Option<Language> {
     Language::of_ending(&raw::ending(targets))
 }
 
+/// What the head of a corrected program says of its model.
+fn remarks(arguments: &CompensateArguments, identified: &IdentifiedModel) -> Vec<&'static str> {
+    let insisted = arguments.model.force.then_some("limits overridden by --force");
+    let unexplained = identified.unexplained.as_ref().map(|_| "verdict of the model: unexplained");
+    insisted.into_iter().chain(unexplained).collect()
+}
+
 /// A controller's program, whole.
-fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layout, corrector: &mut Corrector) -> Result<()> {
+fn rewritten(
+    arguments: &CompensateArguments,
+    language: Language,
+    layout: &Layout,
+    remarks: &[&str],
+    corrector: &mut Corrector,
+) -> Result<()> {
     let text = raw::bytes(&arguments.targets).map_err(|error| Error::spec(layout.place, format!("cannot be read: {error}")))?;
     let partial = if arguments.leave_partial { Partial::Left } else { Partial::Refused };
     let source = ProgramFile { place: layout.place, text: &text, language };
@@ -283,7 +299,7 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
     }
     let frames = if arguments.assume_frames { Frames::Assumed } else { Frames::Refused };
     let mut rewritten = program::corrected(&source, partial, frames, layout.robot, corrector)?;
-    rewritten.bytes = mark::written(&rewritten.bytes, &text, language, arguments.model.force);
+    rewritten.bytes = mark::written(&rewritten.bytes, &text, language, remarks);
     let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());
     let Some(out) = &arguments.out else {
@@ -298,9 +314,9 @@ fn rewritten(arguments: &CompensateArguments, language: Language, layout: &Layou
 }
 
 /// Reads, corrects and writes.
-fn corrected(arguments: &CompensateArguments, layout: &Layout, corrector: &mut Corrector) -> Result<Unreached> {
+fn corrected(arguments: &CompensateArguments, layout: &Layout, remarks: &[&str], corrector: &mut Corrector) -> Result<Unreached> {
     if let Some(language) = language(&arguments.targets) {
-        return rewritten(arguments, language, layout, corrector).map(|()| Unreached::default());
+        return rewritten(arguments, language, layout, remarks, corrector).map(|()| Unreached::default());
     }
     let Some(out) = &arguments.out else {
         return convert(&arguments.targets, std::io::stdout(), is_parquet(&arguments.targets), layout, corrector);

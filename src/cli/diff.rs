@@ -5,9 +5,11 @@ use super::{complain, emit, emit_json};
 use crate::audit::{RunAddress, compare_runs};
 use crate::diff::{self, Detail, DiffOptions, TableDiff};
 use crate::error::{Error, Result};
+use crate::identified::counted_otherwise;
 use crate::pipeline::{Manifest, find_run};
 use crate::store::{Store, TableRef};
 use crate::summary::{rival_changes, run_diff};
+use crate::table::{Recording, Table};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -92,12 +94,15 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     let options = options(arguments)?;
     let (a, b) = (Path::new(&arguments.a), Path::new(&arguments.b));
     if a.is_file() || b.is_file() || arguments.a.ends_with(".parquet") || arguments.b.ends_with(".parquet") {
-        return tables(arguments, a, b, &options);
+        return tables(arguments, a, b, &options, None);
     }
     let store = open_store(arguments.store.as_deref())?;
     let (a, b) = (place(&store, &arguments.a)?, place(&store, &arguments.b)?);
+    let counting = counting(&store, [&a, &b])?;
     if let (Some(left), Some(right)) = (output(&store, &a)?, output(&store, &b)?) {
-        return tables(arguments, &store.object(&left)?, &store.object(&right)?, &options);
+        let counting =
+            counting.filter(|_| [&left, &right].iter().any(|table| table.schema.split('/').next() == Some(Recording::KIND)));
+        return tables(arguments, &store.object(&left)?, &store.object(&right)?, &options, counting);
     }
     let for_tables =
         [("--key", !options.key.is_empty()), ("--quaternion", !options.quaternions.is_empty()), ("--out", options.out.is_some())];
@@ -109,10 +114,11 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     if arguments.json {
         let mut value = serde_json::to_value(&diff).map_err(|error| Error::Bug(error.to_string()))?;
         value["same"] = diff.is_same().into();
+        value["counting"] = counting.into();
         value["rivals"] = serde_json::to_value(&rivals).map_err(|error| Error::Bug(error.to_string()))?;
         emit_json(&value)?;
     } else {
-        emit(&run_diff(&diff, &rivals, arguments.stat))?;
+        emit(&(run_diff(&diff, &rivals, arguments.stat) + &line(counting.as_deref())))?;
     }
     if let Some(path) = &arguments.html {
         let text = run_diff(&diff, &rivals, true);
@@ -125,12 +131,35 @@ fn execute(arguments: &DiffArguments) -> Result<u8> {
     Ok(code(diff.is_same(), duplicates, arguments))
 }
 
-fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &DiffOptions) -> Result<u8> {
+/// In which counting the joints of two runs' tables stand; none where both controllers count as the robot file does.
+fn counting(store: &Store, runs: [&RunAddress; 2]) -> Result<Option<String>> {
+    // Runs are compared by what is left of them, too.
+    let of = |run: &RunAddress| -> Result<Option<String>> {
+        Ok(counted_otherwise(&Manifest::of(store, &run.run)?, store).unwrap_or_default())
+    };
+    let controllers = match (of(runs[0])?, of(runs[1])?) {
+        (None, None) => return Ok(None),
+        (Some(a), Some(b)) if a == b => format!("both controllers count otherwise ({a})"),
+        (Some(a), None) => format!("the controller of A counts otherwise ({a})"),
+        (None, Some(b)) => format!("the controller of B counts otherwise ({b})"),
+        (Some(a), Some(b)) => format!("the controllers count otherwise (A: {a}; B: {b})"),
+    };
+    Ok(Some(format!("joints stand in the robot file's counting; {controllers}")))
+}
+
+fn line(sentence: Option<&str>) -> String {
+    sentence.map(|sentence| format!("{sentence}\n")).unwrap_or_default()
+}
+
+fn tables(arguments: &DiffArguments, a: &Path, b: &Path, options: &DiffOptions, counting: Option<String>) -> Result<u8> {
     let diff = diff::compare(a, b, options)?;
     if arguments.json {
-        emit_json(&json(&diff)?)?;
+        let mut value = json(&diff)?;
+        value["counting"] = counting.into();
+        emit_json(&value)?;
     } else {
-        emit(&diff::text(&diff, if arguments.stat { Detail::Stat } else { Detail::Full }))?;
+        let detail = if arguments.stat { Detail::Stat } else { Detail::Full };
+        emit(&(diff::text(&diff, detail) + &line(counting.as_deref())))?;
     }
     let code = code(diff.is_same(), diff.duplicates(), arguments);
     if let Some(path) = &arguments.html {

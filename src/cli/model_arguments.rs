@@ -1,9 +1,9 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
 use super::means::{CommandTask, Means};
-use crate::compensate::Gate;
+use crate::compensate::{Gate, GateLimits};
 use crate::error::{Error, Fault, Result};
-use crate::identified::{Files, IdentifiedModel, steps_of};
+use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
 use crate::pipeline::{Manifest, Purpose, Selection, find_run};
 use crate::raw::ending;
 use crate::store::Store;
@@ -30,8 +30,14 @@ pub(super) struct ModelArguments {
     /// Takes tables without a content hash, which another program wrote, as they are; a hash that does not hold is refused all the same
     #[arg(long)]
     unchecked: bool,
-    /// Insists on a model that is refused (set-up wrong, limits of the report exceeded, further from the robot file than 50 mm or 5 deg in
-    /// its tool, a link or a joint's zero), and on commands and files that are refused; what is written says so
+    /// Largest distance of the model's tool, or of a link or a joint's zero in mm, from the robot file's: a model beyond is refused
+    #[arg(long, value_name = "MM", default_value_t = 50.0)]
+    max_shift: f64,
+    /// Largest turn of the model's tool, of a link or of a joint's zero from the robot file's, deg
+    #[arg(long, value_name = "DEG", default_value_t = 5.0)]
+    max_tilt: f64,
+    /// Insists on a model that is refused (set-up wrong, limits of the report exceeded, further from the robot file than --max-shift or
+    /// --max-tilt), and on commands and files that are refused; what is written says so
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
@@ -48,6 +54,14 @@ impl ModelArguments {
 
     /// Loads the model and says what is to be known of it; runs the pipeline's stages that are not done.
     pub fn load(&self, purpose: Purpose, command_line: &[OsString]) -> Result<IdentifiedModel> {
+        let wrong = [("--max-shift", self.max_shift), ("--max-tilt", self.max_tilt)]
+            .into_iter()
+            .filter(|(_, given)| !(given.is_finite() && *given > 0.0))
+            .map(|(option, given)| Fault::new(option, format!("expected a number above 0, found {given}")));
+        let wrong: Vec<Fault> = wrong.collect();
+        if !wrong.is_empty() {
+            return Err(Error::Spec(wrong));
+        }
         let identified = self.identified(purpose, command_line)?;
         for warning in &identified.warnings {
             let _ = writeln!(std::io::stderr(), "warning: {warning}");
@@ -57,7 +71,8 @@ impl ModelArguments {
 
     /// A model that no commands are to be made of is refused, or insisted on.
     fn judged(&self, mut identified: IdentifiedModel) -> Result<IdentifiedModel> {
-        identified.refusals.extend(Gate::default().beyond(&identified.model));
+        let limits = GateLimits { shift: self.max_shift * 1e-3, tilt: self.max_tilt.to_radians(), ..GateLimits::default() };
+        identified.refusals.extend(Gate { limits, ..Gate::default() }.beyond(&identified.model));
         if identified.refusals.is_empty() {
             return Ok(identified);
         }
@@ -91,10 +106,13 @@ impl ModelArguments {
             return Ok(identified);
         }
         let plan = self.means.plan(&self.model)?;
-        let steps = steps_of(&plan)?;
+        // A report with limits says whether the model is accepted.
+        let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
         let task = CommandTask { purpose, selection: Selection::default(), quiet: self.quiet };
-        let outcome = self.means.run(&plan.needed_for_all(&steps), &store, task, command_line)?;
-        IdentifiedModel::of_run(&store, &outcome.manifest, step)
+        let outcome = self.means.run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
+        let mut identified = IdentifiedModel::of_run(&store, &outcome.manifest, step)?;
+        identified.refusals.extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());
+        Ok(identified)
     }
 
     /// The id of a run by its name.

@@ -15,7 +15,8 @@ use std::path::PathBuf;
 /// that position data cannot tell do not count. Beside the result stand 200 random sets of as many poses, and a recorded one.
 ///
 /// SELF-COLLISION IS NOT CHECKED, nor collision with the cell: drive the poses slowly first. The way between them is short but
-/// not planned. A direction +1 means: the joint's last move goes upwards.
+/// not planned. A direction +1 means: the joint's last move goes upwards. Poses of a run (--run) are in the controller's counting of the
+/// joints, those of a robot file in the file's.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct PosesArguments {
@@ -44,7 +45,7 @@ pub(super) struct PosesArguments {
     /// the first with a rival], and the rival, as `link_compliance@link 2` [default: its closest rival]
     #[arg(long, num_args = 0..=2, value_names = ["EFFECT", "RIVAL"])]
     separate: Option<Vec<String>>,
-    /// Joint ranges instead of the robot file's, deg (mm for a prismatic joint)
+    /// Joint ranges instead of the robot file's, in its counting, deg (mm for a prismatic joint)
     #[arg(long, value_name = "MIN:MAX,..", allow_hyphen_values = true, value_parser = ranges)]
     limits: Option<Ranges>,
     /// Part of each joint's travel left free at either end for the move of approach, percent

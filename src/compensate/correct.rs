@@ -1,8 +1,8 @@
 //! Targets in, commands out: what precedes goes one after another, the solving in parallel, the order stays.
 
 use super::{
-    Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark, ToolGoal,
-    Uncertainty, beyond_limits, inverse, least_change, one_step,
+    Chain, Circumstance, CommandSolution, CorrectedCommand, Coverage, Gate, IdentifiedArm, Nominal, Reach, Remark, StatedPosture,
+    ToolGoal, Uncertainty, beyond_limits, inverse, least_change, one_step, posture::inverse_in,
 };
 use crate::effect::LONG_AFTER;
 use crate::error::counted;
@@ -29,6 +29,8 @@ pub struct CommandTarget {
     pub point: Option<Vector3<f64>>,
     /// Orientation of the tool, base frame; none where the target is a point.
     pub rotation: Option<Matrix3<f64>>,
+    /// In which posture a Cartesian target is to be reached, where it says.
+    pub posture: Option<StatedPosture>,
     /// kg, where the target says.
     pub payload: Option<f64>,
     /// C, where the target says.
@@ -147,6 +149,8 @@ struct Job {
     /// None: the point that the nominal robot reaches at `home`.
     wanted: Option<ToolGoal>,
     home: Vec<f64>,
+    /// The posture that is stated leads nowhere.
+    other_posture: bool,
     circumstance: Circumstance,
 }
 
@@ -197,6 +201,7 @@ impl<'a> Corrector<'a> {
         let n = robot.joints();
         let convention = &self.manner.convention;
         let of_robot = |q: Vec<f64>| changed(q, |q| convention.to_robot(q));
+        let mut other_posture = false;
         let (wanted, home) = match (target.q.map(of_robot), target.point) {
             (Some(q), point) if !(self.manner.cartesian && point.is_some()) => (None, q),
             (q, point) => {
@@ -204,8 +209,11 @@ impl<'a> Corrector<'a> {
                 let oriented = target.rotation.is_some();
                 let pose = Pose::new(target.rotation.unwrap_or_else(Matrix3::identity), point.unwrap_or_else(Vector3::zeros));
                 let wanted = ToolGoal { pose, oriented };
-                let home = inverse(robot, &wanted, &seed.unwrap_or_else(|| vec![0.0; n]));
-                (Some(wanted), home)
+                let seed = seed.unwrap_or_else(|| vec![0.0; n]);
+                let stated = target.posture.as_ref();
+                let stated = stated.map(|posture| inverse_in(robot, convention, &wanted, &seed, posture));
+                other_posture = matches!(stated, Some(None));
+                (Some(wanted), stated.flatten().unwrap_or_else(|| inverse(robot, &wanted, &seed)))
             }
         };
         if let Some(last) = &self.last {
@@ -225,7 +233,7 @@ impl<'a> Corrector<'a> {
             direction: stated.unwrap_or_else(|| self.direction.clone()),
             current: target.current,
         };
-        Job { wanted, home, circumstance }
+        Job { wanted, home, other_posture, circumstance }
     }
 
     fn solve(&self, reach: &mut Reach, nominal: &mut Nominal, job: &Job) -> CorrectedCommand {
@@ -243,8 +251,10 @@ impl<'a> Corrector<'a> {
         let mut remarks = Vec::new();
         let off = if self.manner.one_step { left_by_nominal(nominal, job) } else { found.residual };
         let faces = !turned || found.turn <= TURNED_AWAY;
-        let reached = off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
-        if !reached {
+        let reached = !job.other_posture && off < REACHED && faces && found.q.iter().all(|q| q.is_finite());
+        if job.other_posture {
+            remarks.push(Remark::OtherPosture);
+        } else if !reached {
             remarks.push(Remark::NotReached(faces.then_some(found.residual)));
         }
         if turned {

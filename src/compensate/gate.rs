@@ -101,12 +101,14 @@ impl Gate {
     }
 
     fn too_far(&self, what: &str, shift: f64, tilt: f64) -> Option<String> {
-        let far = |by: f64, most: f64, unit: &str| {
-            (by.is_nan() || by > most)
-                .then(|| format!("{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed", round(most)))
+        let far = |by: f64, most: f64, unit: &str, option: &str| {
+            let said =
+                || format!("{what} is {by:.1} {unit} from the robot file's, at most {} {unit} allowed ({option})", round(most));
+            (by.is_nan() || by > most).then(said)
         };
         let GateLimits { shift: most, tilt: most_tilt, .. } = self.limits;
-        far(shift * 1e3, most * 1e3, "mm").or_else(|| far(tilt.to_degrees(), most_tilt.to_degrees(), "deg"))
+        far(shift * 1e3, most * 1e3, "mm", "--max-shift")
+            .or_else(|| far(tilt.to_degrees(), most_tilt.to_degrees(), "deg", "--max-tilt"))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::robot::RobotModel;
 use std::f64::consts::{PI, TAU};
 
 /// m or rad: what counts as reached before the identified model takes over.
-const REACHED: f64 = 1e-8;
+pub(super) const REACHED: f64 = 1e-8;
 
 /// Postures that are tried where the given one leads nowhere.
 const POSTURES: u32 = 60;
@@ -15,7 +15,7 @@ const POSTURES: u32 = 60;
 pub fn inverse(robot: &RobotModel, wanted: &ToolGoal, from: &[f64]) -> Vec<f64> {
     let mut best: Option<(f64, Vec<f64>)> = None;
     for number in 0..=POSTURES {
-        let start = if number == 0 { from.to_vec() } else { posture(robot, number) };
+        let start = if number == 0 { from.to_vec() } else { spread(robot, number) };
         let found = least_change(&mut Nominal::new(robot), wanted, &start, &start);
         let q: Vec<f64> = found.q.iter().enumerate().map(|(joint, q)| into_limits(robot, joint, *q)).collect();
         let outside: f64 = q.iter().enumerate().map(|(joint, q)| excess(robot, joint, *q)).sum();
@@ -37,7 +37,7 @@ fn limits(robot: &RobotModel, joint: usize) -> [f64; 2] {
 }
 
 /// Halton's sequence over the limits: the same postures everywhere.
-fn posture(robot: &RobotModel, number: u32) -> Vec<f64> {
+pub(super) fn spread(robot: &RobotModel, number: u32) -> Vec<f64> {
     const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
     let of = |joint: usize| {
         let base = PRIMES[joint % PRIMES.len()];
@@ -54,7 +54,7 @@ fn posture(robot: &RobotModel, number: u32) -> Vec<f64> {
 }
 
 /// A revolute joint turned by whole turns into its limits, where they are left.
-fn into_limits(robot: &RobotModel, joint: usize, q: f64) -> f64 {
+pub(super) fn into_limits(robot: &RobotModel, joint: usize, q: f64) -> f64 {
     let [lower, upper] = limits(robot, joint);
     if !robot.is_revolute(joint) || (lower..=upper).contains(&q) {
         return q;
@@ -63,6 +63,6 @@ fn into_limits(robot: &RobotModel, joint: usize, q: f64) -> f64 {
     q - TAU * ((q - middle) / TAU).round()
 }
 
-fn excess(robot: &RobotModel, joint: usize, q: f64) -> f64 {
+pub(super) fn excess(robot: &RobotModel, joint: usize, q: f64) -> f64 {
     robot.description().joints[joint].limits.map_or(0.0, |[lower, upper]| (lower - q).max(q - upper).max(0.0))
 }

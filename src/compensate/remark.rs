@@ -8,6 +8,8 @@ use std::fmt;
 pub enum Remark {
     /// How far the point stays away, m, where the orientation is not all that fails.
     NotReached(Option<f64>),
+    /// The nominal robot has no joints there in the posture that is stated.
+    OtherPosture,
     /// By how much the orientation is off, rad.
     Turned(f64),
     /// Joints, from 0.
@@ -31,6 +33,7 @@ impl fmt::Display for Remark {
         match self {
             Self::NotReached(Some(off)) => write!(f, "not reached, {:.3} mm off", off * 1e3),
             Self::NotReached(None) => f.write_str("not reached"),
+            Self::OtherPosture => f.write_str("not reached in the posture that is stated"),
             Self::Turned(turn) => write!(f, "orientation off by {:.4} deg", turn.to_degrees()),
             Self::BeyondLimits(joints) => write!(f, "joint {} beyond its limits", numbered(joints)),
             Self::BeyondMeasured(what) => what.fmt(f),

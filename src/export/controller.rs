@@ -1,11 +1,13 @@
 //! What most controllers let one enter, as a list: zeros, ratios, couplings, the tool.
 
+use super::deviation::{DeviationEntry, JointDeviation};
 use super::{Export, Format};
-use crate::effect::Place;
 use crate::error::Result;
-use crate::robot::JointConvention;
+use crate::estimate::Covariance;
+use crate::identified::IdentifiedModel;
+use crate::robot::{JointConvention, RobotModel};
 use crate::units::Unit;
-use nalgebra::DMatrix;
+use std::collections::BTreeSet;
 
 pub(super) struct Controller;
 
@@ -24,11 +26,7 @@ impl Format for Controller {
             "# true position = factor * commanded + zero (+ coupling * the other joint); sigma is one standard deviation\n",
         );
         text.push_str("quantity,where,value,unit,sigma,status\n");
-        let convention = export.identified.convention.as_ref().filter(|convention| !convention.is_of_the_robot_file());
-        match convention {
-            None => text.extend(as_identified(export)),
-            Some(convention) => text.extend(as_counted(export, convention)),
-        }
+        text.extend(lines(&export.identified));
         for (axis, (now, nominal)) in ["x", "y", "z"].iter().zip(export.corrected.tool.iter().zip(&export.identified.robot.tool))
         {
             text.push_str(&format!("tool {axis} (zero pose; base frame),tool,{:.6},mm,,was {:.6}\n", now * 1e3, nominal * 1e3));
@@ -37,132 +35,86 @@ impl Format for Controller {
     }
 }
 
-/// The parameters themselves: the controller counts as the robot file does.
-fn as_identified(export: &Export) -> Vec<String> {
-    let rows = export.identified.parameters.0.iter().filter_map(|row| {
-        let quantity = match row.effect.as_str() {
-            "joint_offset" => "zero",
-            "reduction_ratio" => "factor - 1",
-            "coupling_ratio" => "coupling",
-            _ => return None,
-        };
-        // People enter degrees.
-        let (scale, unit) = if row.unit == "rad" { (180.0 / std::f64::consts::PI, "deg") } else { (1.0, row.unit.as_str()) };
-        let sigma = row.sigma.map(|sigma| format!("{:.3e}", sigma * scale)).unwrap_or_default();
-        Some(format!("{quantity},{},{:.9},{unit},{sigma},{}\n", row.place, row.value * scale, row.status))
+/// A parameter, and what the numbers of the list are by it. SI.
+struct Share<'a> {
+    /// In the stack.
+    position: Option<usize>,
+    status: &'a str,
+    value: f64,
+    sigma: Option<f64>,
+    /// By a unit of the parameter.
+    by: JointDeviation,
+}
+
+fn shares<'a>(identified: &'a IdentifiedModel, convention: &JointConvention) -> Vec<Share<'a>> {
+    let specs = identified.model.stack.specs();
+    let rows = identified.parameters.0.iter().filter_map(|row| {
+        let entry = DeviationEntry::of(&row.effect, &row.place)?;
+        let unit = Unit::parse(&row.unit).unwrap_or(Unit::One);
+        Some(Share {
+            position: specs.iter().position(|spec| spec.name == row.name),
+            status: &row.status,
+            value: unit.to_si(row.value),
+            sigma: row.sigma.map(|sigma| unit.to_si(sigma)),
+            by: JointDeviation::unit(entry, convention.zero().len()).counted(convention),
+        })
     });
     rows.collect()
 }
 
-/// Joint positions as an affine map of the commanded ones, less these: q_true - q = slope q + zero, SI.
-#[derive(Clone)]
-struct Deviation {
-    slope: DMatrix<f64>,
-    zero: Vec<f64>,
-}
-
-impl Deviation {
-    fn none(joints: usize) -> Self {
-        Self { slope: DMatrix::zeros(joints, joints), zero: vec![0.0; joints] }
-    }
-
-    /// Adds `value` (SI) of a parameter; false where it belongs to no such map.
-    fn add(&mut self, effect: &str, place: &str, value: f64) -> bool {
-        match (effect, place.parse()) {
-            ("joint_offset", Ok(Place::Joint(joint))) => self.zero[joint] += value,
-            ("reduction_ratio", Ok(Place::Joint(joint))) => self.slope[(joint, joint)] += value,
-            ("coupling_ratio", Ok(Place::Coupled(by, moved))) => self.slope[(moved, by)] += value,
-            _ => return false,
-        }
-        true
-    }
-
-    /// The same map in the controller's numbers c: with q = A (c - z), c_true - c = A^-1 slope A (c - z) + A^-1 zero.
-    fn counted(&self, convention: &JointConvention) -> Self {
-        let n = self.zero.len();
-        let zero = convention.zero();
-        let linear = |there: bool| {
-            let mut out = DMatrix::zeros(n, n);
-            for joint in 0..n {
-                let mut unit: Vec<f64> = zero.to_vec();
-                if there {
-                    unit[joint] += 1.0;
-                    convention.to_robot(&mut unit);
-                } else {
-                    unit = vec![0.0; n];
-                    unit[joint] = 1.0;
-                    convention.to_controller(&mut unit);
-                    unit.iter_mut().zip(zero).for_each(|(value, zero)| *value -= zero);
-                }
-                out.column_mut(joint).copy_from_slice(&unit);
-            }
-            out
-        };
-        let back = linear(false);
-        let slope = &back * &self.slope * linear(true);
-        let shown = nalgebra::DVector::from_column_slice(zero);
-        let own = nalgebra::DVector::from_column_slice(&self.zero);
-        let zero = back * own - &slope * shown;
-        Self { slope, zero: zero.as_slice().to_vec() }
-    }
-
-    fn numbers(&self) -> Vec<f64> {
-        self.zero.iter().chain(self.slope.iter()).copied().collect()
-    }
-}
-
-/// The same map in the controller's numbers: a number may then be of several parameters.
-fn as_counted(export: &Export, convention: &JointConvention) -> Vec<String> {
-    let identified = &export.identified;
+/// The numbers that the model has parameters for; as a controller counts, one may be of several parameters.
+fn lines(identified: &IdentifiedModel) -> Vec<String> {
     let robot = &identified.model.robot;
-    let n = robot.joints();
-    let mut whole = Deviation::none(n);
-    // Each number by a unit of each parameter, to carry the uncertainty.
-    let mut by_parameter: Vec<(usize, &str, Option<f64>, Vec<f64>)> = Vec::new();
-    let specs = identified.model.stack.specs();
-    for row in &identified.parameters.0 {
-        let unit = Unit::parse(&row.unit).unwrap_or(Unit::One);
-        let mut one = Deviation::none(n);
-        if !one.add(&row.effect, &row.place, 1.0) {
-            continue;
+    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints()));
+    let shares = shares(identified, &convention);
+    let line = |entry: DeviationEntry| {
+        let own: Vec<(&Share, f64)> =
+            shares.iter().filter(|share| share.by.holds(entry)).map(|share| (share, share.by.at(entry))).collect();
+        if own.is_empty() {
+            return None;
         }
-        whole.add(&row.effect, &row.place, unit.to_si(row.value));
-        let at = specs.iter().position(|spec| spec.name == row.name).unwrap_or(usize::MAX);
-        by_parameter.push((at, &row.status, row.sigma.map(|sigma| unit.to_si(sigma)), one.counted(convention).numbers()));
-    }
-    let whole = whole.counted(convention);
-    let sigma_of = |number: usize| -> Option<f64> {
-        let moved = by_parameter.iter().filter(|(.., by)| by[number] != 0.0).collect::<Vec<_>>();
-        if let [(_, _, sigma, by)] = moved[..] {
-            return sigma.map(|sigma| sigma * by[number].abs());
+        let (quantity, scale, unit, decimals) = shown(entry, robot);
+        let value = own.iter().map(|(share, by)| share.value * by).sum::<f64>() * scale;
+        let sigma = sigma(&own, identified.covariance.as_ref());
+        let sigma = sigma.map(|sigma| format!("{:.3e}", sigma * scale)).unwrap_or_default();
+        let statuses: BTreeSet<&str> = own.iter().map(|(share, _)| share.status).collect();
+        let status = statuses.into_iter().collect::<Vec<_>>().join(" and ");
+        Some(format!("{quantity},{},{value:.decimals$},{unit},{sigma},{status}\n", entry.place()))
+    };
+    DeviationEntry::all(robot.joints()).filter_map(line).collect()
+}
+
+/// What a number is called, what it is multiplied with from SI, its unit, and the decimals that keep a joint within 1e-9 rad.
+fn shown(entry: DeviationEntry, robot: &RobotModel) -> (&'static str, f64, String, usize) {
+    // People enter degrees.
+    let unit = |joint: usize| if robot.is_revolute(joint) { Unit::Degree } else { Unit::Millimetre };
+    match entry {
+        DeviationEntry::Zero(joint) => ("zero", unit(joint).from_si(1.0), unit(joint).to_string(), 9),
+        DeviationEntry::Factor(_) => ("factor - 1", 1.0, "1".into(), 12),
+        DeviationEntry::Coupling { by, moved } if unit(by) == unit(moved) => ("coupling", 1.0, "1".into(), 12),
+        DeviationEntry::Coupling { by, moved } => {
+            let scale = unit(moved).from_si(1.0) / unit(by).from_si(1.0);
+            ("coupling", scale, format!("{}/{}", unit(moved), unit(by)), 12)
         }
-        let covariance = identified.covariance.as_ref()?;
-        let by = |at: usize| moved.iter().find(|(own, ..)| *own == at).map_or(0.0, |(.., by)| by[number]);
-        let twice = |(a, b, value, _): (usize, usize, f64, f64)| by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 };
-        Some(covariance.pairs().map(twice).sum::<f64>().sqrt())
-    };
-    let status = |number: usize| {
-        let mut all: Vec<&str> =
-            by_parameter.iter().filter(|(.., by)| by[number] != 0.0).map(|(_, status, ..)| *status).collect();
-        all.dedup();
-        all.join(" and ")
-    };
-    let angle = |joint: usize| if robot.is_revolute(joint) { (Unit::Degree, "deg") } else { (Unit::Millimetre, "mm") };
-    let line = |quantity: &str, place: String, number: usize, value: f64, unit: (Unit, &str)| {
-        let sigma = sigma_of(number).map(|sigma| format!("{:.3e}", unit.0.from_si(sigma))).unwrap_or_default();
-        format!("{quantity},{place},{:.9},{},{sigma},{}\n", unit.0.from_si(value), unit.1, status(number))
-    };
-    let mut lines = Vec::new();
-    let told = |number: usize| by_parameter.iter().any(|(.., by)| by[number] != 0.0);
-    for joint in (0..n).filter(|joint| told(*joint)) {
-        lines.push(line("zero", Place::Joint(joint).to_string(), joint, whole.zero[joint], angle(joint)));
     }
-    let entries = (0..n).flat_map(|by| (0..n).map(move |moved| (moved, by)));
-    for (moved, by) in entries.filter(|(moved, by)| told(n + by * n + moved)) {
-        let number = n + by * n + moved;
-        let (quantity, place) =
-            if moved == by { ("factor - 1", Place::Joint(by)) } else { ("coupling", Place::Coupled(by, moved)) };
-        lines.push(line(quantity, place.to_string(), number, whole.slope[(moved, by)], (Unit::One, "1")));
+}
+
+/// Standard deviation of a sum of parameters, each times a factor: of those that were estimated. None where none was, and of several
+/// where their covariance is not known.
+fn sigma(own: &[(&Share, f64)], covariance: Option<&Covariance>) -> Option<f64> {
+    let estimated: Vec<(&Share, f64, f64)> =
+        own.iter().filter_map(|(share, by)| share.sigma.map(|sigma| (*share, *by, sigma))).collect();
+    if let [(_, by, sigma)] = estimated[..] {
+        return Some(sigma * by.abs());
     }
-    lines
+    let covariance = covariance?;
+    let known = |share: &Share| share.position.is_some_and(|position| covariance.parameters().contains(&position));
+    if estimated.is_empty() || !estimated.iter().all(|(share, ..)| known(share)) {
+        return None;
+    }
+    let by = |position: usize| -> f64 {
+        estimated.iter().filter(|(share, ..)| share.position == Some(position)).map(|(_, by, _)| by).sum()
+    };
+    let part = |(a, b, value, _): (usize, usize, f64, f64)| by(a) * by(b) * value * if a == b { 1.0 } else { 2.0 };
+    Some(covariance.pairs().map(part).sum::<f64>().sqrt())
 }

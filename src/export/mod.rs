@@ -1,6 +1,7 @@
 //! The identified model for other programs, one file per format. A format carries rigid geometry or less: what it leaves out stands in it.
 
 mod controller;
+mod deviation;
 mod dh;
 mod json;
 mod mjcf;

@@ -1,11 +1,14 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
+mod convention;
 mod robot_file;
 mod scatter;
 mod standing;
 mod written;
 
+pub use convention::{convention_of, counted_otherwise};
 pub use robot_file::robot_file;
+use standing::unexplained_of;
 pub use standing::{standing_of, wrong_setup_of};
 
 use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
@@ -17,12 +20,11 @@ use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
 use crate::robot::description::RobotDescription;
 use crate::robot::{JointConvention, Measurements, RobotModel};
-use crate::stage::ingest::Ingest;
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;
 use crate::store::{Store, TableRef};
 use crate::table::{
-    Corrected, CovarianceTable, JointConventions, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file,
+    Corrected, CovarianceTable, Document, Loose, Network, Parameters, Recording, Robot, Standing, Table, from_file,
 };
 use std::path::{Path, PathBuf};
 use written::written;
@@ -50,6 +52,8 @@ pub struct IdentifiedModel {
     pub convention: Option<JointConvention>,
     /// Where the parameters come from, e.g. `run 01J..., stage geometry`.
     pub origin: String,
+    /// What the last diagnosis left without a cause, if anything.
+    pub unexplained: Option<String>,
     /// What the person must know of it.
     pub warnings: Vec<String>,
     /// What the stage that identified it, or learned on top, warned of when it ran.
@@ -79,6 +83,17 @@ pub fn steps_of(plan: &Plan) -> Result<Vec<usize>> {
         return Err(Error::spec(plan.file.display().to_string(), "identifies nothing; put a stage `identify` after the split"));
     }
     Ok(steps)
+}
+
+/// The stages of a plan whose reports judge by limits that the user set.
+pub fn judges_of(plan: &Plan) -> Vec<usize> {
+    let limited = |at: &usize| {
+        let settings = plan.stages[*at].stage.settings();
+        let limits = settings.get("limits").and_then(|limits| limits.as_object());
+        limits.is_some_and(|limits| limits.values().any(|limit| !limit.is_null()))
+    };
+    let report = |at: &usize| plan.stages[*at].outputs.iter().any(|port| port.kind == Document::KIND);
+    (0..plan.stages.len()).filter(report).filter(limited).collect()
 }
 
 impl IdentifiedModel {
@@ -111,17 +126,7 @@ impl IdentifiedModel {
         });
         let network = learned.and_then(|stage| stage.outputs.iter().find(|output| output.kind == Network::KIND));
         let convention =
-            last(JointConventions::KIND).map(|output| JointConventions::from_frame(&load(&output.table)?)?.to_convention());
-        let ingested = manifest.stages.iter().any(|stage| stage.uses == Ingest::NAME);
-        if ingested && convention.is_none() {
-            let message = format!(
-                "the run does not say how the controller counts its joints: an earlier calib made it. `calib run {}` writes it anew",
-                manifest.pipeline.file
-            );
-            return Err(Error::data(run, message));
-        }
-        // The twin logs its joints as its robot file counts them.
-        let convention = convention.transpose()?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
+            convention_of(manifest, store)?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
         let recording = last(Recording::KIND).map(|output| Recording::from_frame(&load(&output.table)?)).transpose()?;
         let prismatic: Vec<bool> =
             (0..robot.joints.len()).map(|joint| !RobotModel::new(robot.clone()).is_revolute(joint)).collect();
@@ -133,7 +138,8 @@ impl IdentifiedModel {
         let origin = format!("run {run}, stage {}", stage.id);
         let read = manifest.stages.iter().flat_map(|stage| &stage.files).map(|file| &file.path);
         let sources = read.chain(std::iter::once(&manifest.pipeline.file)).map(PathBuf::from).collect();
-        let warnings = stands.iter().flat_map(Standing::warnings).collect();
+        let unexplained = unexplained_of(manifest, store)?;
+        let warnings = stands.iter().flat_map(Standing::warnings).chain(unexplained.clone()).collect();
         let told = manifest.stages.iter().flat_map(|stage| &stage.warnings).find(|line| line.starts_with(WRONG_SETUP)).cloned();
         let refusals = wrong.or(told).into_iter().collect();
         let learned = learned.filter(|_| correction.is_some());
@@ -144,7 +150,8 @@ impl IdentifiedModel {
         let covariance = covariance.and_then(|table| table.of_model(&own.model));
         let scatter = scatter::of(stage, learned, load)?;
         let convention = Some(convention);
-        Ok(Self { correction, covariance, scatter, data, convention, warnings, stage_warnings, refusals, sources, ..own })
+        let known = Self { correction, covariance, scatter, data, convention, ..own };
+        Ok(Self { unexplained, warnings, stage_warnings, refusals, sources, ..known })
     }
 
     /// The model of a table of parameters; robots come as a table `robot`, in the practice layout, or as calib's YAML.
@@ -181,6 +188,7 @@ impl IdentifiedModel {
             data: None,
             convention: None,
             origin,
+            unexplained: None,
             warnings: Vec::new(),
             stage_warnings: Vec::new(),
             refusals: Vec::new(),

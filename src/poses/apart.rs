@@ -9,9 +9,10 @@ use crate::diagnose::{DiagnosedModel, contest};
 use crate::effect::{CAUSES, Effect, Form, JointTable, Load, Place, cause};
 use crate::error::{Error, Result, nearest};
 use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, tell};
+use crate::identified::convention_of;
 use crate::pipeline::StageReport;
 use crate::robot::description::RobotDescription;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::store::{Store, TableRef};
 use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
 use nalgebra::Vector3;
@@ -32,6 +33,7 @@ pub struct Apart<'a> {
     form: Option<Form>,
     robot: RobotDescription,
     ranges: Vec<[f64; 2]>,
+    convention: JointConvention,
     rows: usize,
     /// mm.
     sigma: f64,
@@ -62,6 +64,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
         return Err(Error::spec(place, message));
     }
     let robot = read::<Robot>(store, &stage)?.to_description()?;
+    let convention = convention_of(&manifest, store)?.unwrap_or_else(|| JointConvention::of_the_robot_file(robot.joints.len()));
     let parameters: Parameters = written(store, &stage)?;
     let model = parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque)?;
     let recording: Recording = read(store, &stage)?;
@@ -109,6 +112,7 @@ pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: 
         form: tried,
         robot,
         ranges: site.ranges,
+        convention,
         rows: rows.len(),
         sigma: sigma * 1e3,
         circumstances,

@@ -1,9 +1,9 @@
-//! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them, deg and mm.
+//! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them at the controller, deg and mm, in its counting.
 
 use crate::error::{Error, Result};
 use crate::raw::ending;
-use crate::robot::Measurements;
 use crate::robot::description::{JointKind, RobotDescription};
+use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::units::Unit;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
 use parquet::arrow::ArrowWriter;
@@ -20,6 +20,14 @@ pub struct Drive<'a> {
     pub poses: &'a Measurements,
     /// +1 or -1, row-major.
     pub direction: &'a [f64],
+    /// How the controller that drives them counts.
+    pub convention: &'a JointConvention,
+}
+
+/// In which counting joints stand, in the words of a JSON document.
+pub(super) fn counting(convention: &JointConvention, robot: &RobotDescription) -> String {
+    let difference = convention.difference(&RobotModel::new(robot.clone()));
+    difference.map_or_else(|| "robot file".into(), |difference| format!("controller: {difference}"))
 }
 
 /// A column: its name, its values, and the decimals that people read (none: whole numbers).
@@ -33,7 +41,7 @@ struct DriveColumn {
 const JOINT_DECIMALS: usize = 4;
 
 fn columns(drive: &Drive) -> Vec<DriveColumn> {
-    let Drive { robot, ranges, poses, direction } = *drive;
+    let Drive { robot, poses, direction, convention, .. } = *drive;
     let n = poses.joints;
     let rows = 0..poses.rows();
     let column = |name: String, decimals, value: &dyn Fn(usize) -> f64| DriveColumn {
@@ -41,28 +49,52 @@ fn columns(drive: &Drive) -> Vec<DriveColumn> {
         values: rows.clone().map(value).collect(),
         decimals,
     };
+    let shown: Vec<Vec<f64>> = rows.clone().map(|row| shown(drive, poses.q(row))).collect();
     let mut out = vec![column("sequence".into(), 0, &|row| (row + 1) as f64)];
-    for (j, (joint, range)) in robot.joints.iter().zip(ranges).enumerate() {
-        let (ending, unit) = match joint.kind {
-            JointKind::Revolute => ("deg", Unit::Degree),
-            JointKind::Prismatic => ("mm", Unit::Millimetre),
-        };
-        let middle = 0.5 * (range[0] + range[1]);
-        // Rounded towards the middle, so that what is written keeps within the limits.
-        out.push(column(format!("q{}_{ending}", j + 1), JOINT_DECIMALS, &|row| {
-            let (value, scale) = (poses.q[row * n + j], 10f64.powi(JOINT_DECIMALS as i32));
-            let scaled = unit.from_si(value) * scale;
-            (if value > middle { scaled.floor() } else { scaled.ceil() }) / scale
-        }));
+    for (j, joint) in robot.joints.iter().enumerate() {
+        let ending = if joint.kind == JointKind::Revolute { "deg" } else { "mm" };
+        out.push(column(format!("q{}_{ending}", j + 1), JOINT_DECIMALS, &|row| shown[row][j]));
     }
     out.push(column("payload_kg".into(), 3, &|row| poses.payload[row]));
     for j in 0..n {
-        out.push(column(format!("dir{}", j + 1), 0, &|row| direction[row * n + j]));
+        out.push(column(format!("dir{}", j + 1), 0, &|row| direction[row * n + j] * convention.sign()[j]));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
         out.push(column(name.into(), 3, &|row| Unit::Millimetre.from_si(poses.position[row][axis])));
     }
     out
+}
+
+/// Joints in the controller's numbers, deg or mm, rounded so that what is written keeps within the limits of every joint.
+fn shown(drive: &Drive, q: &[f64]) -> Vec<f64> {
+    let Drive { robot, ranges, convention, .. } = *drive;
+    let scale = 10f64.powi(JOINT_DECIMALS as i32);
+    let unit = |j: usize| if robot.joints[j].kind == JointKind::Revolute { Unit::Degree } else { Unit::Millimetre };
+    let exact = |change: &dyn Fn(&mut [f64]), values: &[f64]| {
+        let mut values = values.to_vec();
+        change(&mut values);
+        values
+    };
+    // In steps of the last decimal.
+    let counted = exact(&|q| convention.to_controller(q), q);
+    let mut steps: Vec<f64> = Vec::new();
+    for (j, [low, high]) in ranges.iter().enumerate() {
+        // Towards the middle of the joint's range.
+        let down = (q[j] > 0.5 * (low + high)) == (convention.sign()[j] > 0.0);
+        let value = unit(j).from_si(counted[j]) * scale;
+        steps.push(if down { value.floor() } else { value.ceil() });
+    }
+    // A joint whose number holds a part of another one's may still be moved out by the rounding of that one.
+    for _ in ranges {
+        let numbers: Vec<f64> = steps.iter().enumerate().map(|(j, steps)| unit(j).to_si(steps / scale)).collect();
+        let driven = exact(&|q| convention.to_robot(q), &numbers);
+        for (j, [low, high]) in ranges.iter().enumerate() {
+            let out = (driven[j] - high).max(0.0) - (low - driven[j]).max(0.0);
+            let back = (unit(j).from_si(out.abs()) * scale).ceil() * out.signum() * convention.sign()[j];
+            steps[j] -= if out == 0.0 { 0.0 } else { back };
+        }
+    }
+    steps.iter().map(|steps| steps / scale).collect()
 }
 
 /// What is wrong with the ending, if anything.

@@ -8,7 +8,7 @@ use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
 use crate::identified::robot_file;
 use crate::robot::description::RobotDescription;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -19,6 +19,8 @@ pub struct PoseProposal<'a> {
     pub(super) request: &'a PoseRequest,
     pub(super) robot: RobotDescription,
     pub(super) ranges: Vec<[f64; 2]>,
+    /// A robot file knows no other counting than its own.
+    pub(super) convention: JointConvention,
     pub(super) effects: Vec<&'static str>,
     /// Effects left out, with the reason.
     pub(super) left_out: Vec<(&'static str, String)>,
@@ -76,10 +78,12 @@ pub fn proposal<'a>(
     let warnings = recording.and_then(|(_, warning)| warning).into_iter().collect();
     let parameters = model().stack.specs().iter().map(|spec| (spec.name.clone(), spec.unit)).collect();
     let ranges = site.ranges;
+    let convention = JointConvention::of_the_robot_file(imported.joints.len());
     Ok(PoseProposal {
         request,
         robot: imported,
         ranges,
+        convention,
         effects,
         left_out,
         parameters,

@@ -9,7 +9,7 @@ use serde_json::json;
 impl PoseAnswer for PoseProposal<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let Proposal { poses, direction, .. } = &self.proposal;
-        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction })
+        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses, direction, convention: &self.convention })
     }
 
     fn text(&self) -> String {
@@ -164,6 +164,7 @@ fn document(work: &PoseProposal) -> serde_json::Value {
         "separation": separation.collect::<Vec<_>>(),
         "approach_visible_share": proposal.approach_seen,
         "self_collision_checked": false,
+        "counting": drive::counting(&work.convention, &work.robot),
         "out": work.request.out.as_ref().map(|out| out.to_string_lossy()),
         "poses": work.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
     })

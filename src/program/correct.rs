@@ -1,13 +1,11 @@
 //! A program read, corrected and written again, whole: targets that cannot be reached are refused, since a program has no place for a remark.
 
+use super::literal::JOINTS;
 use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
 use crate::compensate::Corrector;
 use crate::error::{Error, Fault, Result};
 use crate::robot::RobotModel;
 use crate::robot::description::RobotDescription;
-
-/// Joints that both languages have targets for.
-const JOINTS: usize = 6;
 
 /// Faults told of a program: more are of a file that is none.
 const MOST_FAULTS: usize = 500;

@@ -3,6 +3,9 @@
 use crate::robot::Bound;
 use std::ops::Range;
 
+/// Joints that both languages have targets for.
+pub(super) const JOINTS: usize = 6;
+
 /// What the numbers of a target mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetKind {
@@ -12,6 +15,18 @@ pub enum TargetKind {
     Frame,
     /// x, y, z (mm), q1..q4 (w, x, y, z).
     Quaternion,
+}
+
+/// What a Cartesian target says of the posture in which it is to be reached.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PostureStatement {
+    /// Nothing.
+    #[default]
+    Unstated,
+    /// RAPID: the quadrants of joints 1, 4 and 6.
+    Quadrants([i32; 3]),
+    /// KRL, T: bit i is set where joint i + 1 is below 0.
+    Turn(u32),
 }
 
 /// A target of a program.
@@ -25,6 +40,8 @@ pub struct Literal {
     pub spans: Vec<Range<usize>>,
     /// External axes, deg or mm; none where one is not connected.
     pub external: Vec<Option<f64>>,
+    /// In which posture.
+    pub posture: PostureStatement,
 }
 
 impl Literal {

@@ -15,15 +15,15 @@ pub fn stands_in(bytes: &[u8], language: Language) -> bool {
     })
 }
 
-/// A corrected program with its mark; `insisted` where a limit was overridden. `source`: the program as it was.
-pub fn written(program: &[u8], source: &[u8], language: Language, insisted: bool) -> Vec<u8> {
+/// A corrected program with its mark, which carries `remarks`, too. `source`: the program as it was.
+pub fn written(program: &[u8], source: &[u8], language: Language, remarks: &[&str]) -> Vec<u8> {
     let hash = blake3::hash(source).to_hex();
     let at = place(program, language);
     let ending = if program.windows(2).any(|two| two == b"\r\n") { "\r\n" } else { "\n" };
     // A head that no line ends.
     let before = if at > 0 && !program[..at].ends_with(b"\n") { ending } else { "" };
-    let how = if insisted { ", limits overridden by --force" } else { "" };
-    let comment = format!("{before}{} {MARK} from {}{how}{ending}", sign(language), &hash[..16]);
+    let remarks: String = remarks.iter().map(|remark| format!(", {remark}")).collect();
+    let comment = format!("{before}{} {MARK} from {}{remarks}{ending}", sign(language), &hash[..16]);
     [&program[..at], comment.as_bytes(), &program[at..]].concat()
 }
 

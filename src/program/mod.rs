@@ -16,7 +16,7 @@ mod token;
 
 pub use correct::{ProgramFile, corrected};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
-pub use literal::{Literal, TargetKind};
+pub use literal::{Literal, PostureStatement, TargetKind};
 pub use pose::solve;
 
 use std::ops::Range;
@@ -61,6 +61,9 @@ pub enum Frames {
 
 /// Brackets in brackets, at most: targets in arrays of three dimensions have six.
 const DEPTH: usize = 16;
+
+/// Said once a program.
+const STATUS: &str = "S is not checked: it needs the arm's geometry; targets are reached in the posture that T states";
 
 /// Something said of a place in a program; line and column count from 1, columns in bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,6 +122,8 @@ struct Gathered {
     faults: Vec<(usize, String)>,
     partial: Vec<(usize, String)>,
     frames: Vec<(usize, String)>,
+    /// Where a status (S) stands first.
+    status: Option<usize>,
 }
 
 /// What a language's reader finds declared under names: one for each literal.
@@ -171,6 +176,7 @@ impl<'p> Program<'p> {
             return Err(refusal);
         }
         found.literals.sort_by_key(|literal| literal.at());
+        found.warnings.extend(found.status.map(|at| (at, STATUS.into())));
         let frames = placed(bytes, found.frames);
         let mut warnings = placed(bytes, found.warnings);
         warnings.extend(frames.iter().cloned());

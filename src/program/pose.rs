@@ -3,8 +3,9 @@
 //! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
-use super::{Literal, SolvedLiteral, TargetKind};
-use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, turns};
+use super::literal::JOINTS;
+use super::{Literal, PostureStatement, SolvedLiteral, TargetKind};
+use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, StatedPosture, turns};
 use crate::robot::{JointConvention, RobotModel};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
@@ -12,11 +13,38 @@ use std::f64::consts::PI;
 /// Every literal corrected, in their order; an error says why there is no command.
 pub fn solve(literals: &[Literal], robot: &RobotModel, corrector: &mut Corrector) -> Vec<Result<SolvedLiteral, String>> {
     let answers = corrector.batch(literals.iter().map(target).collect());
-    let solved = |(literal, answer): (&Literal, &CorrectedCommand)| match &answer.q {
-        Some(q) => Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), remark: answer.remark() }),
+    let first = literals.iter().position(is_unstated);
+    let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| match &answer.q {
+        Some(q) => {
+            let own = (Some(k) == first).then(|| NEAREST.to_string());
+            let known = Some(answer.remark()).filter(|remark| !remark.is_empty());
+            let remark = known.into_iter().chain(own).collect::<Vec<_>>().join("; ");
+            Ok(SolvedLiteral { values: values(literal, robot, corrector.convention(), q), remark })
+        }
         None => Err(answer.remark()),
     };
-    literals.iter().zip(&answers).map(solved).collect()
+    literals.iter().zip(&answers).enumerate().map(solved).collect()
+}
+
+/// Once a program, at its first such target.
+const NEAREST: &str = "posture not stated: taken nearest to the target before";
+
+fn is_unstated(literal: &Literal) -> bool {
+    literal.kind != TargetKind::Joints && literal.posture == PostureStatement::Unstated
+}
+
+/// The posture that a target states; KRL's S is not read: it needs the arm's geometry.
+fn posture(literal: &Literal) -> Option<StatedPosture> {
+    match literal.posture {
+        PostureStatement::Unstated => None,
+        PostureStatement::Quadrants([one, four, six]) => {
+            Some(StatedPosture::of_quadrants(JOINTS, &[(0, one), (3, four), (5, six)]))
+        }
+        PostureStatement::Turn(turn) => {
+            let below: Vec<bool> = (0..JOINTS).map(|joint| turn >> joint & 1 == 1).collect();
+            Some(StatedPosture::of_signs(&below))
+        }
+    }
 }
 
 fn target(literal: &Literal) -> CommandTarget {
@@ -28,11 +56,12 @@ fn target(literal: &Literal) -> CommandTarget {
         }
         TargetKind::Frame => {
             let rotation = turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians());
-            CommandTarget { point: point(), rotation: Some(rotation), ..CommandTarget::default() }
+            CommandTarget { point: point(), rotation: Some(rotation), posture: posture(literal), ..CommandTarget::default() }
         }
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
-            CommandTarget { point: point(), rotation: Some(turn.to_rotation_matrix().into_inner()), ..CommandTarget::default() }
+            let rotation = Some(turn.to_rotation_matrix().into_inner());
+            CommandTarget { point: point(), rotation, posture: posture(literal), ..CommandTarget::default() }
         }
     }
 }

@@ -62,6 +62,7 @@ pub(super) fn document(tables: &Tables, options: &ReportOptions, title: &str, ju
         "diagnosis": diagnosis,
         "findings": findings.collect::<Vec<_>>(),
         "corrections": corrections.collect::<Vec<_>>(),
+        "parameters_counting": tables.counting.as_ref().map_or_else(|| "robot file".into(), |difference| format!("robot file; the controller counts otherwise: {difference}")),
         "parameters": parameters.collect::<Vec<_>>(),
         "rejected_rows": tables.rejected.iter().map(|table| table.0.len()).sum::<usize>(),
         "suspects": tables.suspects.iter().map(|table| table.0.len()).sum::<usize>(),

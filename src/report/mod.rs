@@ -39,6 +39,8 @@ pub struct Tables {
     pub parameters: Parameters,
     /// The nominal arm.
     pub robot: Robot,
+    /// What the controller counts otherwise than the robot file, where it does.
+    pub counting: Option<String>,
     /// What was measured.
     pub recording: Recording,
     /// Who is fitted, who judges.
@@ -135,7 +137,7 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         version: env!("CARGO_PKG_VERSION"),
         errors: errors::ErrorsSection::new(tables, &steps, options.set, judgement.as_ref().is_none_or(|judged| judged.kept))?,
         workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
-        parameters: parameters::ParametersSection::new(&tables.parameters),
+        parameters: parameters::ParametersSection::new(&tables.parameters, tables.counting.as_deref()),
         fits: fits::FitsSection::new(tables, &steps),
         comparisons: corrections::comparisons(tables),
         data: data::DataSection::new(tables),

@@ -7,6 +7,8 @@ use serde::Serialize;
 #[derive(Serialize)]
 pub(super) struct ParametersSection {
     groups: Vec<Group>,
+    /// In which counting the joints' parameters stand, where the controller has another one.
+    counting: Option<String>,
     /// What was not estimated, and what has a remark.
     remarks: Vec<RemarkView>,
 }
@@ -44,7 +46,7 @@ struct RemarkView {
 }
 
 impl ParametersSection {
-    pub fn new(parameters: &Parameters) -> Self {
+    pub fn new(parameters: &Parameters, counting: Option<&str>) -> Self {
         let registered = parameters.effects();
         let place = |row: &ParameterRow| registered.iter().position(|effect| *effect == row.effect).unwrap_or(registered.len());
         let mut sorted: Vec<&ParameterRow> = parameters.0.iter().collect();
@@ -61,8 +63,15 @@ impl ParametersSection {
             rows: rows.iter().map(|parameter| row(parameter, &rows)).collect(),
         });
         let remarked = sorted.iter().filter(|p| p.remark.is_some() || p.status == "redundant" || p.status == "unseen");
+        let counting = counting.map(|difference| {
+            format!(
+                "Zeros, ratios and couplings of joints stand in the robot file's counting; the controller counts otherwise ({difference}), \
+                 and \u{201c}calib export --format controller\u{201d} writes them as it does."
+            )
+        });
         Self {
             groups: groups.collect(),
+            counting,
             remarks: remarked
                 .map(|p| RemarkView {
                     name: p.name.clone(),

@@ -6,9 +6,9 @@ use crate::report::{AcceptanceLimits, ReportOptions, Tables, pages};
 use crate::robot::RobotModel;
 use crate::stage::{Context, Labelled, Stage, curves, reads, writes};
 use crate::table::{
-    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake, Observability, Parameters,
-    Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects, Table, Training, Unseen,
-    Verdict, standing,
+    Corrections, Curves, Document, DocumentRow, FindingNumbers, Findings, Fit, Forms, Frame, Intake, JointConventions,
+    Observability, Parameters, Prediction, Recording, Rejected, Rivals, Robot, Split, Standing, Statistics, Step, Suspects,
+    Table, Training, Unseen, Verdict, standing,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,7 @@ reads! {
         parameters: Parameters,
         robot: Robot,
         recording: Recording,
+        convention: Vec<Labelled<JointConventions>>,
         split: Split,
         intake: Vec<Labelled<Intake>>,
         rejected: Vec<Labelled<Rejected>>,
@@ -74,7 +75,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 13;
+    const IMPLEMENTATION: u32 = 14;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -100,7 +101,9 @@ impl Stage for Report {
         let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
         let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
         stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
+        let counting = counting(&reads)?;
         let tables = Tables {
+            counting,
             statistics: reads.statistics,
             prediction: unlabelled(reads.prediction),
             parameters: stands.as_ref().and_then(|stands| model(&stands.model)).unwrap_or(reads.parameters),
@@ -156,6 +159,13 @@ impl Report {
         let data = reads.recording.measurements();
         curves::curves(&findings.table, &parameters.table, &model, &reads.recording, &data, &prediction.table)
     }
+}
+
+/// What the controller counts otherwise than the robot file, where it does.
+fn counting(reads: &ReportReads) -> Result<Option<String>> {
+    let Some(convention) = reads.convention.last() else { return Ok(None) };
+    let robot = RobotModel::new(reads.robot.to_description()?);
+    Ok(convention.table.to_convention()?.difference(&robot))
 }
 
 /// The identity of what the report rests on.

@@ -1,8 +1,12 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
+mod controller_list;
 pub mod concealed;
 mod counting;
+mod counting_said;
 mod gate;
+mod maker;
+mod posture;
 mod standing;
 mod stated;
 mod true_error;

@@ -91,6 +91,7 @@ fn curves_of(
         parameters: parameters.clone(),
         robot: Robot::from_description(description),
         recording: recording.clone(),
+        convention: vec![],
         split,
         intake: Vec::new(),
         rejected: Vec::new(),

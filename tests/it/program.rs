@@ -91,3 +91,29 @@ fn brackets_without_end_are_a_fault_and_no_overflow() {
     assert_eq!(refused(Language::Krl, &format!("X={}", deep("{", "}"))), ["1:18: brackets are nested too deep"]);
     assert_eq!(refused(Language::Rapid, &format!("X:={};", deep("[", "]"))), ["1:19: brackets are nested too deep"]);
 }
+
+#[test]
+fn configurations_and_turns_are_read_as_postures() {
+    use calib::program::PostureStatement;
+    let postures = |language: Language, text: &str| -> Vec<PostureStatement> {
+        let program = Program::parse(text.as_bytes(), language, Partial::Refused).expect("accepted");
+        program.literals().iter().map(|literal| literal.posture).collect()
+    };
+    let robtarget = |cf: &str| format!("MoveL [[1,2,3],[1,0,0,0],[{cf}],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;");
+    assert_eq!(postures(Language::Rapid, &robtarget("1,-2,0,4")), [PostureStatement::Quadrants([1, -2, 0])]);
+    assert_eq!(postures(Language::Rapid, &robtarget("9E9,9E9,9E9,9E9")), [PostureStatement::Unstated]);
+    let found = refused(Language::Rapid, &robtarget("0.5,0,0,0"));
+    assert_eq!(found, ["1:27: 0.5 is no quadrant of a joint, expected a whole number"]);
+    let pos = |rest: &str| format!("LIN {{X 1,Y 2,Z 3,A 4,B 5,C 6{rest}}}");
+    for (text, bits) in [("T 10", 10), ("T 'B101010'", 42), ("T 'H2A'", 42)] {
+        assert_eq!(postures(Language::Krl, &pos(&format!(",{text}"))), [PostureStatement::Turn(bits)], "{text}");
+    }
+    assert_eq!(postures(Language::Krl, &pos("")), [PostureStatement::Unstated]);
+    assert_eq!(postures(Language::Krl, &pos(",S 2")), [PostureStatement::Unstated]);
+    for text in ["T -1", "T 1.5", "T 'B12'", "T x"] {
+        assert!(
+            refused(Language::Krl, &pos(&format!(",{text}")))[0].contains("expected a whole number or a bit pattern"),
+            "{text}"
+        );
+    }
+}

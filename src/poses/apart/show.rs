@@ -57,7 +57,8 @@ impl Apart<'_> {
 impl PoseAnswer for Apart<'_> {
     fn drive(&self) -> Option<Drive<'_>> {
         let proposed = self.told.proposed.as_ref()?;
-        Some(Drive { robot: &self.robot, ranges: &self.ranges, poses: &proposed.poses, direction: &proposed.direction })
+        let Self { robot, ranges, convention, .. } = self;
+        Some(Drive { robot, ranges, poses: &proposed.poses, direction: &proposed.direction, convention })
     }
 
     fn text(&self) -> String {
@@ -89,6 +90,10 @@ impl PoseAnswer for Apart<'_> {
             }
             text.push_str("; append the files under `later` of the stage `ingest` and diagnose again;\n");
             text.push_str(&format!("to see what that decided: calib diff {} NEW_RUN\n", self.run));
+            if !self.convention.is_of_the_robot_file() {
+                let counting = drive::counting(&self.convention, &self.robot);
+                text.push_str(&format!("joints and directions of the poses are counted as at the {counting}\n"));
+            }
             text.push_str(&closing(self.request));
         }
         text
@@ -118,6 +123,7 @@ impl PoseAnswer for Apart<'_> {
             "conclusion": self.conclusion(),
             "approach_visible_share": proposed.as_ref().map(|proposed| proposed.approach_seen),
             "self_collision_checked": false,
+            "counting": drive::counting(&self.convention, &self.robot),
             "out": self.request.out.as_ref().map(|out| out.to_string_lossy()),
             "poses": self.drive().map_or_else(Vec::new, |poses| drive::objects(&poses)),
         })

@@ -1,7 +1,7 @@
 //! `{[TYPE:] NAME value, ...}`: the fields of a target, each known, named once, and one number.
 
 use super::super::token::{ProgramText, Token, TokenKind};
-use super::super::{Gathered, Literal, TargetKind, quoted};
+use super::super::{Gathered, Literal, PostureStatement, TargetKind, quoted};
 use super::line::opens;
 use std::ops::Range;
 
@@ -165,10 +165,13 @@ impl<'t> Aggregate<'t> {
         let (values, spans) = names.into_iter().filter_map(given).map(|(_, value, span)| (*value, span.clone())).unzip();
         let external = EXTERNALS.into_iter().map(|name| given(name).map(|(_, value, _)| *value)).collect();
         let kind = if kind.axes { TargetKind::Joints } else { TargetKind::Frame };
-        found.literals.push(Literal { kind, values, spans, external });
+        let turn = given("T").map_or(PostureStatement::Unstated, |(_, value, _)| PostureStatement::Turn(*value as u32));
+        let status = given("S").map(|(.., span)| span.start);
+        found.status = found.status.or(status);
+        found.literals.push(Literal { kind, values, spans, external, posture: turn });
     }
 
-    /// Name and number of a field; status and turn, which are bit patterns too, have 0 for theirs.
+    /// Name and number of a field; status and turn may be bit patterns.
     fn field(&self, kind: Type, field: &[Token], first: &Token, found: &mut Gathered) -> Option<(String, f64, Range<usize>)> {
         let bytes = self.source.bytes;
         if first.sort != TokenKind::Word {
@@ -183,22 +186,33 @@ impl<'t> Aggregate<'t> {
             return None;
         }
         let value = &field[1..];
-        if let Some((number, span)) = self.source.number(value) {
+        let bits = STATUS.contains(&name.as_str());
+        let number = self.source.number(value).or_else(|| if bits { pattern(bytes, value) } else { None });
+        if let Some((number, span)) = number.filter(|(number, _)| !bits || (number.fract() == 0.0 && *number >= 0.0)) {
             return Some((name, number, span));
         }
         let span = self.value(field);
-        // `T 'B101010'`: a bit pattern.
-        if STATUS.contains(&name.as_str())
-            && matches!(value, [only] if only.sort == TokenKind::Text && bytes[only.span.start] == b'\'')
-        {
-            return Some((name, 0.0, span));
-        }
         let message = if value.is_empty() {
             format!("{name} has no number")
         } else {
-            format!("{name} is {}, expected a number", quoted(bytes, span.clone()))
+            let expected = if bits { "a whole number or a bit pattern" } else { "a number" };
+            format!("{name} is {}, expected {expected}", quoted(bytes, span.clone()))
         };
         found.fault(span.start, message);
         None
     }
+}
+
+/// `'B101010'`, `'H2A'`: the number that it is.
+fn pattern(bytes: &[u8], value: &[Token]) -> Option<(f64, Range<usize>)> {
+    let [only] = value else { return None };
+    let text = std::str::from_utf8(&bytes[only.span.clone()]).ok()?;
+    let inner = text.strip_prefix('\'')?.strip_suffix('\'')?;
+    let (base, digits) = inner.split_at_checked(1)?;
+    let radix = match base {
+        "B" | "b" => 2,
+        "H" | "h" => 16,
+        _ => return None,
+    };
+    u32::from_str_radix(digits, radix).ok().map(|number| (f64::from(number), only.span.clone()))
 }

@@ -1,7 +1,7 @@
 //! Bracket lists of RAPID: `[[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[eax..]]` and `[[rax_1..rax_6],[eax..]]`, and arrays of them.
 
 use super::super::token::{ProgramText, Token};
-use super::super::{Gathered, Literal, TargetKind, quoted};
+use super::super::{Gathered, Literal, PostureStatement, TargetKind, quoted};
 use crate::error::counted;
 use std::ops::Range;
 
@@ -155,6 +155,7 @@ impl<'t> List<'t> {
         }
         let axis = |(value, _): &(f64, _)| (*value != NOT_CONNECTED).then_some(*value);
         let external = numbers.last().into_iter().flatten().map(axis).collect();
+        let posture = if want == Want::Pose { configuration(&numbers[2], found) } else { PostureStatement::Unstated };
         let used = if want == Want::Joints { 1 } else { 2 };
         let (values, spans): (Vec<f64>, Vec<Range<usize>>) = numbers.into_iter().take(used).flatten().unzip();
         if want == Want::Pose {
@@ -165,7 +166,7 @@ impl<'t> List<'t> {
             }
         }
         let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal { kind, values, spans, external });
+        found.literals.push(Literal { kind, values, spans, external, posture });
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {
@@ -189,4 +190,21 @@ impl<'t> List<'t> {
         }
         out
     }
+}
+
+/// cf1, cf4, cf6 of `[cf1,cf4,cf6,cfx]`: whole quarter turns.
+fn configuration(numbers: &[(f64, Range<usize>)], found: &mut Gathered) -> PostureStatement {
+    const MOST: f64 = 100.0;
+    let mut quadrants = [0; 3];
+    for (quadrant, (value, span)) in quadrants.iter_mut().zip(numbers) {
+        if *value == NOT_CONNECTED {
+            return PostureStatement::Unstated;
+        }
+        if value.fract() != 0.0 || value.abs() > MOST {
+            found.fault(span.start, format!("{value} is no quadrant of a joint, expected a whole number"));
+            return PostureStatement::Unstated;
+        }
+        *quadrant = *value as i32;
+    }
+    PostureStatement::Quadrants(quadrants)
 }

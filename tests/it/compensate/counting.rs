@@ -1,71 +1,15 @@
 //! One counting: a controller that counts its joints otherwise than the robot file gets commands as it counts them. The same simulated robot
 //! is recorded, identified and compensated under every convention; where it really goes is the same to a micrometre.
 
+use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
 use super::{ROBOT, calib};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
-use calib::units::Unit;
 use nalgebra::Rotation3;
 use std::path::Path;
-
-/// How a controller counts, deg: c = sign * (q, couplings added) + zero.
-struct Maker {
-    name: &'static str,
-    sign: [f64; 6],
-    zero: [f64; 6],
-    /// Joint, by, ratio; from 1.
-    coupled: &'static [(usize, usize, f64)],
-}
-
-const PLAIN: Maker = Maker { name: "robot file", sign: [1.0; 6], zero: [0.0; 6], coupled: &[] };
-
-fn makers() -> Vec<Maker> {
-    let mut all: Vec<Maker> = (0..6)
-        .map(|joint| {
-            let mut sign = [1.0; 6];
-            sign[joint] = -1.0;
-            Maker { name: ["sign 1", "sign 2", "sign 3", "sign 4", "sign 5", "sign 6"][joint], sign, ..PLAIN }
-        })
-        .collect();
-    let swivel = [-1.0, 1.0, 1.0, -1.0, 1.0, -1.0];
-    all.push(Maker { name: "signs 1, 4, 6", sign: swivel, ..PLAIN });
-    all.push(Maker { name: "zeros", zero: [0.0, -90.0, 90.0, 0.0, 12.5, 180.0], ..PLAIN });
-    all.push(Maker { name: "coupled", coupled: &[(3, 2, -1.0), (6, 5, 0.5)], ..PLAIN });
-    // As KUKA, ABB (a parallelogram) and FANUC (joint 3 against the horizon) count an upright arm.
-    all.push(Maker { name: "KUKA", sign: swivel, zero: [0.0, -90.0, 90.0, 0.0, 0.0, 0.0], ..PLAIN });
-    all.push(Maker { name: "ABB, parallelogram", coupled: &[(3, 2, 1.0)], ..PLAIN });
-    all.push(Maker { name: "FANUC", sign: [1.0, 1.0, -1.0, -1.0, 1.0, -1.0], coupled: &[(3, 2, -1.0)], ..PLAIN });
-    let zero = [10.0, -90.0, 90.0, 30.0, -45.0, 180.0];
-    all.push(Maker { name: "all at once", sign: swivel, zero, coupled: &[(3, 2, -1.0), (6, 5, 0.5)] });
-    all
-}
-
-impl Maker {
-    fn counted(&self, q: &[f64]) -> Vec<f64> {
-        let own: Vec<f64> = q.iter().map(|q| q.to_degrees()).collect();
-        let held = |joint: usize| self.parts(joint).map(|(by, ratio)| ratio * own[by]).sum::<f64>();
-        (0..6).map(|joint| self.sign[joint] * (own[joint] + held(joint)) + self.zero[joint]).collect()
-    }
-
-    /// What the controller's numbers (deg) make of the joints, rad: no joint that is in another one's number holds a third.
-    fn driven(&self, numbers: &[f64]) -> Vec<f64> {
-        let plain: Vec<f64> = (0..6).map(|joint| self.sign[joint] * (numbers[joint] - self.zero[joint])).collect();
-        let held = |joint: usize| self.parts(joint).map(|(by, ratio)| ratio * plain[by]).sum::<f64>();
-        (0..6).map(|joint| (plain[joint] - held(joint)).to_radians()).collect()
-    }
-
-    fn parts(&self, joint: usize) -> impl Iterator<Item = (usize, f64)> {
-        self.coupled.iter().filter(move |(moved, ..)| *moved == joint + 1).map(|(_, by, ratio)| (by - 1, *ratio))
-    }
-
-    fn settings(&self) -> String {
-        let coupled = self.coupled.iter().map(|(joint, by, ratio)| format!("{{joint: {joint}, by: {by}, ratio: {ratio}}}"));
-        format!("sign: {:?}, zero: {:?}, coupled: [{}]", self.sign, self.zero, coupled.collect::<Vec<_>>().join(", "))
-    }
-}
 
 /// How far (mm) the true robot is with each command from where it was wanted, in the base as it was identified.
 fn misses(cell: &Cell, base: &Pose, wanted: &[Point], commands: &[Vec<f64>]) -> Vec<f64> {
@@ -78,24 +22,10 @@ fn misses(cell: &Cell, base: &Pose, wanted: &[Point], commands: &[Vec<f64>]) -> 
 
 /// Recording, pipeline and targets in the counting of a maker; the true misses of every kind of output.
 fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) -> Vec<(&'static str, Vec<f64>)> {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = recorded(maker, cell, points, ROBOT, IDENTIFY);
     let here = folder.path();
-    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
     let numbers = |q: &[f64]| maker.counted(q).iter().map(|c| format!("{c:.9}")).collect::<Vec<_>>().join(",");
     let header = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg";
-    let recorded = cell.recorded_by(points.to_vec(), 77).recording;
-    let rows = points.iter().zip(&recorded.position).enumerate().map(|(k, (point, position))| {
-        let [x, y, z] = position.map(|x| Unit::Millimetre.from_si(x));
-        format!("P{k},{},{x:.6},{y:.6},{z:.6}\n", numbers(&point.q))
-    });
-    std::fs::write(here.join("log.csv"), format!("id,{header},x,y,z\n{}", rows.collect::<String>())).expect("a file");
-    let q = format!("{{column: \"q{{j}}_deg\", unit: deg, {}}}", maker.settings());
-    let pipeline = format!(
-        "calib: 1\nname: counted\nseed: 3\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n  - uses: ingest\n    with:\n      files:\n        - file: log.csv\n          columns:\n            point_id: {{column: id}}\n            usage: {{value: fit}}\n            q: {q}\n            x: {{column: x, unit: mm}}\n            y: {{column: y, unit: mm}}\n            z: {{column: z, unit: mm}}\n      instrument: leica_at960\n  - uses: split\n    with: {{by: usage}}\n  - uses: identify\n    with: {{on: [fit]}}\n"
-    );
-    std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
-    ran(here, &["run", "pipeline.yaml", "--quiet"], "");
-
     let robot = RobotModel::new(cell.robot.clone());
     let lines: String = targets.iter().map(|target| numbers(&target.q) + "\n").collect();
     let table = ran(here, &["compensate", "latest", "--plain"], &format!("{header}\n{lines}"));
@@ -168,12 +98,6 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
             (output, misses(cell, &base, targets, &driven))
         })
         .collect()
-}
-
-fn ran(here: &Path, arguments: &[&str], input: &str) -> String {
-    let output = calib(here, arguments, input);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).expect("UTF-8")
 }
 
 fn said(here: &Path, input: &str) -> String {

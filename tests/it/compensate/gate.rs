@@ -1,6 +1,9 @@
 //! What is refused though it can be computed, and that one who insists is told so in what is written.
 
+use super::maker::{PLAIN, recorded};
+use super::true_error::Cell;
 use super::{PIPELINE, ROBOT, calib, cell};
+use calib::robot::import::{RobotFileText, read_calib};
 
 const HEADER: &str = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,20,-30,5,40,0\n";
 
@@ -138,4 +141,72 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
     }
     let column = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg\n10,20,-30,5,40,0,50\n";
     assert_eq!(calib(here, &["compensate", "pipeline.yaml", "--quiet"], column).status.code(), Some(0));
+}
+
+#[test]
+fn how_far_a_model_may_be_from_the_robot_file_is_for_the_user_to_say() {
+    for (option, limit, unit) in [("--max-shift", "0.001", "mm"), ("--max-tilt", "0.0001", "deg")] {
+        for verb in [&["compensate", "latest"][..], &["export", "latest", "--format", "json"]] {
+            let (code, out, err) = run(&[verb, &[option, limit]].concat(), HEADER);
+            assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
+            assert!(err.contains(&format!("at most {limit} {unit} allowed ({option})")), "{err}");
+        }
+        let (code, _, err) = run(&["compensate", "latest", option, "-1"], HEADER);
+        assert_eq!(code, Some(2), "{err}");
+    }
+}
+
+#[test]
+fn a_pipeline_whose_report_does_not_accept_it_is_refused_as_its_run_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    let pipeline = |limits: &str| format!("{PIPELINE}  - uses: validate\n  - uses: report\n    with: {{limits: {{{limits}}}}}\n");
+    let ran = |arguments: &[&str]| {
+        let output = calib(here, arguments, HEADER);
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    std::fs::write(here.join("strict.yaml"), pipeline("max_mm: 0.0001")).expect("a file");
+    assert_eq!(ran(&["run", "strict.yaml", "--quiet"]).0, Some(1));
+    for model in ["strict.yaml", "latest"] {
+        let (code, err) = ran(&["compensate", model]);
+        assert_eq!(code, Some(10), "{model}: {err}");
+        assert!(err.contains("refused: not accepted") && err.contains("at most 0.0001 mm allowed"), "{model}: {err}");
+        assert_eq!(ran(&["export", model, "--format", "json"]).0, Some(10));
+        let (code, err) = ran(&["compensate", model, "--force"]);
+        assert_eq!(code, Some(0), "{model}: {err}");
+        assert!(err.contains("warning: used because of --force: not accepted"), "{model}: {err}");
+    }
+    std::fs::write(here.join("mild.yaml"), pipeline("max_mm: 10")).expect("a file");
+    assert_eq!(ran(&["compensate", "mild.yaml"]).0, Some(0));
+}
+
+#[test]
+fn a_model_that_leaves_something_unexplained_says_so_once_and_in_the_program() {
+    let robot = read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot;
+    let cell = Cell::of(robot, 1.2, [100.0, 200.0], Vec::new());
+    let folder = recorded(&PLAIN, &cell, &cell.points(80, &[0.0], 5), ROBOT, "  - uses: diagnose\n");
+    let here = folder.path();
+    // Heights with bumps over three joints that no cause has.
+    let log = std::fs::read_to_string(here.join("log.csv")).expect("a file");
+    let bumpy = |line: &str| {
+        let (rest, z) = line.rsplit_once(',').expect("a height");
+        let cells: Vec<f64> = rest.split(',').skip(1).map(|cell| cell.parse().expect("a number")).collect();
+        let bumps = (cells[0] / 7.0).sin() * (cells[1] / 5.0).sin() + (cells[2] / 6.0 + cells[0] / 9.0).cos();
+        format!("{rest},{:.6}\n", z.parse::<f64>().expect("a number") + 0.3 * bumps)
+    };
+    let (header, rows) = log.split_once('\n').expect("a header");
+    let rows: String = rows.lines().map(bumpy).collect();
+    std::fs::write(here.join("log.csv"), format!("{header}\n{rows}")).expect("a file");
+    calib(here, &["run", "pipeline.yaml", "--quiet"], "");
+    std::fs::write(here.join("p.src"), "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n").expect("a file");
+    for model in ["pipeline.yaml", "latest"] {
+        let output = calib(here, &["compensate", model, "p.src", "--quiet"], "");
+        let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
+        assert_eq!(err.matches("the verdict is `unexplained`").count(), 1, "{err}");
+        let head = out.lines().find(|line| line.contains("corrected by calib")).unwrap_or_else(|| panic!("{err}"));
+        assert!(head.ends_with(", verdict of the model: unexplained"), "{head}");
+        let export = calib(here, &["export", model, "--format", "json", "--quiet"], "");
+        assert_eq!(String::from_utf8_lossy(&export.stderr).matches("the verdict is `unexplained`").count(), 1);
+    }
 }

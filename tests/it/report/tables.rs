@@ -383,6 +383,7 @@ pub fn tables(name: &str) -> ReportReads {
         parameters: parameters(),
         robot: robot(name),
         recording,
+        convention: vec![],
         split: Split(split),
         intake: vec![Labelled { stage: "ingest".into(), table: Intake(vec![intake]) }],
         rejected: rejected(61),
