@@ -2,19 +2,21 @@
 
 mod cells;
 mod comparison;
+mod dependence;
 mod source;
 
 use crate::diagnose::BASE;
-use crate::effect::{AnchorShift, BaseFrame, LONG_AFTER, Variable};
+use crate::effect::{AnchorShift, BaseFrame, LONG_AFTER};
 use crate::error::{Fault, Result, counted};
 use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
-use crate::robot::{Measurements, RobotModel, Unmeasured, Visited};
+use crate::robot::{Measurements, RobotModel, Visited};
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Labelled, Stage};
 use crate::table::{CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split};
 use cells::VisitedCells;
 use comparison::Comparison;
+use dependence::Dependence;
 use source::{CarriedFrom, stripped};
 
 crate::stage::identified::identification! {
@@ -203,31 +205,13 @@ fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Reco
     Some(Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>()))
 }
 
-/// Whether a model depends on payload and on temperature; every model does on its joints.
-fn depends(model: &Model) -> [bool; 2] {
-    let [mut payload, mut temperature] = [false; 2];
-    for (effect, _) in model.stack.effects() {
-        let variables = effect.form().map_or_else(Vec::new, |form| form.variables());
-        let loaded = |variable: &Variable| {
-            matches!(variable, Variable::Payload | Variable::Load { .. } | Variable::Push { .. } | Variable::ArmLoad)
-        };
-        payload |= effect.needs_torque() || variables.iter().any(loaded);
-        temperature |= variables.iter().any(|variable| matches!(variable, Variable::Temperature | Variable::Lagging { .. }));
-    }
-    [payload, temperature]
-}
-
 /// What of each row, of all that the model depends on, was never visited; nothing where that is not known.
 fn remarks(visited: Option<&Visited>, model: &Model, data: &Measurements, context: &Context) -> Vec<Option<String>> {
     let Some(visited) = visited else { return vec![None; data.rows()] };
-    let [payload, temperature] = depends(model);
+    let depends = Dependence::of(model);
     let said = |row: usize| {
         let mut beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
-        beyond.retain(|what| match what {
-            Unmeasured::Payload => payload,
-            Unmeasured::Temperature => temperature,
-            Unmeasured::Joints(_) | Unmeasured::Gaps(_) => true,
-        });
+        beyond.retain_mut(|what| depends.has(what));
         (!beyond.is_empty()).then(|| beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
     let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();
