@@ -360,3 +360,25 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     assert!(said.statement.contains(lost), "{}", said.statement);
     assert!(said.warnings.iter().any(|warning| warning.starts_with(lost)), "{:?}", said.warnings);
 }
+
+#[test]
+fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
+    let sound = recorded(&fixture::spherical(), 52, json!([]));
+    let said = |other: fn(usize) -> bool, first: &str, second: &str| {
+        let mut inputs = sound.clone();
+        for (row, point) in inputs.recording.position.iter_mut().enumerate().filter(|(row, _)| other(*row)) {
+            // Half a metre aside, and turned by 40 deg.
+            let (sin, cos) = 0.7f64.sin_cos();
+            assert!(row < 72);
+            *point = [cos * point[0] - sin * point[1] + 0.5, sin * point[0] + cos * point[1], point[2]];
+        }
+        let said = diagnosed(&inputs).expect("a diagnosis");
+        assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
+        let statement = &said.findings[0].statement;
+        assert!(statement.starts_with("two set-ups are in one recording"), "{statement}");
+        assert!(statement.contains(first) && statement.contains(second), "{statement}");
+        assert!(said.findings.iter().all(|finding| finding.effect == "setup"));
+    };
+    said(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
+    said(|row| row % 2 == 1, "1, 3, 5, 7, ... (36 rows)", "2, 4, 6, 8, ... (36 rows)");
+}
