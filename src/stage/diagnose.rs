@@ -5,7 +5,9 @@ use crate::effect::CAUSES;
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
+use crate::stage::blank_payload::blank_payload;
 use crate::stage::own_effects::own_effects;
+use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
 use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
@@ -149,7 +151,14 @@ impl Stage for Diagnose {
             seed: context.seed,
         };
         let diagnosis = wrong_setup(&question).unwrap_or_else(|| diagnose(&question, |line| context.services.note(line)));
-        let diagnosis = said(diagnosis, &question, context)?;
+        let mut diagnosis = said(diagnosis, &question, context)?;
+        blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
+        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
+            for line in rounded_logs(&diagnosis.model, &data, &diagnosis.kept) {
+                diagnosis.statement.push_str(&format!("; {line}"));
+                context.services.warn(line);
+            }
+        }
         let step = context.id;
         let mut held_out = vec![true; data.rows()];
         fit.iter().for_each(|row| held_out[*row] = false);

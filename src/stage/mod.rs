@@ -1,8 +1,10 @@
 //! Stages: pure functions from tables to tables. One file each, one line each in [`STAGES`].
 
 mod advice;
+mod blank_payload;
 mod compare;
 mod computed;
+mod copied;
 mod curves;
 mod diagnose;
 mod folding;
@@ -17,6 +19,7 @@ mod registry;
 mod repeated;
 mod report;
 mod robot;
+mod rounded;
 mod screened;
 mod simulate;
 pub mod split;

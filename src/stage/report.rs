@@ -101,12 +101,17 @@ impl Stage for Report {
         let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
         let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
         stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
-        let counting = counting(&reads)?;
+        let mut standing = stands.as_ref().map(|stands| [stands.step.clone(), stands.model.clone()]);
+        let (mut statistics, mut prediction) = (reads.statistics, reads.prediction);
+        if let Some(carried) = carried(standing.as_ref().map(|[step, _]| step), &prediction, &reads.recording) {
+            prediction.retain(|step| step.table.is_of(&reads.recording));
+            statistics.0.retain(|row| prediction.iter().any(|step| step.stage == row.step));
+            standing = Some([carried.clone(), carried]);
+        }
         let tables = Tables {
-            counting,
-            statistics: reads.statistics,
-            prediction: unlabelled(reads.prediction),
-            parameters: stands.as_ref().and_then(|stands| model(&stands.model)).unwrap_or(reads.parameters),
+            statistics,
+            prediction: unlabelled(prediction),
+            parameters: standing.as_ref().and_then(|[_, stage]| model(stage)).unwrap_or(reads.parameters),
             robot: reads.robot,
             recording: reads.recording,
             split: reads.split,
@@ -123,7 +128,7 @@ impl Stage for Report {
             forms: unlabelled(reads.forms),
             suspects: unlabelled(reads.suspects),
             curves,
-            standing: stands.map(|stands| stands.step),
+            standing: standing.map(|[step, _]| step),
             withdrawn,
         };
         let Accepted { mean_mm, p95_mm, max_mm } = self.limits;
@@ -143,6 +148,14 @@ impl Stage for Report {
         let wrong = limits.into_iter().filter(|(_, limit)| limit.is_some_and(|limit| !(limit.is_finite() && limit > 0.0)));
         wrong.map(|(name, _)| Fault::new(format!("limits.{name}"), "expected a length above 0, mm")).collect()
     }
+}
+
+/// The last step that predicts the recording of the report, where the step that stands predicts another one: the report is of what was
+/// carried there.
+fn carried(standing: Option<&String>, prediction: &[Labelled<Prediction>], recording: &Recording) -> Option<String> {
+    let stands = prediction.iter().find(|step| Some(&step.stage) == standing)?;
+    let here = || prediction.iter().rfind(|step| step.table.is_of(recording));
+    if stands.table.is_of(recording) { None } else { here().map(|step| step.stage.clone()) }
 }
 
 impl Report {

@@ -1,10 +1,12 @@
 //! `split`: which rows of the recording serve what. Every row belongs to exactly one named set.
 //!
 //! Neighbouring rows with the same joints are repeats of one pose: blocks and random choice keep them together, since a pose
-//! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted.
+//! that was seen in training is no test. Targets that are measured one after the other in a pose are never parted. Copies of a row under
+//! other ids go wherever they stand to the set of that row.
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::stage::copied::{self, copied_rows};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
@@ -108,7 +110,7 @@ writes! {
 impl Stage for SplitBy {
     const NAME: &'static str = "split";
     const SUMMARY: &'static str = "deals rows out to named sets: every n-th, blocks, random, by usage, by order";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = SplitReads;
     type Writes = SplitWrites;
 
@@ -183,7 +185,10 @@ impl Stage for SplitBy {
             return Err(Error::Spec(faults));
         }
         let recording = &reads.recording;
-        let sets = self.deal(recording, context.seed)?;
+        let mut sets = self.deal(recording, context.seed)?;
+        let copies = copied_rows(recording);
+        copies.iter().for_each(|(row, copy)| sets[*copy] = sets[*row].clone());
+        copied::said(&copies, recording).into_iter().for_each(|line| context.services.warn(line));
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for set in &sets {
             *counts.entry(set).or_default() += 1;

@@ -1,15 +1,23 @@
 //! `transfer`: an identified model on another recording of the same robot. The arm is held; only where its base stands is found anew.
 
+mod cells;
+mod comparison;
+mod dependence;
+mod source;
+
 use crate::diagnose::BASE;
 use crate::effect::{AnchorShift, BaseFrame, LONG_AFTER};
 use crate::error::{Fault, Result, counted};
-use crate::estimate::{FitOptions, align_points};
+use crate::estimate::{FitOptions, Fitted, Model, Screening, align_points};
 use crate::robot::{Measurements, RobotModel, Visited};
 use crate::stage::identified::{Fitting, Identified};
 use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Labelled, Stage};
-use crate::table::{CovarianceTable, ParameterRow, Parameters, Recording, Robot, Split};
-use nalgebra::Vector3;
+use crate::table::{CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split};
+use cells::VisitedCells;
+use comparison::Comparison;
+use dependence::Dependence;
+use source::{CarriedFrom, stripped};
 
 crate::stage::identified::identification! {
     /// Settings of `transfer`.
@@ -33,13 +41,15 @@ crate::stage::reads! {
         parameters: Parameters,
         covariance: Option<CovarianceTable>,
         recordings: Vec<Labelled<Recording>>,
+        models: Vec<Labelled<Parameters>>,
+        predictions: Vec<Labelled<Prediction>>,
     }
 }
 
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 8;
+    const IMPLEMENTATION: u32 = 9;
     type Reads = TransferReads;
     type Writes = Identified;
 
@@ -65,13 +75,8 @@ impl Stage for Transfer {
         // Another recording has another clock: steps have happened, and the arm is warm. What lags follows the time between rows.
         let start = (0..data.rows()).map(|row| data.time(row)).fold(f64::INFINITY, f64::min);
         data.time = Some((0..data.rows()).map(|row| LONG_AFTER + data.time(row) - start).collect());
-        let robot = RobotModel::new(reads.robot.to_description()?);
-        let there = earlier.model(robot.clone(), &[], self.load.into())?;
-        let predicted = there.predict(&data);
-        let whole: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
-        let points = |of: &[nalgebra::Vector3<f64>]| whole.iter().map(|row| of[*row]).collect::<Vec<_>>();
-        let base = align_points(&points(&predicted), &points(&data.position)) * there.base();
-        let mut model = earlier.model_standing(base, robot, &[], self.load.into())?;
+        let source = CarriedFrom::of(&reads);
+        let mut model = self.placed(&earlier, &reads, &data, &rows)?;
         let open: Vec<usize> = match self.free {
             Some(_) => (0..model.x.len()).collect(),
             None => model.stack.parameters_of(BaseFrame::NAME).collect(),
@@ -80,30 +85,92 @@ impl Stage for Transfer {
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let mut carried = CarriedModel { earlier, model, fitted, screening, held };
+        let mut covariance = reads.covariance.as_ref();
+        if let Some(geometry) = self.better_alone(&carried, source.as_ref(), &reads, (&data, &rows), context)? {
+            (carried, covariance) = (geometry, None);
+        }
+        let CarriedModel { earlier, model, fitted, screening, held } = &carried;
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
             split: &reads.split,
             asked: &rows,
             rows: &screening.kept,
-            screening: &screening,
-            held: &held,
-            earlier: Some(&earlier),
-            earlier_covariance: reads.covariance.as_ref(),
+            screening,
+            held,
+            earlier: Some(earlier),
+            earlier_covariance: covariance,
             seen_before: &vec![false; data.rows()],
             geometry: None,
             repeatability,
             folds: self.folds,
         };
-        let mut identified = Identified::of(context, &model, &fitted, &fitting);
-        let judges = judges(&data, &rows, &screening.kept);
-        if earlier.0.iter().any(|row| !is_geometry(row)) {
-            let geometry = geometry_alone(&earlier, &reads.robot, &data, &rows, self)?;
-            compare(context, &data, &judges, [&model.predict(&data), &geometry]);
-        }
-        let remarks = remarks(&reads.recordings, &reads.recording, &data, context);
+        let mut identified = Identified::of(context, model, fitted, &fitting);
+        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
+        let remarks = remarks(visited.as_ref(), model, &data, context);
         identified.prediction = identified.prediction.with_remarks(remarks.into_iter());
         Ok(identified)
+    }
+}
+
+/// A model on another recording, its base found anew there.
+struct CarriedModel {
+    earlier: Parameters,
+    model: Model,
+    fitted: Fitted,
+    screening: Screening,
+    held: Vec<usize>,
+}
+
+impl Transfer {
+    /// A model with its base where these rows have it best.
+    fn placed(&self, earlier: &Parameters, reads: &TransferReads, data: &Measurements, rows: &[usize]) -> Result<Model> {
+        let robot = RobotModel::new(reads.robot.to_description()?);
+        let there = earlier.model(robot.clone(), &[], self.load.into())?;
+        let predicted = there.predict(data);
+        let whole: Vec<usize> = rows.iter().copied().filter(|row| data.whole(*row)).collect();
+        let points = |of: &[nalgebra::Vector3<f64>]| whole.iter().map(|row| of[*row]).collect::<Vec<_>>();
+        let base = align_points(&points(&predicted), &points(&data.position)) * there.base();
+        earlier.model_standing(base, robot, &[], self.load.into())
+    }
+
+    /// The geometry alone, carried likewise, where it is better than all that was found; says how both do.
+    fn better_alone(
+        &self,
+        carried: &CarriedModel,
+        source: Option<&CarriedFrom>,
+        reads: &TransferReads,
+        (data, rows): (&Measurements, &[usize]),
+        context: &Context,
+    ) -> Result<Option<CarriedModel>> {
+        if carried.earlier.0.iter().all(is_geometry) {
+            return Ok(None);
+        }
+        let geometry = match source {
+            Some(source) => source.geometry(reads, self.load.into())?.of_the_arm()?,
+            None => stripped(&carried.earlier),
+        };
+        let start = self.placed(&geometry, reads, data, rows)?;
+        let candidates: Vec<usize> = start.stack.parameters_of(BaseFrame::NAME).collect();
+        let options = FitOptions { rows, candidates: &candidates };
+        let (model, fitted, screening) = fit_rows(&start, data, &options, &reads.split, self.screen);
+        let judges = judges(data, rows, [&carried.screening, &screening]);
+        let visited = source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
+        let both = [&carried.model.predict(data)[..], &model.predict(data)];
+        let comparison = Comparison::of(data, &judges, both, visited.as_ref());
+        let words = comparison.words();
+        if comparison.is_worse() {
+            context.services.warn(format!("{words}: what was identified besides it does not hold here and is not used"));
+            return Ok(Some(CarriedModel { earlier: geometry, model, fitted, screening, held: Vec::new() }));
+        }
+        match comparison.is_worse_outside() {
+            true => context
+                .services
+                .warn(format!("{words}: in unvisited cells what was identified besides the geometry makes it worse")),
+            false => context.services.note(words),
+        }
+        Ok(None)
     }
 }
 
@@ -112,63 +179,39 @@ fn is_geometry(row: &ParameterRow) -> bool {
     row.form.is_none() && (row.effect == AnchorShift::NAME || BASE.contains(&row.effect.as_str()))
 }
 
-/// Whole points by which a carried model is judged: those that did not place its base, or where there are none, all.
-fn judges(data: &Measurements, asked: &[usize], kept: &[usize]) -> Vec<usize> {
-    let others: Vec<usize> = (0..data.rows()).filter(|row| !asked.contains(row) && data.whole(*row)).collect();
-    if others.is_empty() { kept.iter().copied().filter(|row| data.whole(*row)).collect() } else { others }
+/// Whole points by which carried models are judged: those that did not place their base, or where there are none, all; without those
+/// that neither can follow.
+fn judges(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> Vec<usize> {
+    let aside =
+        |row: usize| screenings.iter().all(|one| one.suspects.iter().any(|suspect| suspect.row == row && !suspect.used()));
+    let whole: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row) && !aside(*row)).collect();
+    let others: Vec<usize> = whole.iter().copied().filter(|row| !asked.contains(row)).collect();
+    if others.is_empty() { whole } else { others }
 }
 
-/// What the geometry of a model predicts without what else was found, its base where these rows have it.
-fn geometry_alone(
-    earlier: &Parameters,
-    robot: &Robot,
-    data: &Measurements,
-    rows: &[usize],
-    settings: &Transfer,
-) -> Result<Vec<Vector3<f64>>> {
-    let geometry = Parameters(earlier.0.iter().filter(|row| is_geometry(row)).cloned().collect());
-    let model = geometry.model(RobotModel::new(robot.to_description()?), &[], settings.load.into())?;
-    let predicted = model.predict(data);
-    let whole = || rows.iter().copied().filter(|row| data.whole(*row));
-    let moved = align_points(
-        &whole().map(|row| predicted[row]).collect::<Vec<_>>(),
-        &whole().map(|row| data.position[row]).collect::<Vec<_>>(),
-    );
-    Ok(predicted.iter().map(|point| moved.point(point)).collect())
-}
-
-/// Beyond this the difference is not that of two ways to place a base.
-const WORSE: f64 = 1.02;
-
-/// Says where a carried model is worse than its own geometry.
-fn compare(context: &Context, data: &Measurements, judges: &[usize], [whole, geometry]: [&[Vector3<f64>]; 2]) {
-    let rms = |predicted: &[Vector3<f64>]| {
-        let squares = judges.iter().map(|row| (data.position[*row] - predicted[*row]).norm_squared());
-        (squares.sum::<f64>() / judges.len().max(1) as f64).sqrt() * 1e3
-    };
-    let (whole, geometry) = (rms(whole), rms(geometry));
-    if whole > WORSE * geometry {
-        context.services.warn(format!(
-            "the carried model leaves {whole:.3} mm rms on this recording, its geometry alone {geometry:.3} mm: what was identified besides it \
-             does not hold here"
-        ));
+/// What was visited where the model was fitted, else by all other recordings; nothing where there is no other.
+fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Recording) -> Option<Visited> {
+    if let Some(source) = source {
+        return Some(Visited::of(&source.recording.measurements(), &source.rows));
     }
-}
-
-/// What of each row was never visited by the other recordings; nothing where there is no other.
-fn remarks(all: &[Labelled<Recording>], own: &Recording, data: &Measurements, context: &Context) -> Vec<Option<String>> {
     let mut others = all.iter().map(|one| &one.table).filter(|table| table.q != own.q && table.joints == own.joints);
-    let Some(first) = others.next() else { return vec![None; data.rows()] };
-    let mut visited = first.measurements();
+    let mut visited = others.next()?.measurements();
     for more in others.map(Recording::measurements) {
         visited.q.extend(more.q);
         visited.position.extend(more.position);
         visited.payload.extend(more.payload);
         visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
     }
-    let visited = Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>());
+    Some(Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>()))
+}
+
+/// What of each row, of all that the model depends on, was never visited; nothing where that is not known.
+fn remarks(visited: Option<&Visited>, model: &Model, data: &Measurements, context: &Context) -> Vec<Option<String>> {
+    let Some(visited) = visited else { return vec![None; data.rows()] };
+    let depends = Dependence::of(model);
     let said = |row: usize| {
-        let beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
+        let mut beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
+        beyond.retain_mut(|what| depends.has(what));
         (!beyond.is_empty()).then(|| beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     };
     let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();

@@ -4,12 +4,12 @@ use super::statistics::rows;
 use super::{DiagnosisSummary, labelled};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
-use crate::stage::{Diagnose, Stage};
+use crate::stage::{Diagnose, Stage, Transfer};
 use crate::store::Store;
 use crate::table::{Standing, StatisticsRow};
 
 /// Of the set with most points that the step which stands was not fitted to, else of the one that it was fitted to; nothing where no stage
-/// stated errors. Of a `wrong` set-up nothing else is said.
+/// stated errors; where a model is carried to another recording, what it does there. Of a `wrong` set-up nothing else is said.
 pub fn in_short(
     outcome: &CompletedRun,
     standing: Option<&Standing>,
@@ -21,22 +21,28 @@ pub fn in_short(
     }
     let rows = rows(outcome, store)?;
     let last = || rows.iter().max_by_key(|row| row.order).map(|row| row.step.as_str());
-    let Some(step) = standing.map(|stands| stands.step.as_str()).or_else(last) else { return Ok(None) };
+    let ran = |name: &str| outcome.manifest.stages.iter().rfind(|stage| stage.uses == name && !stage.outputs.is_empty());
+    // What a model does elsewhere is what a carried one is asked for; its sets may bear the names of those that it was fitted to.
+    let carried = ran(Transfer::NAME).filter(|stage| rows.iter().any(|row| row.step == stage.id));
+    let stands = || standing.map(|stands| stands.step.as_str()).or_else(last);
+    let Some(step) = carried.map(|stage| stage.id.as_str()).or_else(stands) else { return Ok(None) };
     let own = rows.iter().filter(|row| row.step == step);
     let Some(after) = own.max_by_key(|row| (row.held_out, row.points)) else { return Ok(None) };
-    let earlier = rows.iter().filter(|row| row.set == after.set && row.order < after.order);
+    let earlier = rows.iter().filter(|row| carried.is_none() && row.set == after.set && row.order < after.order);
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
     let mut text = before.map_or_else(String::new, |row| labelled("before", &error(row)));
-    text.push_str(&labelled("after", &error(after)));
+    text.push_str(&labelled(if carried.is_some() { "carried" } else { "after" }, &error(after)));
     text.push_str(&labelled("noise", &noise(after)));
+    for warning in carried.iter().flat_map(|stage| &stage.warnings) {
+        text.push_str(&labelled("warning", warning));
+    }
     for warning in standing.iter().flat_map(|stands| stands.warnings()) {
         text.push_str(&labelled("warning", &warning));
     }
     if let Some(standing) = standing.filter(|stands| !stands.withdrawn.is_empty()) {
         text.push_str(&labelled("", &format!("`calib compensate` and `calib export` take the step `{}`", standing.model)));
     }
-    let diagnosed = outcome.manifest.stages.iter().rfind(|stage| stage.uses == Diagnose::NAME && !stage.outputs.is_empty());
-    if let Some(stage) = diagnosed {
+    if let Some(stage) = ran(Diagnose::NAME) {
         let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
         text.push_str(&labelled("verdict", &told.verdict()));
         text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));

@@ -50,6 +50,9 @@ use crate::robot::Measurements;
 use crate::table::{Recording, Split};
 use nalgebra::Vector3;
 
+/// A measured point that is added up again from prediction and residual is off by less than this.
+const ROUNDING_MM: f64 = 1e-6;
+
 impl Prediction {
     /// The residuals of every row under a model; no row is a suspect yet. `held_out[row]` as in the column; `covariance` where the
     /// step estimated the whole model.
@@ -103,6 +106,18 @@ impl Prediction {
             }
         });
         Self(rows.collect())
+    }
+
+    /// Whether these are the points of a recording: its rows, names and measured points.
+    pub fn is_of(&self, recording: &Recording) -> bool {
+        let measured = |row: &PredictionRow| [row.x_mm + row.dx_mm, row.y_mm + row.dy_mm, row.z_mm + row.dz_mm];
+        let is = |at: usize, row: &PredictionRow| {
+            let apart = || measured(row).into_iter().zip(recording.position[at]).map(|(own, point)| (own - point * 1e3).abs());
+            row.sequence == recording.sequence[at]
+                && row.point_id == recording.point_id[at]
+                && (row.measured.is_some() || apart().all(|apart| apart < ROUNDING_MM))
+        };
+        self.0.len() == recording.rows() && self.0.iter().enumerate().all(|(at, row)| is(at, row))
     }
 
     /// Whole points that the step was fitted to.

@@ -130,3 +130,41 @@ fn no_choice_parts_the_targets_of_a_pose() {
     let every = sets("{by: every, n: 4}", targets(8)).unwrap();
     assert_eq!(every.iter().filter(|set| *set == "validate").count(), 6);
 }
+
+#[test]
+fn copies_of_a_row_under_other_ids_stay_in_one_set_and_are_counted() {
+    let copied = || {
+        let mut all = recording(&[0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3]);
+        all.position = all.q.iter().map(|q| [1.0 + q, 2.0, 3.0]).collect();
+        all
+    };
+    for yaml in [
+        "{by: every, n: 3}",
+        "{by: blocks, length: 2, sets: [fit, fit, validate]}",
+        "{by: random, fraction: 0.4}",
+        "{by: order, sets: [{set: fit, rows: 8}, {set: validate}]}",
+    ] {
+        let desk = Desk::default();
+        let tables = desk.run(&settings(yaml), SplitReads { recording: copied() });
+        let tables = match (&tables, yaml.contains("order")) {
+            // All of a set are copies of another's.
+            (Err(error), true) => {
+                assert!(error.to_string().contains("validate"), "{error}");
+                continue;
+            }
+            _ => tables.unwrap(),
+        };
+        let split = table::<Split>(&tables).remove(0);
+        for k in 0..4 {
+            assert_eq!(split.0[8 + k].set, split.0[k].set, "{yaml}: P{} copies P{k}", 8 + k);
+        }
+        let warnings = desk.warnings.lock().unwrap().join("\n");
+        assert!(warnings.contains("4 rows") && warnings.contains("P8 is P0"), "{yaml}: {warnings}");
+    }
+    // A pose that was measured again is no copy.
+    let mut again = copied();
+    again.position[8..].iter_mut().for_each(|point| point[0] += 1e-6);
+    let desk = Desk::default();
+    desk.run(&settings("{by: every, n: 3}"), SplitReads { recording: again }).unwrap();
+    assert!(desk.warnings.lock().unwrap().is_empty());
+}

@@ -118,6 +118,8 @@ fn transferred(parameters: &Parameters, to: &Series) -> Result<[f64; 2]> {
         parameters: parameters.clone(),
         covariance: None,
         recordings: Vec::new(),
+        models: Vec::new(),
+        predictions: Vec::new(),
     };
     let prediction: Prediction = table(&Desk::default().run(&stage, reads)?).remove(0);
     let errors = || prediction.0.iter().map(|row| row.error_mm);
@@ -208,6 +210,8 @@ fn a_model_holds_on_a_later_recording_from_where_the_tracker_stands_then() {
         parameters: parameters.clone(),
         covariance: None,
         recordings: Vec::new(),
+        models: Vec::new(),
+        predictions: Vec::new(),
     };
     let tables = desk.run(&stage, reads).unwrap();
     let mean = unseen(&tables);
@@ -253,6 +257,8 @@ fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is
             parameters: parameters.clone(),
             covariance: None,
             recordings: vec![label("ingest", earlier.clone()), label("later", recording.clone())],
+            models: Vec::new(),
+            predictions: Vec::new(),
         };
         let tables = desk.run(&settings::<Transfer>(json!({"folds": 0})), reads).unwrap();
         let warnings = desk.warnings.lock().unwrap().join("\n");
@@ -271,4 +277,159 @@ fn a_carried_model_says_where_it_was_not_measured_and_that_its_geometry_alone_is
     compliance.for_each(|row| row.value = 3e-6);
     let (_, warnings) = carry(&parameters);
     assert!(warnings.contains(worse), "{warnings}");
+}
+
+fn labelled<T>(stage: &str, table: T) -> Labelled<T> {
+    Labelled { stage: stage.into(), table }
+}
+
+/// The twin's robot with a model and its geometry, each identified by itself in one recording, and another recording.
+struct Carrying {
+    robot: Robot,
+    here: Recording,
+    there: (Recording, Split),
+    found: (Parameters, Prediction),
+    geometry: (Parameters, Prediction),
+}
+
+/// What a stage wrote of a carried model, and what it said.
+struct CarriedThere {
+    parameters: Parameters,
+    prediction: Prediction,
+    notes: String,
+    warnings: String,
+}
+
+impl Carrying {
+    fn new() -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
+        let read = settings::<ReadRobot>(json!({"file": file}));
+        let robot: Robot = table(&Desk::default().run(&read, RobotReads {}).unwrap()).remove(0);
+        let (here, split) = measured(&robot, 4);
+        let there = measured(&robot, 5);
+        let effects = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio"];
+        let model = |effects: &[&str]| {
+            let identify = settings::<Identify>(json!({"effects": effects, "folds": 0}));
+            let reads = IdentifyReads { robot: robot.clone(), recording: here.clone(), split: split.clone() };
+            let tables = Desk::default().run(&identify, reads).unwrap();
+            (table(&tables).remove(0), table(&tables).remove(0))
+        };
+        let geometry = model(&effects);
+        let found = model(&[&effects[..], &["joint_compliance"]].concat());
+        Self { robot, here, there, found, geometry }
+    }
+
+    fn carry(&self, parameters: &Parameters, separate: bool) -> CarriedThere {
+        let desk = Desk::default();
+        let geometry = separate.then(|| labelled("geometry", self.geometry.clone()));
+        let reads = TransferReads {
+            robot: self.robot.clone(),
+            recording: self.there.0.clone(),
+            split: self.there.1.clone(),
+            parameters: parameters.clone(),
+            covariance: None,
+            recordings: vec![labelled("here", self.here.clone()), labelled("there", self.there.0.clone())],
+            models: geometry
+                .iter()
+                .map(|one| labelled("geometry", one.table.0.clone()))
+                .chain([labelled("found", parameters.clone())])
+                .collect(),
+            predictions: geometry
+                .iter()
+                .map(|one| labelled("geometry", one.table.1.clone()))
+                .chain([labelled("found", self.found.1.clone())])
+                .collect(),
+        };
+        let tables = desk.run(&settings::<Transfer>(json!({"folds": 0})), reads).unwrap();
+        let said = |lines: &std::sync::Mutex<Vec<String>>| lines.lock().unwrap().join("\n");
+        CarriedThere {
+            parameters: table(&tables).remove(0),
+            prediction: table(&tables).remove(0),
+            notes: said(&desk.notes),
+            warnings: said(&desk.warnings),
+        }
+    }
+}
+
+fn of_joints(parameters: &Parameters) -> usize {
+    parameters.0.iter().filter(|row| row.effect == "joint_compliance").count()
+}
+
+#[test]
+fn findings_that_make_another_recording_worse_than_geometry_alone_are_not_used_there() {
+    let carrying = Carrying::new();
+    let held = carrying.carry(&carrying.found.0, true);
+    assert!(!held.warnings.contains("not used"), "{}", held.warnings);
+    assert!(held.notes.contains("the geometry alone") && held.notes.contains("visited cells"), "{}", held.notes);
+    assert_eq!(of_joints(&held.parameters), of_joints(&carrying.found.0));
+    // Too much wind-up: still better than the geometry without it, which left room for it, and worse than geometry found by itself.
+    let mut wrong = carrying.found.0.clone();
+    wrong.0.iter_mut().filter(|row| row.effect == "joint_compliance").for_each(|row| row.value *= 1.8);
+    let mean = |carried: &CarriedThere| {
+        let errors = || carried.prediction.0.iter().filter(|row| row.held_out).map(|row| row.error_mm);
+        errors().sum::<f64>() / errors().count() as f64
+    };
+    let alone = carrying.carry(&carrying.geometry.0, false);
+    for separate in [true, false] {
+        let carried = carrying.carry(&wrong, separate);
+        assert!(carried.warnings.contains("does not hold here and is not used"), "{separate}: {}", carried.warnings);
+        for words in ["mean", "largest", "visited cells", "unvisited"] {
+            assert!(carried.warnings.contains(words), "{words}: {}", carried.warnings);
+        }
+        assert_eq!(of_joints(&carried.parameters), 0);
+        let apart = mean(&carried) / mean(&alone);
+        assert!((0.98..1.02).contains(&apart), "{separate}: {} mm, {} mm", mean(&carried), mean(&alone));
+    }
+}
+
+#[test]
+fn remarks_of_a_carried_model_name_no_variable_that_nothing_in_it_depends_on() {
+    let mut carrying = Carrying::new();
+    carrying.here.temperature = Some(vec![20.0; carrying.here.rows()]);
+    carrying.here.payload = Some(vec![0.0; carrying.here.rows()]);
+    carrying.there.0.temperature = Some(vec![35.0; carrying.there.0.rows()]);
+    carrying.there.0.payload = Some(vec![1.0; carrying.there.0.rows()]);
+    let remarks =
+        |carried: &CarriedThere| carried.prediction.0.iter().filter_map(|row| row.remark.clone()).collect::<Vec<_>>().join("\n");
+    let said = remarks(&carrying.carry(&carrying.geometry.0, false));
+    assert!(said.is_empty(), "{said}");
+    let said = remarks(&carrying.carry(&carrying.found.0, true));
+    assert!(!said.contains("temperature") && said.contains("payload"), "{said}");
+}
+
+#[test]
+fn the_closing_lines_state_the_carried_figure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d");
+    std::fs::copy(root.join("robot.yaml"), folder.path().join("robot.yaml")).expect("the robot");
+    let simulate = |id: &str, seed: u64| {
+        format!(
+            "  - id: {id}\n    uses: simulate\n    with:\n      truth: {{offset_deg: [0.1, 0.2, -0.1, 0.1, 0.1, 0]}}\n      \
+             poses: {{range_deg: [[-90, 90], [-40, 60], [-55, 55], [-120, 120], [-75, 75], [-160, 160]]}}\n      \
+             blocks: [{{usage: fit, points: 40}}, {{usage: check, points: 30}}]\n      seed: {seed}\n"
+        )
+    };
+    let split =
+        |id: &str, of: &str| format!("  - id: {id}\n    uses: split\n    reads: {{recording: {of}}}\n    with: {{by: usage}}\n");
+    let pipeline = format!(
+        "calib: 1\nname: carried\nseed: 1\nstages:\n  - uses: robot\n    with: {{file: robot.yaml}}\n{}{}  - id: found\n    uses: \
+         diagnose\n    reads: {{recording: here, split: fitted}}\n{}{}  \
+         - id: carried\n    uses: transfer\n    reads: {{recording: there, split: placed, parameters: found, covariance: \
+         found}}\n  - uses: validate\n  - uses: report\n",
+        simulate("here", 1),
+        split("fitted", "here"),
+        simulate("there", 2),
+        split("placed", "there")
+    );
+    std::fs::write(folder.path().join("p.yaml"), pipeline).expect("written");
+    let run = std::process::Command::new(env!("CARGO_BIN_EXE_calib"))
+        .args(["run", "p.yaml", "--quiet"])
+        .current_dir(folder.path())
+        .output()
+        .expect("calib");
+    let told = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success(), "{told}{}", String::from_utf8_lossy(&run.stderr));
+    let carried = told.lines().find(|line| line.starts_with("carried")).unwrap_or_default();
+    assert!(carried.contains("after `carried`") && carried.contains("30 held-out points"), "{told}");
+    assert!(!told.contains("after `found`"), "{told}");
 }

@@ -91,7 +91,8 @@ def main():
             print("".join(f"  {line}\n" for line in run.stderr.splitlines() if "warning" in line), end="")
 
             def rows(step):
-                sql = f"SELECT sequence, error_mm, sigma_mm, noise_mm, remark FROM {step}_prediction ORDER BY sequence"
+                # Columns without any value are not in a table.
+                sql = f"SELECT * FROM {step}_prediction ORDER BY sequence"
                 query = subprocess.run([arguments.calib, "query", "HEAD", sql, "--csv"], capture_output=True, text=True, cwd=folder)
                 if query.returncode != 0:
                     raise SystemExit(query.stderr)
@@ -103,11 +104,11 @@ def main():
                 print(f"  {name:9} mean {sum(errors) / len(errors):.3f}, max {max(errors):.3f} mm, {len(errors)} rows")
             worse = silent = 0
             for one, other in zip(plain, found):
-                sigma = float(other["sigma_mm"] or 0) ** 2 + float(other["noise_mm"] or 0) ** 2
+                sigma = float(other.get("sigma_mm") or 0) ** 2 + float(other.get("noise_mm") or 0) ** 2
                 if float(other["error_mm"]) - float(one["error_mm"]) > 3 * sigma ** 0.5:
                     worse += 1
-                    silent += not other["remark"]
-            remarked = sum(bool(row["remark"]) for row in found)
+                    silent += not other.get("remark")
+            remarked = sum(bool(row.get("remark")) for row in found)
             print(f"  worse by more than three stated sigma: {worse} rows, {silent} of them without a remark; {remarked} rows have one")
 
 

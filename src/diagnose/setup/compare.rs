@@ -1,6 +1,7 @@
 //! Every set-up error of the list tried: the recording without it, base and tool aligned anew, and what is left compared.
 
 use super::manufacture::{ANGLE, length_error};
+use super::mixture::{TwoSetups, is_in_parts};
 use super::number::FreeNumber;
 use super::order::RowOrder;
 use super::pairs::{PointPairs, sampled};
@@ -81,6 +82,11 @@ impl<'a> AsStated<'a> {
         self.is_no_robot() || self.share() > NOMINAL && self.placed.left > self.noise
     }
 
+    /// Whether a part of the rows lies farther off than any nominal robot leaves them, however near most are.
+    pub fn is_in_parts(&self) -> bool {
+        is_in_parts(&self.placed.off, NOMINAL * self.reach)
+    }
+
     fn share(&self) -> f64 {
         self.placed.left / self.cloud.max(f64::MIN_POSITIVE)
     }
@@ -103,6 +109,15 @@ impl<'a> AsStated<'a> {
         let own = if number.is_some() { OWN_NUMBERS } else { 1.0 };
         let explains = counts && BETTER * own * share < self.share() && share < CLOUD && placed.left < NOMINAL * pairs.reach();
         Try { wrong, placed, share: own * share, explains }
+    }
+
+    /// Two set-ups whose rows were read as one, where that explains it.
+    pub fn two_setups(&self) -> Option<TwoSetups> {
+        let of = |rows: &[usize]| PointPairs::of(self.question.robot, self.question.data, rows.iter().map(|row| (*row, *row)));
+        let sample: Vec<usize> = self.judges.iter().map(|k| self.rows[*k]).collect();
+        let found = TwoSetups::of(&of(&sample), &self.placed)?;
+        let is_right = found.left < CLOUD * self.cloud && found.left < NOMINAL * self.reach;
+        is_right.then(|| found.of_all(&of(&self.rows), &self.rows))
     }
 
     /// What explains it: one set-up error, else two.

@@ -6,6 +6,7 @@
 
 mod compare;
 mod manufacture;
+mod mixture;
 mod number;
 mod order;
 mod outcome;
@@ -29,10 +30,14 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
     }
     let stated = AsStated::of(question);
     if !stated.is_far_off() {
-        return None;
+        let parted = if stated.is_in_parts() { stated.two_setups() } else { None };
+        return parted.map(|found| outcome::two_setups(question, &found));
     }
-    match stated.explained() {
-        Some(found) => Some(outcome::explained(question, &stated, &found)),
+    if let Some(found) = stated.explained() {
+        return Some(outcome::explained(question, &stated, &found));
+    }
+    match stated.two_setups() {
+        Some(found) => Some(outcome::two_setups(question, &found)),
         None => stated.is_no_robot().then(|| outcome::unexplained(question, &stated)),
     }
 }

@@ -1,6 +1,7 @@
 //! What a diagnosis says of a wrong set-up: the nominal robot where its base fits best, the set-up error, and no physics.
 
 use super::compare::{AsStated, ExplainedSetup};
+use super::mixture::TwoSetups;
 use super::pairs::median;
 use super::words::{mm, words};
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Question, SETUP, VerdictKind};
@@ -49,6 +50,11 @@ pub(super) fn explained(question: &Question, stated: &AsStated, found: &Explaine
     };
     let errors = (lengths(&stated.placed.off, 1.0), lengths(&found.placed.off, scale));
     Diagnosis { before: errors.0, after: errors.1, ..wrong(question, vec![finding]) }
+}
+
+/// Rows of two set-ups.
+pub(super) fn two_setups(question: &Question, found: &TwoSetups) -> Diagnosis {
+    wrong(question, vec![finding(format!("{}.", found.words()))])
 }
 
 /// An identified model that leaves the robot file by more than manufacture allows, and no set-up error of the list that explains it.

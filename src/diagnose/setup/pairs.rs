@@ -57,6 +57,16 @@ impl<'a> PointPairs<'a> {
         out
     }
 
+    /// Some of the rows.
+    pub fn only(&self, rows: &[usize]) -> Self {
+        Self {
+            q: rows.iter().flat_map(|row| self.q(*row).to_vec()).collect(),
+            points: rows.iter().map(|row| self.points[*row]).collect(),
+            target: rows.iter().map(|row| self.target[*row]).collect(),
+            ..self.clone()
+        }
+    }
+
     pub fn with_points(&self, change: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self { points: self.points.iter().map(change).collect(), ..self.clone() }
     }

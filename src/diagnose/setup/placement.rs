@@ -31,6 +31,30 @@ pub(super) struct Placement {
     pub left: f64,
 }
 
+impl Placement {
+    /// By how much it misses points, in the tracker's frame and in that of the last body.
+    pub fn missed(&self, pairs: &PointPairs) -> [Vec<Vector3<f64>>; 2] {
+        let robot = pairs.robot;
+        let missed = |row: usize| {
+            let body = bodies(robot, pairs.q(row))[robot.joints()];
+            let missed = pairs.points[row] - self.base.point(&body.point(&self.seats[pairs.target[row]]));
+            (missed, (self.base.rotation * body.rotation).transpose() * missed)
+        };
+        let (there, turned) = (0..pairs.rows()).map(missed).unzip();
+        [there, turned]
+    }
+
+    /// How far another one's base stands from its own, m.
+    pub fn base_apart(&self, other: &Self) -> f64 {
+        (self.base.translation - other.base.translation).norm()
+    }
+
+    /// How far another one's targets sit from its own at most, m.
+    pub fn tool_apart(&self, other: &Self) -> f64 {
+        self.seats.iter().zip(&other.seats).map(|(own, other)| (own - other).norm()).fold(0.0, f64::max)
+    }
+}
+
 /// The best placement.
 pub(super) fn place(pairs: &PointPairs, number: Option<FreeNumber>) -> Placement {
     let robot = pairs.robot;

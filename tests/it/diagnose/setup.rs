@@ -195,7 +195,47 @@ fn sound_recordings_say_nothing_of_the_set_up() {
         let said = diagnosed(&inputs).expect(name);
         assert_ne!(said.verdict, "wrong_setup", "{name}: {}", said.statement);
         assert!(said.findings.iter().all(|finding| finding.effect != "setup"), "{name}");
+        assert!(!said.warnings.iter().any(|line| line.contains("rounded") || line.contains("payload")), "{:?}", said.warnings);
     }
+}
+
+#[test]
+fn a_rounded_log_is_named_with_its_step_and_what_it_makes() {
+    let rounded = |value: f64, step: f64| (value / step).round() * step;
+    let mut coarse = recorded(&fixture::spherical(), 48, json!([]));
+    joints(&mut coarse, |q| q.iter_mut().for_each(|q| *q = rounded(q.to_degrees(), 0.1).to_radians()));
+    let said = diagnosed(&coarse).expect("a diagnosis");
+    let line = said.warnings.iter().find(|line| line.starts_with("joint positions are rounded to 0.1 deg, which makes up to"));
+    let up_to = line.and_then(|line| line.split("up to ").nth(1)?.split(" mm").next()?.parse::<f64>().ok());
+    // Half a step of every joint at once, at an arm of some 2.5 m: a few millimetres.
+    assert!(up_to.is_some_and(|mm| (1.0..15.0).contains(&mm)), "{:?}", said.warnings);
+    assert!(said.statement.contains("rounded to 0.1 deg"), "{}", said.statement);
+    let mut coarse = recorded(&fixture::spherical(), 49, json!([]));
+    points(&mut coarse, |p| p.map(|x| rounded(x, 1e-3)));
+    let said = diagnosed(&coarse).expect("a diagnosis");
+    let line = "measured points are rounded to 1 mm, which makes up to 0.87 mm";
+    assert!(said.warnings.iter().any(|own| own.starts_with(line)), "{:?}", said.warnings);
+    // Digits that are finer than the noise cost nothing.
+    let mut fine = recorded(&fixture::spherical(), 50, json!([]));
+    joints(&mut fine, |q| q.iter_mut().for_each(|q| *q = rounded(q.to_degrees(), 1e-4).to_radians()));
+    points(&mut fine, |p| p.map(|x| rounded(x, 1e-6)));
+    let said = diagnosed(&fine).expect("a diagnosis");
+    assert!(!said.warnings.iter().any(|line| line.contains("rounded")), "{:?}", said.warnings);
+}
+
+#[test]
+fn a_payload_column_that_is_never_or_seldom_filled_is_said() {
+    let sound = recorded(&fixture::spherical(), 51, json!([]));
+    let said = |filled: fn(usize) -> f64| {
+        let mut inputs = sound.clone();
+        inputs.recording.payload = Some((0..72).map(filled).collect());
+        diagnosed(&inputs).expect("a diagnosis").warnings.join("\n")
+    };
+    let empty = said(|_| f64::NAN);
+    assert!(empty.contains("the payload column is empty in all 72 rows"), "{empty}");
+    let half = said(|row| if row % 2 == 0 { 10.0 } else { f64::NAN });
+    assert!(half.contains("the payload column is empty in 36 of 72 rows"), "{half}");
+    assert!(!said(|_| 0.0).contains("payload column"));
 }
 
 #[test]
@@ -319,4 +359,26 @@ fn without_link_masses_a_loaded_recording_says_what_is_lost() {
     let lost = "the robot file gives no link masses, yet gravity loads joints in these poses (24 rows of 48 carry a payload)";
     assert!(said.statement.contains(lost), "{}", said.statement);
     assert!(said.warnings.iter().any(|warning| warning.starts_with(lost)), "{:?}", said.warnings);
+}
+
+#[test]
+fn two_set_ups_in_one_recording_are_named_with_the_rows_of_each() {
+    let sound = recorded(&fixture::spherical(), 52, json!([]));
+    let said = |other: fn(usize) -> bool, first: &str, second: &str| {
+        let mut inputs = sound.clone();
+        for (row, point) in inputs.recording.position.iter_mut().enumerate().filter(|(row, _)| other(*row)) {
+            // Half a metre aside, and turned by 40 deg.
+            let (sin, cos) = 0.7f64.sin_cos();
+            assert!(row < 72);
+            *point = [cos * point[0] - sin * point[1] + 0.5, sin * point[0] + cos * point[1], point[2]];
+        }
+        let said = diagnosed(&inputs).expect("a diagnosis");
+        assert_eq!(said.verdict, "wrong_setup", "{}", said.statement);
+        let statement = &said.findings[0].statement;
+        assert!(statement.starts_with("two set-ups are in one recording"), "{statement}");
+        assert!(statement.contains(first) && statement.contains(second), "{statement}");
+        assert!(said.findings.iter().all(|finding| finding.effect == "setup"));
+    };
+    said(|row| row >= 30, "1 to 30 (30 rows)", "31 to 72 (42 rows)");
+    said(|row| row % 2 == 1, "1, 3, 5, 7, ... (36 rows)", "2, 4, 6, 8, ... (36 rows)");
 }
