@@ -90,7 +90,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
-        let round = LastRound { pool: search.pool, survey: &survey, judged, first, last, located };
+        let without = question.without;
+        let round = LastRound { pool: search.pool, survey: &survey, judged, without, first, last, located };
         return conclude(round, &fitter, &before);
     }
 }

@@ -1,11 +1,13 @@
 //! Diagnosis of recordings with concealed effects: what was hidden is named and placed, and nothing else.
 
 mod flanks;
+mod possible;
 mod said;
 mod scrambled;
 mod setup;
 mod tool_mass;
 mod weight;
+mod without;
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};
