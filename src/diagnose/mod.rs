@@ -9,6 +9,7 @@
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
 //! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
 
+mod adequacy;
 mod closed_form;
 mod judge;
 mod locate;
@@ -91,7 +92,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
-        let round = LastRound { pool: search.pool, survey: &survey, judged, first, last, located };
+        let without = question.without;
+        let round = LastRound { pool: search.pool, survey: &survey, judged, without, first, last, located };
         return conclude(round, &fitter, &before);
     }
 }

@@ -19,7 +19,7 @@ pub struct Question<'a> {
     pub set: &'a [usize],
     /// By what the penalties of rare causes (-2 ln of their odds) are multiplied: 1 as the library believes.
     pub prior_weight: f64,
-    /// Names of causes that are not tried.
+    /// Names of causes that are not tried, and not given to what looks like them.
     pub without: &'a [String],
     /// Effects that the user declares: they are tried beside the library's.
     pub own: &'a [&'static DeclaredCause],
@@ -130,9 +130,9 @@ pub const SETUP: &str = "setup";
 const FAULTS: [&str; 4] = ["outlier", "mislabelled_point", "joint_log_lag", SETUP];
 
 impl Finding {
-    /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording.
+    /// Whether it is a cause on the arm, its mounting or the instrument; else a fault of the recording, which has no evidence.
     pub fn is_physics(&self) -> bool {
-        !FAULTS.contains(&self.effect)
+        self.evidence.is_some() && !FAULTS.contains(&self.effect)
     }
 
     /// Whether nothing but a shape stands behind it.

@@ -2,7 +2,7 @@
 
 use super::basis::around;
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Law, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -134,6 +134,19 @@ impl Cause for Backlash {
             None => return format!("{place} has lost motion to the side that its load pushes it"),
         };
         format!("{place} has lost motion: a half-gap of {} {by}", summary.size())
+    }
+
+    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let law = form.term()?.law();
+        if let Variable::Push { joint, friction_nm } = law.first.of {
+            let most = survey.recorded_load(joint);
+            let [friction, largest] = [friction_nm.abs(), most].map(|torque| figure(torque, 0));
+            if friction_nm.abs() > most {
+                return Some(format!("its threshold of {friction} Nm lies beyond the largest recorded load of {largest} Nm"));
+            }
+        }
+        let pushed = matches!(law.first.of, Variable::Load { .. } | Variable::Push { .. });
+        (pushed && *p.first()? < -error(0)).then(|| "its gap is negative".into())
     }
 
     fn finer(&self) -> &'static [&'static str] {

@@ -117,6 +117,12 @@ pub trait Cause: Sync {
         String::new()
     }
 
+    /// Why a form with coefficients `p` (SI) cannot be this cause, as a clause: a number beyond what its physics allows, or beyond what the
+    /// recording holds. Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
+    fn impossible(&self, _form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+        None
+    }
+
     /// See [`Placed::called`].
     fn called(&self, _term: &Term, _p: &[f64], _survey: &Survey) -> &'static str {
         self.name()

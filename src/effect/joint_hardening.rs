@@ -46,11 +46,10 @@ const LARGE: f64 = 1e-3;
 /// Sines of a free curve.
 const CURVE: usize = 6;
 /// Smallest and largest torque of a bend, as shares of the joint's largest load: a smaller one is a step at no load, beyond the
-/// largest a knee is never seen and what saturates there is a straight line. See also [`least_bend`].
-const BENDS: [f64; 2] = [0.01, 10.0];
+/// largest it is never seen, and a power says as much of what bends gradually. See also [`least_bend`].
+const BENDS: [f64; 2] = [0.01, 0.98];
 /// Share of the rows that has to lie on the other side of a bend.
 const BEYOND: f64 = 0.05;
-const LAST_KNEE: f64 = 0.98;
 /// Lost motion changes sides within this share of the largest load, and grows beyond by no more than this share of itself.
 const SHARP: f64 = 0.15;
 const FLAT: f64 = 0.1;
@@ -74,7 +73,7 @@ impl Cause for JointHardening {
             let most = survey.load(joint);
             let least = least_bend(survey, joint);
             let seen = move |share: &f64| share * most >= least;
-            let shares = [0.05, 0.15, 0.5, 1.5].into_iter().filter(seen);
+            let shares = [0.05, 0.15, 0.5, BENDS[1]].into_iter().filter(seen);
             let laws = shares.map(|share| HardeningLaw::Saturating { at_nm: share * most });
             let laws = laws.chain([0.2].into_iter().filter(seen).map(|share| HardeningLaw::SoftZone { at_nm: share * most }));
             let laws =
@@ -100,6 +99,17 @@ impl Cause for JointHardening {
 
     fn finer(&self) -> &'static [&'static str] {
         &["backlash", "unknown"]
+    }
+
+    fn impossible(&self, form: &Form, _p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let windup: &BentWindup = form.as_a()?;
+        let (HardeningLaw::Saturating { at_nm } | HardeningLaw::SoftZone { at_nm } | HardeningLaw::Knee { at_nm }) = windup.law
+        else {
+            return None;
+        };
+        let most = survey.recorded_load(windup.joint);
+        let [at, largest] = [at_nm, most].map(|torque| figure(torque, 0));
+        (at_nm > most).then(|| format!("its bend at {at} Nm lies beyond the largest recorded load of {largest} Nm"))
     }
 
     fn identities(&self, form: &Form, called: &str) -> Vec<(&'static str, Place)> {
@@ -264,7 +274,7 @@ impl Placed for BentWindup {
         let scaled = |factor: f64| match self.law {
             HardeningLaw::Saturating { at_nm } => Some(HardeningLaw::Saturating { at_nm: within(at_nm * factor, BENDS[1]) }),
             HardeningLaw::SoftZone { at_nm } => Some(HardeningLaw::SoftZone { at_nm: within(at_nm * factor, BENDS[1]) }),
-            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee { at_nm: within(at_nm * factor, LAST_KNEE) }),
+            HardeningLaw::Knee { at_nm } => Some(HardeningLaw::Knee { at_nm: within(at_nm * factor, BENDS[1]) }),
             HardeningLaw::Power { exponent, at_nm } => {
                 Some(HardeningLaw::Power { exponent: (exponent * factor).clamp(0.2, 6.0), at_nm })
             }

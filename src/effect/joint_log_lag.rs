@@ -96,6 +96,13 @@ impl Cause for JointLogLag {
         }
     }
 
+    /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
+    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, _survey: &Survey) -> Option<String> {
+        let lag: &Lag = form.as_a()?;
+        let (most, share) = p.iter().copied().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        (lag.by != Behind::Clock && share < -error(most)).then(|| "a lag is not below zero".into())
+    }
+
     fn is_of_the_measurement(&self) -> bool {
         true
     }

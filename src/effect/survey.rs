@@ -1,7 +1,7 @@
 //! What a recording offers to hypotheses: ranges, loads, times, and which columns it has.
 
 use super::{Form, Sight};
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, Posture, RobotModel};
 use nalgebra::Vector3;
 
 /// The fitted rows of a recording as seen from the present model.
@@ -82,6 +82,18 @@ impl<'a> Survey<'a> {
     /// Largest load torque of a joint, Nm.
     pub fn load(&self, joint: usize) -> f64 {
         self.torques(joint).fold(0.0, |most, torque| most.max(torque.abs()))
+    }
+
+    /// Largest load torque (Nm) of a joint that the recording holds: by the present model, and no more than robot file and stated payloads
+    /// make, since a load that a model itself makes up is not recorded.
+    pub fn recorded_load(&self, joint: usize) -> f64 {
+        let stated = |row: &usize| Posture::as_stated(self.robot, self.data.q(*row), self.data.payload[*row]).torque[joint].abs();
+        self.rows.iter().map(stated).fold(0.0, f64::max).min(self.load(joint))
+    }
+
+    /// From the first fitted row to the last, s.
+    pub fn length(&self) -> f64 {
+        self.time[1] - self.time[0]
     }
 
     /// Whether gravity loads the joint enough to speak of it.

@@ -2,7 +2,8 @@
 
 use super::motion::{SHORT, extent};
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure, warmth,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Summary, Survey, Term, Variable, figure,
+    warmth,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -11,8 +12,12 @@ pub struct ThermalGrowth;
 
 /// 1/K: more than any polymer or metal that links are made of, four times aluminium.
 const PER_KELVIN: f64 = 1e-4;
-/// The same over a warm-up by 60 K.
-const MOST: f64 = 60.0 * PER_KELVIN;
+/// K; no arm warms up by more.
+const WARM_UP: f64 = 60.0;
+/// The same over a warm-up.
+const MOST: f64 = WARM_UP * PER_KELVIN;
+/// 1/K: zinc has 30e-6, aluminium 23e-6. What the search may try is more, so that what is no growth is not forced into another name.
+const METAL: f64 = 7e-5;
 
 /// What separates warmth of the arm from that of its surroundings.
 pub(super) const MEASURE: Measure =
@@ -57,6 +62,19 @@ impl Cause for ThermalGrowth {
 
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
         warmth::near(term, survey, level)
+    }
+
+    fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let (term, value) = (form.term()?, *p.first()?);
+        let warm_up = matches!(term.basis(), Basis::Settling { .. });
+        let most = if warm_up { WARM_UP * METAL } else { METAL };
+        let per = if warm_up { "in all" } else { "for each kelvin" };
+        let [size, largest] = [value, most].map(|share| figure(1e6 * share, 0));
+        if value < -error(0) {
+            return Some("links do not shrink as they warm up".into());
+        }
+        let larger = (value > most).then(|| format!("{size} um/m {per} is more than the {largest} of any material of links"));
+        larger.or_else(|| warmth::impossible(term, survey))
     }
 
     fn sentence(&self, summary: &Summary) -> String {

@@ -2,8 +2,8 @@
 
 use super::tracker_circle::RARER;
 use super::{
-    Basis, Cause, CauseDescription, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable, figure,
-    warmth,
+    Basis, Cause, CauseDescription, Form, Hypothesis, Measure, Motion, NumberSpec, Polar, Summary, Survey, Term, Variable,
+    figure, warmth,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -12,6 +12,10 @@ pub struct TrackerRefraction;
 
 /// 1/K, and over a warm-up by 30 K: air changes by 1e-6 a kelvin; more is a weather station with a fault.
 const MOST: [f64; 2] = [1e-5, 3e-4];
+/// K; no air in a hall warms up by more.
+const WARM_UP: f64 = 30.0;
+/// 1/K: five times what air does, since the temperature that was logged need not be that along the beam.
+const AIR: f64 = 5e-6;
 
 impl Cause for TrackerRefraction {
     fn about(&self) -> &'static CauseDescription {
@@ -43,6 +47,16 @@ impl Cause for TrackerRefraction {
 
     fn near(&self, term: &Term, survey: &Survey, level: i32) -> Vec<Term> {
         warmth::near(term, survey, level)
+    }
+
+    fn impossible(&self, form: &Form, p: &[f64], _error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
+        let (term, value) = (form.term()?, *p.first()?);
+        let warm_up = matches!(term.basis(), Basis::Settling { .. });
+        let most = if warm_up { WARM_UP * AIR } else { AIR };
+        let per = if warm_up { "in all" } else { "for each kelvin" };
+        let [size, largest] = [value.abs(), most].map(|share| figure(1e6 * share, 0));
+        let larger = (value.abs() > most).then(|| format!("{size} um/m {per} is more than the {largest} that air can make"));
+        larger.or_else(|| warmth::impossible(term, survey))
     }
 
     fn sentence(&self, summary: &Summary) -> String {

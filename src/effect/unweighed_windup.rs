@@ -9,7 +9,7 @@ use super::skeleton::moments;
 use super::{
     ArmState, Cause, Deflection, Effect, Form, Hypothesis, ParameterSpec, Place, Placed, Summary, Survey, Variable, figure,
 };
-use crate::robot::{LoadCorrection, Measurements, Posture, RobotModel, Travel};
+use crate::robot::{Measurements, Posture, RobotModel};
 use crate::units::Unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -69,7 +69,8 @@ impl UnweighedWindup {
             return Vec::new();
         }
         let lines = moments(survey.robot);
-        let postures: Vec<Posture> = survey.rows.iter().map(|row| hanging(survey.robot, survey.data.q(*row))).collect();
+        let postures: Vec<Posture> =
+            survey.rows.iter().map(|row| Posture::as_stated(survey.robot, survey.data.q(*row), 0.0)).collect();
         let loaded = survey.revolute().filter(|joint| lever(survey.robot, *joint, &postures) > LEVER);
         loaded.flat_map(|joint| Self::at(cause, survey.robot, joint, &lines)).collect()
     }
@@ -143,17 +144,6 @@ pub(super) fn is_unweighed(robot: &RobotModel) -> bool {
 fn is_plumb(robot: &RobotModel, joint: usize) -> bool {
     let down = Vector3::from(robot.description().gravity);
     !robot.is_revolute(joint) || robot.axis(joint).cross(&down).norm() < 1e-6 * down.norm()
-}
-
-/// The arm of the robot file at joint positions `q`.
-fn hanging(robot: &RobotModel, q: &[f64]) -> Posture {
-    let mut posture = Posture::new(robot.joints());
-    for (joint, travel) in q.iter().enumerate() {
-        let behind = posture.behind[joint] * robot.motion(joint, &Travel::new(*travel));
-        (posture.body[joint], posture.behind[joint + 1]) = (behind, behind);
-    }
-    posture.gravity_torques(robot, 0.0, &LoadCorrection::new(robot.joints()));
-    posture
 }
 
 /// The largest lever of a joint for gravity: 1 about a level axis.

@@ -1,7 +1,7 @@
 //! How far something has warmed up: by the measured temperature, at once or behind it, or by time since the start.
 
 use super::basis::around;
-use super::{Basis, Law, Survey, Term, Variable};
+use super::{Basis, Clock, Law, Survey, Term, Variable};
 
 /// Time constants as shares of the recording.
 const WARM_UPS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.5];
@@ -27,6 +27,24 @@ pub(super) fn all(survey: &Survey) -> Vec<(Law, usize)> {
     let times = several(times.collect(), kinds * WARM_UPS.len());
     measured.map(|measured| (measured, kinds)).into_iter().chain(lagging).chain(times).collect()
 }
+
+/// Why a term cannot follow a warmth: its time constant is beyond what the recording can show, which only a straight line is left of.
+pub(super) fn impossible(term: &Term, survey: &Survey) -> Option<String> {
+    let time = match (term.law().first.of, term.basis()) {
+        (Variable::Lagging { lag: time } | Variable::Work { cooling: time, .. }, _) => time,
+        (_, Basis::Settling { constant, .. }) => constant,
+        _ => return None,
+    };
+    let (clock, length) = (Clock::of(survey.data), survey.length());
+    // What ends at the bound would go on beyond it.
+    let beyond = time >= SLOWEST * CONSTANTS[1] * length;
+    beyond.then(|| {
+        format!("its time constant of {} is ten times as long as the recording ({})", clock.span(time), clock.span(length))
+    })
+}
+
+/// A time constant of this share of its bound is at the bound.
+const SLOWEST: f64 = 0.99;
 
 /// Other time constants around that of a term's first factor.
 pub(super) fn near(term: &Term, survey: &Survey, level: i32) -> Vec<Term> {

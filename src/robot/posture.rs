@@ -1,6 +1,7 @@
 //! The arm as it hangs: frames of all stations, what each joint carries, and gravity's torques (static part of Eq. 24).
 
 use crate::robot::model::RobotModel;
+use crate::robot::travel::Travel;
 use crate::spatial::Pose;
 use nalgebra::Vector3;
 
@@ -78,6 +79,17 @@ impl Posture {
             torque: vec![0.0; joints],
             gravity: Vector3::zeros(),
         }
+    }
+
+    /// The arm of the robot file at joint positions `q` with `payload` kg declared on the tool, as if nothing yielded.
+    pub fn as_stated(robot: &RobotModel, q: &[f64], payload: f64) -> Self {
+        let mut posture = Self::new(robot.joints());
+        for (joint, travel) in q.iter().enumerate() {
+            let behind = posture.behind[joint] * robot.motion(joint, &Travel::new(*travel));
+            (posture.body[joint], posture.behind[joint + 1]) = (behind, behind);
+        }
+        posture.gravity_torques(robot, payload, &LoadCorrection::new(robot.joints()));
+        posture
     }
 
     /// Computes what is carried and the torques from the frames, with `payload` kg declared on the tool.

@@ -1,7 +1,7 @@
 //! `diagnose`: where the recording and the robot as its user believes it differ, what physics was left out, and the gain of it.
 
 use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulation, diagnose, wrong_setup};
-use crate::effect::CAUSES;
+use crate::effect::{BaseFrame, CAUSES};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::robot::RobotModel;
@@ -28,7 +28,8 @@ pub struct Diagnose {
     /// By what the penalties of rare causes are multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
     pub prior_weight: f64,
-    /// Causes that are not tried, by their names: what a cell cannot have, or what a test of the library leaves out.
+    /// Causes that are not tried and never named: what a cell cannot have, or what a test of the library leaves out. What looks like one
+    /// all the same is `unknown`; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<String>,
     /// Files with effects of your own, which are tried beside those of the library.
@@ -80,7 +81,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 18;
+    const IMPLEMENTATION: u32 = 19;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -93,6 +94,10 @@ impl Stage for Diagnose {
         for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
             let allowed: Vec<&str> = tried().collect();
             faults.push(Fault::new(format!("without[{k}]"), format!("`{name}` is no cause{}", instead(name, &allowed))));
+        }
+        if let Some(k) = self.without.iter().position(|name| name == BaseFrame::NAME) {
+            let message = "`base_frame` places the robot before the instrument: without it nothing can be diagnosed";
+            faults.push(Fault::new(format!("without[{k}]"), message));
         }
         faults
     }

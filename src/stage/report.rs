@@ -75,7 +75,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 
@@ -101,6 +101,7 @@ impl Stage for Report {
         let stands = stands.filter(|_| reads.recording.simulated.is_none() && wrong.is_none());
         let withdrawn = stands.as_ref().map(|stands| stands.withdrawn.clone()).unwrap_or_default();
         stands.iter().flat_map(Standing::warnings).for_each(|warning| context.services.warn(warning));
+        let counting = counting(&reads)?;
         let mut standing = stands.as_ref().map(|stands| [stands.step.clone(), stands.model.clone()]);
         let (mut statistics, mut prediction) = (reads.statistics, reads.prediction);
         if let Some(carried) = carried(standing.as_ref().map(|[step, _]| step), &prediction, &reads.recording) {
@@ -109,6 +110,7 @@ impl Stage for Report {
             standing = Some([carried.clone(), carried]);
         }
         let tables = Tables {
+            counting,
             statistics,
             prediction: unlabelled(prediction),
             parameters: standing.as_ref().and_then(|[_, stage]| model(stage)).unwrap_or(reads.parameters),

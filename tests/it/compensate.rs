@@ -1,7 +1,7 @@
 //! Compensation: inverse kinematics, least change, and the command `compensate` on texts of targets.
 
-mod controller_list;
 pub mod concealed;
+mod controller_list;
 mod counting;
 mod counting_said;
 mod gate;

@@ -2,11 +2,13 @@
 
 mod flanks;
 mod left_out;
+mod possible;
 mod said;
 mod scrambled;
 mod setup;
 mod tool_mass;
 mod weight;
+mod without;
 
 use crate::desk::{Desk, shared, table};
 use crate::suspects::{Inputs, pipeline};

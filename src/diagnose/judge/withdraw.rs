@@ -74,6 +74,7 @@ fn empty(now: &FitState, set: &[usize], comparison: &ModelComparison) -> Option<
         "in the whole model it is smaller than its own uncertainty"
     };
     let state = comparison.without(now, &members);
+    let effect = comparison.said(effect);
     Some((members, format!("{effect} at {place}: {why}"), state))
 }
 
@@ -113,6 +114,7 @@ fn harmful(
             None => (),
         }
         if let Some(state) = state.filter(|_| gain <= 0.0 && worst.as_ref().is_none_or(|(least, ..)| gain < *least)) {
+            let effect = comparison.said(effect);
             let sentence =
                 format!("{effect} at {place}: poses that a fit has not seen are predicted as well or better without it");
             worst = Some((gain, members, sentence, state));

@@ -7,11 +7,11 @@ use crate::robot::{Measurements, RobotModel};
 /// Effects that the user's simulation has.
 pub const BASE: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
 
-/// The base model at its start.
-pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Model {
+/// The base model at its start, less the corrections that the user excludes.
+pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize], without: &[String]) -> Model {
     let setting = EffectContext { base: align(robot, data, rows), load: Load::GravityTorque };
     let effects: Vec<Box<dyn Effect>> = identified()
-        .filter(|cause| BASE.contains(&cause.name()))
+        .filter(|cause| BASE.contains(&cause.name()) && !without.iter().any(|name| name == cause.name()))
         .filter_map(|cause| cause.whole(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();

@@ -121,7 +121,7 @@ impl<'a> Fitter<'a> {
             estimated: 0,
             on_path: PathCorrelation::Unasked,
         };
-        let base = base_model(question.robot, &fitter.data, question.fit);
+        let base = base_model(question.robot, &fitter.data, question.fit, question.without);
         let mut now = fitter.fit(&base, Vec::new());
         fitter.free = Some(now.fitted.free());
         fitter.spread = spreads(&now.model, &fitter.data);

@@ -1,21 +1,23 @@
 //! Findings that are no physics of the arm: rows that no model can follow, logs that are apart.
 
+use super::last_round::LastRound;
 use crate::diagnose::types::{Finding, Probabilities};
-use crate::effect::{JointLogLag, Place};
+use crate::effect::{JointLogLag, Place, Unknown};
 use crate::error::counted;
-use crate::estimate::{Screening, Suspect, SuspectKind};
+use crate::estimate::{Suspect, SuspectKind};
 
 /// Joints and points of all rows that are so many rows apart.
-pub(super) fn rows_apart(offset: i64) -> Finding {
+pub(super) fn rows_apart(offset: i64, last: &LastRound) -> Finding {
     let rows = counted(offset.unsigned_abs() as usize, "row");
     let how = if offset < 0 { "ahead of" } else { "behind" };
     let text =
         format!("the joints of a point are {rows} {how} it: join the two logs again, nothing else can be diagnosed before");
-    of_the_recording(JointLogLag::NAME, text)
+    of_the_recording(JointLogLag::NAME, text, last)
 }
 
 /// Rows of the recording that no model can follow, as findings; `unknown` is a row that the found causes cannot foretell.
-pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Finding> {
+pub(super) fn faults(last: &LastRound, unknown: Option<usize>) -> Vec<Finding> {
+    let screening = &last.judged.state.screening;
     // What has no other explanation than that it is far out must be farther than this noise reaches.
     let far = |s: &Suspect| s.kind != SuspectKind::Outlier || s.statistic > screening.reach;
     let of = |kinds: fn(SuspectKind) -> bool| -> Vec<usize> {
@@ -31,22 +33,23 @@ pub(super) fn faults(screening: &Screening, unknown: Option<usize>) -> Vec<Findi
     let mut out = Vec::new();
     let swapped = of(|kind| matches!(kind, SuspectKind::Exchanged | SuspectKind::Mislabelled));
     if !swapped.is_empty() {
-        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped))));
+        out.push(of_the_recording("mislabelled_point", format!("points carry another point's name: {}", list(&swapped)), last));
     }
     let shifted = of(|kind| matches!(kind, SuspectKind::ShiftedBlock(_)));
     if !shifted.is_empty() {
         let text = format!("joints and points are rows apart in the recording: {}", list(&shifted));
-        out.push(of_the_recording("joint_log_lag", text));
+        out.push(of_the_recording(JointLogLag::NAME, text, last));
     }
     let wrong = of(|kind| matches!(kind, SuspectKind::Outlier | SuspectKind::UnitSlip(_) | SuspectKind::Zero));
     if !wrong.is_empty() {
-        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong))));
+        out.push(of_the_recording("outlier", format!("single wrong points: {}", list(&wrong)), last));
     }
     out
 }
 
-/// A fault of the recording.
-fn of_the_recording(effect: &'static str, statement: String) -> Finding {
+/// A fault of the recording; without its name where that is not to be given.
+fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -> Finding {
+    let effect = if last.excludes(effect) { Unknown::NAME } else { effect };
     Finding {
         effect,
         place: Place::Recording,

@@ -4,14 +4,14 @@ use super::faults::{faults, rows_apart};
 use super::groups::{FindingKey, REFINEMENT, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
-use super::rivals::{exact, rivals};
-use super::statement::{not_so, sentence};
+use super::rivals::{FIRM, exact, rivals};
+use super::statement::{left_out, not_so, sentence};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::effect::{
-    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people,
+    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, figure, follows, people,
 };
 use crate::estimate::{ParameterStatus, tail};
 
@@ -19,7 +19,7 @@ use crate::estimate::{ParameterStatus, tail};
 pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let state = &last.judged.state;
     if let Some(offset) = state.screening.apart {
-        return vec![rows_apart(offset)];
+        return vec![rows_apart(offset, last)];
     }
     let set = last.set();
     let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
@@ -33,7 +33,7 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     };
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
-    out.extend(faults(&state.screening, unknown));
+    out.extend(faults(last, unknown));
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
@@ -52,12 +52,11 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let own: Vec<usize> = members.iter().map(|i| last.judged.set[*i]).collect();
     let rest = without(pool, &whole.set, &own);
     let forms: Vec<Form> = members.iter().map(|i| state.causes[*i].form.clone()).collect();
-    let mut rivals = rivals(pool, &rest, &own, whole.bic, (effect, place));
+    let mut rivals = rivals(last, &rest, &own, whole.bic, (effect, place));
     exact(effect, &forms, &mut rivals);
-    let turn = HolderTurn::of(state, last.survey.data, &forms);
+    let turn = HolderTurn::of(state, last.survey.data, &forms).filter(|turn| !last.excludes(turn.rival(effect).effect));
     let other = turn.as_ref().map(|turn| turn.rival(effect));
     rivals.extend(other.filter(|other| !rivals.iter().any(|rival| (rival.effect, rival.place) == (other.effect, other.place))));
-    rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
     let effect_rms = size(pool, members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
     let without = pool.solve(&rest);
     let gain = whole.solution.gain - without.gain;
@@ -77,14 +76,21 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let clock = Clock::of(last.survey.data);
     let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
     let varies = varying(&own, pool, whole, gain, clock);
-    let why = impossible(last, members).map(String::from).or_else(|| varies.as_ref().map(|(why, _)| why.clone()));
-    rivals.extend(varies.map(|(_, loss)| RivalCause { effect, place, delta_bic: loss, probability: 0.0 }));
+    let impossible = impossible(last, members, effect).or_else(|| more_than_it_does(effect, &evidence));
+    if let (None, Some((_, loss))) = (&impossible, &varies) {
+        rivals.push(RivalCause { effect, place, delta_bic: *loss, probability: 0.0 });
+    }
+    rivals.retain(|rival| !last.excludes(rival.effect));
     rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
+    let why = impossible.or_else(|| varies.map(|(why, _)| why));
     let (effect, statement) = match (why, turn) {
+        _ if last.excludes(effect) => (Unknown::NAME, left_out(&summary, effect_rms)),
         (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, effect_rms)),
         (None, Some(turn)) => (effect, turn.sentence(clock, effect_rms)),
         (None, None) => (effect, sentence(effect, &summary, effect_rms)),
     };
+    // What has lost its name is no rival of itself.
+    rivals.retain(|rival| (rival.effect, rival.place) != (effect, place));
     let valid = valid(&forms, last);
     Finding {
         effect,
@@ -99,8 +105,9 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     }
 }
 
-/// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows.
-fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
+/// Why causes cannot be what they are called: a number that the fit of the whole model puts beyond what physics allows, or beyond what the
+/// recording holds.
+fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<String> {
     let state = &last.judged.state;
     members.iter().find_map(|i| {
         let Hypothesis { positive, largest, ref form, .. } = last.pool.hypotheses[last.judged.set[*i]];
@@ -109,19 +116,36 @@ fn impossible(last: &LastRound, members: &[usize]) -> Option<&'static str> {
             ParameterStatus::Free(sigma) => FIRM * sigma,
             _ => 0.0,
         };
-        if form.is_against_load(&state.model.x[range.clone()], &error) {
-            return Some("has the wrong sign");
+        let values = &state.model.x[range.clone()];
+        // The finer shape of a finding is not what it is called by.
+        let own = effect != Unknown::NAME && [form.name(), form.called(values, last.survey)].contains(&effect);
+        let beyond = own.then(|| form.cause().impossible(form, values, &error, last.survey)).flatten();
+        if beyond.is_some() {
+            return beyond;
+        }
+        if form.is_against_load(values, &error) {
+            return Some("has the wrong sign".into());
         }
         range.clone().find_map(|k| {
             let ParameterStatus::Free(sigma) = state.fitted.statuses[k] else { return None };
             let value = state.model.x[k];
             if positive && value < -FIRM * sigma {
-                Some("has the wrong sign")
+                Some("has the wrong sign".into())
             } else {
-                (value.abs() - FIRM * sigma > largest).then_some("is more than is possible")
+                (value.abs() - FIRM * sigma > largest).then(|| "is more than is possible".into())
             }
         })
     })
+}
+
+/// What a cause does bounds what rows lose without it; folds scatter by less than this factor, beyond which their fits went astray.
+const ASTRAY: f64 = 2.0;
+
+/// Why what the folds say is nothing of a cause: its absence costs more than all that it does.
+fn more_than_it_does(effect: &str, evidence: &Evidence) -> Option<String> {
+    let gain = evidence.heldout_gain.filter(|gain| effect != Unknown::NAME && *gain > ASTRAY * evidence.effect_rms)?;
+    let [gain, all] = [gain, evidence.effect_rms].map(|length| figure(1e6 * length, 0));
+    Some(format!("other poses would gain {gain} um by it, which is more than all that it does, {all} um rms"))
 }
 
 /// The other causes of a set that make sense alone: a product only beside the law that it is made of, the torque model only beside a
@@ -148,9 +172,6 @@ fn varying(own: &[usize], pool: &CachedHypotheses, whole: &Whole, gain: f64, clo
     let why = || format!("its size depends on the {}", by.join(" and the "));
     (!by.is_empty() && lost > REFINEMENT * gain).then(|| (why(), pool.bic(&named) - whole.bic))
 }
-
-/// Standard errors by which a number must be beyond what is possible.
-const FIRM: f64 = 2.0;
 
 /// The fitted parameters of some causes, as people read them.
 fn parameters(state: &FitState, effect: &str, members: &[usize]) -> Vec<ParameterEstimate> {
@@ -206,4 +227,19 @@ fn size<'a>(pool: &HypothesisSet, own: impl Iterator<Item = (usize, &'a [f64])>)
         whitened * pool.problem.data.noise(*row).powi(2) / 3.0
     });
     (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_gains_more_than_all_that_it_does_is_not_what_it_is_called() {
+        let evidence = |gain| Evidence { heldout_gain: gain, effect_rms: 220e-6, ..Evidence::default() };
+        let said = more_than_it_does("gear_cyclic", &evidence(Some(8.3e-3))).expect("more");
+        assert_eq!(said, "other poses would gain 8300 um by it, which is more than all that it does, 220 um rms");
+        assert_eq!(more_than_it_does("gear_cyclic", &evidence(Some(430e-6))), None);
+        assert_eq!(more_than_it_does("gear_cyclic", &evidence(None)), None);
+        assert_eq!(more_than_it_does(Unknown::NAME, &evidence(Some(8.3e-3))), None);
+    }
 }

@@ -10,6 +10,8 @@ pub(crate) struct LastRound<'a, 'b> {
     pub pool: &'b CachedHypotheses<'a>,
     pub survey: &'b Survey<'a>,
     pub judged: JudgedCauses,
+    /// Names of causes that are not to be given.
+    pub without: &'b [String],
     /// The gate's probability at the start and at the end.
     pub first: f64,
     pub last: f64,
@@ -23,6 +25,11 @@ impl LastRound<'_, '_> {
         let mut set = self.judged.set.clone();
         set.sort_unstable();
         set
+    }
+
+    /// Whether a name is not to be given.
+    pub fn excludes(&self, effect: &str) -> bool {
+        self.without.iter().any(|name| name == effect)
     }
 
     /// What the best hypothesis beside the chosen ones would be.

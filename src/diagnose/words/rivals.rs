@@ -1,11 +1,13 @@
 //! What explains as well as a finding: other causes that fit equally well here, and those that no data could tell from it.
 
-use crate::diagnose::pool::{CachedHypotheses, EQUIVALENT};
+use super::last_round::LastRound;
+use crate::diagnose::pool::EQUIVALENT;
 use crate::diagnose::types::RivalCause;
 use crate::effect::{Effect, Form, Place};
 
-/// Other single causes that do as well in place of `own`.
-pub(super) fn rivals(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic: f64, named: (&str, Place)) -> Vec<RivalCause> {
+/// Other single causes that do as well in place of `own`, with numbers that they can have.
+pub(super) fn rivals(last: &LastRound, rest: &[usize], own: &[usize], bic: f64, named: (&str, Place)) -> Vec<RivalCause> {
+    let pool = last.pool;
     let given = pool.given(rest);
     let own_penalty: f64 = own.iter().map(|k| pool.prior_penalty[*k]).sum();
     let mut out: Vec<RivalCause> = Vec::new();
@@ -20,12 +22,26 @@ pub(super) fn rivals(pool: &CachedHypotheses, rest: &[usize], own: &[usize], bic
         set.sort_unstable();
         let delta = pool.bic(&set) - bic;
         // What counts is the fit: the prior's penalties are opinions.
-        if delta - pool.prior_penalty[h] + own_penalty < EQUIVALENT {
+        if delta - pool.prior_penalty[h] + own_penalty < EQUIVALENT && is_possible(last, &set, h) {
             out.push(RivalCause { effect, place, delta_bic: delta, probability: 0.0 });
         }
     }
     out
 }
+
+/// Whether a hypothesis of a set has numbers there that its cause can have.
+fn is_possible(last: &LastRound, set: &[usize], h: usize) -> bool {
+    let pool = last.pool;
+    let Some(own) = set.iter().zip(pool.coefficients(set)).find(|(k, _)| **k == h).map(|(_, own)| own) else { return true };
+    let form = &pool.hypotheses[h].form;
+    let solution = pool.solve(set);
+    let first: usize = set.iter().take_while(|k| **k != h).map(|k| pool.first[k + 1] - pool.first[*k]).sum();
+    let error = |column: usize| FIRM * solution.error(first + column);
+    form.cause().impossible(form, &own, &error, last.survey).is_none()
+}
+
+/// Standard errors by which a number must be beyond what is possible.
+pub(super) const FIRM: f64 = 2.0;
 
 /// Identities of kinematics and statics, whatever the data.
 pub(super) fn exact(effect: &str, forms: &[Form], rivals: &mut Vec<RivalCause>) {

@@ -20,6 +20,23 @@ pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: f64) -> St
     )
 }
 
+/// The sentence of a finding whose name the user has excluded.
+pub(super) fn left_out(summary: &Summary, rms: f64) -> String {
+    let mut by: Vec<String> = Vec::new();
+    for variable in summary.forms.iter().flat_map(|form| form.variables()) {
+        let name = summary.clock.named(variable);
+        if !by.contains(&name) {
+            by.push(name);
+        }
+    }
+    let by = if by.is_empty() { String::new() } else { format!(" and depends on {}", by.join(" and ")) };
+    format!(
+        "something unknown acts at {}{by}; the name that it would have is left out by `without` ({} um rms at the tool).",
+        summary.place,
+        figure(rms * 1e6, 0)
+    )
+}
+
 /// Joints move the point by less than this (m/rad): no effect of theirs can be seen.
 const STILL: f64 = 1e-3;
 

@@ -2,6 +2,7 @@
 
 use super::{robot, settings, take};
 use crate::desk::Desk;
+use crate::workbook::workbook;
 use calib::robot::{INSTRUMENTS, NoiseBasis, SigmaSource};
 use calib::stage::Stage;
 use calib::table::{Recording, Table};
@@ -106,4 +107,37 @@ fn a_noise_is_stated_once_and_in_a_way_that_is_known() {
     assert_eq!(zero, ["files[0].columns.u95.coverage_factor: allowed: above 0, e.g. 2 for 95 %"]);
     let none = faults("", "instrument: {constant_um: 0, per_metre_um: 0, coverage: 2}");
     assert!(none[0].starts_with("instrument: expected a noise above zero"), "{none:?}");
+}
+
+#[test]
+fn a_coordinate_of_exactly_zero_keeps_its_stated_uncertainty() {
+    let columns = "u95_x: {column: a, unit: um}\n      u95_y: {column: b, unit: um}\n      u95_z: {column: c, unit: um}";
+    let text =
+        "id,q1,q2,x,y,z,a,b,c\nP1,10,20,3000,0,0,20,30,40\nP2,11,21,0,-0.0,4000,22,32,42\nP3,12,22,0,3000,0.000,24,34,44\n";
+    let expected = [[10.0, 15.0, 20.0], [11.0, 16.0, 21.0], [12.0, 17.0, 22.0]];
+    let yaml = format!("{}      {columns}\n", super::TWO);
+    let rows: Vec<String> = text.lines().map(|line| line.replace(',', "|")).collect();
+    // Text, a sheet, and the point in a file of its own.
+    let (joints, points): (Vec<String>, Vec<String>) = (text.lines())
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            (cells[..3].join(","), [&cells[..1], &cells[3..]].concat().join(","))
+        })
+        .unzip();
+    let desk = Desk::default().with("a.csv", joints.join("\n")).with("b.csv", points.join("\n"));
+    let apart = yaml.replace("      x:", "  - file: b.csv\n    columns:\n      point_id: {column: id}\n      x:");
+    for (desk, yaml) in [
+        (Desk::default().with("a.csv", text), yaml.clone()),
+        (Desk::default().with("a.csv", workbook(&[("Data", &rows.join("\n"))])), yaml),
+        (desk, format!("{apart}join: {{by: id}}\n")),
+    ] {
+        let recording = take(&desk, &yaml, robot("rr", 1.0)).expect("rows").recording;
+        let recording = Recording::from_frame(&recording.to_frame().expect("a table")).expect("the same");
+        is_near(&sigmas_um(&recording), &expected);
+        assert_eq!(recording.sigma_source.as_deref(), Some(&[SigmaSource::Recorded; 3][..]));
+        let data = recording.measurements();
+        assert_eq!(data.noise_basis, NoiseBasis::Instrument);
+        let own: Vec<[f64; 3]> = data.sigma.iter().map(|sigma| (sigma * 1e6).into()).collect();
+        is_near(&own, &expected);
+    }
 }

@@ -1,0 +1,48 @@
+//! `without`: a cause that is excluded is neither tried nor named, whatever looks like it.
+
+use super::{CASE, calib, case_with, concealed, refused, table_of};
+use calib::table::{Findings, Parameters};
+use serde_json::Value;
+use std::path::Path;
+
+/// What the pipeline of cases says without some causes.
+fn said(without: &str, folder: &Path) -> Value {
+    case_with(folder, &[("  - uses: diagnose\n", &format!("  - uses: diagnose\n    with: {{without: [{without}]}}\n"))]);
+    let said = calib(&[&["diagnose", "p.yaml", "--quiet", "--json"], &CASE[..]].concat(), folder);
+    serde_json::from_str(&said).expect("JSON")
+}
+
+#[test]
+fn an_excluded_cause_is_not_named_by_another_form_of_it() {
+    for (family, seed) in [("cable_drag", "5"), ("backlash", "32")] {
+        let folder = concealed(family, seed, "120");
+        let said = said(family, folder.path());
+        let findings = said["findings"].as_array().expect("a list");
+        assert!(!findings.is_empty(), "{family}: {said:#}");
+        // Neither as a name, nor as a rival, nor in a sentence.
+        assert!(!said.to_string().contains(family), "{family}: {said:#}");
+        let table: Findings = table_of(folder.path(), "diagnose.findings.parquet");
+        assert!(table.0.iter().all(|row| row.effect != family));
+    }
+}
+
+#[test]
+fn an_excluded_correction_of_geometry_leaves_the_robot_file_as_it_is() {
+    let folder = concealed("zero_shift", "923", "120");
+    let here = folder.path();
+    let ratios = |without: &str| {
+        said(without, here);
+        let parameters: Parameters = table_of(here, "diagnose.parameters.parquet");
+        parameters.0.iter().filter(|row| row.effect == "reduction_ratio").count()
+    };
+    assert_eq!((ratios("backlash"), ratios("reduction_ratio")), (6, 0));
+}
+
+#[test]
+fn nothing_is_diagnosed_without_the_frame_of_the_base() {
+    let folder = concealed("zero_shift", "923", "40");
+    case_with(folder.path(), &[("  - uses: diagnose\n", "  - uses: diagnose\n    with: {without: [base_frame]}\n")]);
+    let (code, said) = refused(&[&["diagnose", "p.yaml", "--quiet"], &CASE[..]].concat(), folder.path());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("`base_frame` places the robot before the instrument"), "{said}");
+}
