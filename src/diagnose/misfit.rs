@@ -89,7 +89,6 @@ impl Misfit {
         Ground {
             agrees: self.chi_square <= LOUD,
             not_carried: self.not_carried,
-            lacking: None,
             nameless,
             basis,
             repeats,

@@ -9,7 +9,6 @@
 //! A `round` looks at the recording around the present model as a `whitened` problem, in which a `search` compares sets of the `pool`;
 //! in the end `judge` asks folds of the rows to fit, and `words` are found for what stands.
 
-mod adequacy;
 mod closed_form;
 mod judge;
 mod locate;

@@ -20,8 +20,6 @@ pub(crate) struct Ground {
     pub agrees: bool,
     /// What is left of held-out points, where they are off by more than what was fitted and the noise allow.
     pub not_carried: Option<f64>,
-    /// What poses are off by that a fit has not seen, and what the noise allows, where that is clearly less.
-    pub lacking: Option<[f64; 2]>,
     /// Whether only causes without a name were found.
     pub nameless: bool,
     /// Whether the arm moved while it was measured: no pose can be measured twice.
@@ -55,14 +53,7 @@ impl Ground {
                 um(held_out)
             ),
             None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} um remain"),
-            None => match self.lacking.filter(|_| self.agrees) {
-                Some([found, allowed]) => format!(
-                    "the findings do not explain everything: poses that a fit has not seen are off by {} um where noise makes {}",
-                    um(found),
-                    um(allowed)
-                ),
-                None => format!("the findings do not explain everything: {left} um remain"),
-            },
+            None => format!("the findings do not explain everything: {left} um remain"),
         }
     }
 
@@ -126,7 +117,6 @@ mod tests {
             left: 32e-6,
             agrees: true,
             not_carried: None,
-            lacking: None,
             nameless: false,
             in_motion: false,
         }

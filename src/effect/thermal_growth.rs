@@ -16,8 +16,8 @@ const PER_KELVIN: f64 = 1e-4;
 const WARM_UP: f64 = 60.0;
 /// The same over a warm-up.
 const MOST: f64 = WARM_UP * PER_KELVIN;
-/// 1/K: zinc has 30e-6, aluminium 23e-6. What the search may try is more, so that what is no growth is not forced into another name.
-const METAL: f64 = 7e-5;
+/// 1/K: aluminium has 23e-6, zinc 30e-6, the polymers of light links up to 70e-6. What the search may try is more, so that what is no growth is not forced into another name.
+const MATERIAL: f64 = 7e-5;
 
 /// What separates warmth of the arm from that of its surroundings.
 pub(super) const MEASURE: Measure =
@@ -67,7 +67,7 @@ impl Cause for ThermalGrowth {
     fn impossible(&self, form: &Form, p: &[f64], error: &dyn Fn(usize) -> f64, survey: &Survey) -> Option<String> {
         let (term, value) = (form.term()?, *p.first()?);
         let warm_up = matches!(term.basis(), Basis::Settling { .. });
-        let most = if warm_up { WARM_UP * METAL } else { METAL };
+        let most = if warm_up { WARM_UP * MATERIAL } else { MATERIAL };
         let per = if warm_up { "in all" } else { "for each kelvin" };
         let [size, largest] = [value, most].map(|share| figure(1e6 * share, 0));
         if value < -error(0) {

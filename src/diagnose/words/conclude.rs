@@ -5,7 +5,6 @@ use super::last_round::LastRound;
 use super::probability::weigh;
 use super::statement::{next, not_observable, not_tried, slower_than_noise};
 use super::unseen::by_speed;
-use crate::diagnose::adequacy::Adequacy;
 use crate::diagnose::closed_form::FormulaSearch;
 use crate::diagnose::judge::FOLDS;
 use crate::diagnose::locate::locate;
@@ -13,7 +12,7 @@ use crate::diagnose::misfit::{LOUD, Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::diagnose::verdict_statement::{Ground, statement};
+use crate::diagnose::verdict_statement::statement;
 use crate::effect::Unknown;
 use crate::estimate::{Model, cross_validate};
 use crate::robot::NoiseBasis;
@@ -43,21 +42,13 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let something_left = structured && misfit.chi_square > LOUD || misfit.chi_square > TOO_LOUD || misfit.not_carried.is_some();
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > LOUD;
-    let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
-    let parameters = state.fitted.singular.len();
-    let adequacy = folds.as_ref().and_then(|folds| {
-        Adequacy::of(&folds.random, data, &state.screening.kept, parameters, (basis, fitter.repeatability.repeats))
-    });
-    let lacking = adequacy.and_then(|adequacy| adequacy.lacking());
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
         VerdictKind::NothingMissing if above_stated => VerdictKind::Unexplained,
-        VerdictKind::NothingMissing | VerdictKind::Explained if lacking.is_some() => VerdictKind::Unexplained,
         other => other,
     };
     let nameless = !something_left && only_unknown(&findings);
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
-    let left = adequacy.map_or(0.0, |adequacy| adequacy.left());
-    findings.iter_mut().for_each(|finding| weigh(finding, left));
+    findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(by_speed(&last));
@@ -66,7 +57,8 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
     let formulas = search.of_all(&findings);
     let state = last.judged.state;
-    let ground = Ground { lacking, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
+    let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
+    let ground = misfit.ground(data, basis, fitter.repeatability.repeats, nameless);
     Diagnosis {
         statement: statement(verdict, &ground),
         noise_basis: basis,

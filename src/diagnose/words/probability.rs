@@ -15,9 +15,6 @@ const TEMPERATURE: f64 = 2.03;
 const NONE: f64 = 0.52;
 const BY_LOSS: f64 = -0.57;
 const NO_LAW: f64 = 0.45;
-/// ... and by what no finding explains: a part of it already is a reason to doubt.
-const BY_REST: f64 = 3.0;
-const PART: f64 = 4.0;
 /// What the criterion would lose by a rival that does exactly the same in whatever data, by how rarely it is the cause.
 const IDENTITY: f64 = 6.3;
 /// Of what has none of the names, the share that acts at the named place all the same.
@@ -25,14 +22,13 @@ const SAME_PLACE: f64 = 0.34;
 /// Faults of single rows are seen as such or not at all.
 const FAULT: f64 = 0.98;
 
-/// Sets the probabilities of a finding and of its rivals; `left` is what no finding explains, in -2 ln of likelihood: the more it is beside
-/// what the finding explains, the less its name is to be trusted.
-pub(super) fn weigh(finding: &mut Finding, left: f64) {
+/// Sets the probabilities of a finding and of its rivals.
+pub(super) fn weigh(finding: &mut Finding) {
     let Some(evidence) = finding.evidence else {
         finding.probabilities = Probabilities { name: FAULT, place: FAULT, none: 1.0 - FAULT };
         return;
     };
-    let none = none(&evidence, finding.effect == Unknown::NAME, left);
+    let none = none(&evidence, finding.effect == Unknown::NAME);
     // Only identities differ by nothing at all.
     let loss = |delta: f64| if delta == 0.0 { IDENTITY } else { delta.max(0.0) };
     let weight = |delta: f64| (-loss(delta) / (2.0 * TEMPERATURE)).exp();
@@ -46,9 +42,8 @@ pub(super) fn weigh(finding: &mut Finding, left: f64) {
     finding.probabilities = Probabilities { name, place: place.min(1.0), none };
 }
 
-fn none(evidence: &Evidence, no_law: bool, left: f64) -> f64 {
-    let loss = evidence.delta_bic.max(1.0);
-    let odds = NONE + BY_LOSS * loss.ln() + NO_LAW * f64::from(u8::from(no_law)) + BY_REST * (1.0 + PART * left / loss).ln();
+fn none(evidence: &Evidence, no_law: bool) -> f64 {
+    let odds = NONE + BY_LOSS * evidence.delta_bic.max(1.0).ln() + NO_LAW * f64::from(u8::from(no_law));
     1.0 / (1.0 + (-odds).exp())
 }
 
@@ -81,7 +76,7 @@ mod tests {
     #[test]
     fn names_and_none_add_up_to_one_and_equal_rivals_share_alike() {
         let mut found = finding(200.0, &[("backlash", 1, -1.0), ("zero_shift", 2, 3.0), ("counterbalance", 2, 0.0)]);
-        weigh(&mut found, 0.0);
+        weigh(&mut found);
         let Probabilities { name, place, none } = found.probabilities;
         let rivals: Vec<f64> = found.rivals.iter().map(|rival| rival.probability).collect();
         assert!((name + none + rivals.iter().sum::<f64>() - 1.0).abs() < 1e-12);
@@ -90,20 +85,10 @@ mod tests {
     }
 
     #[test]
-    fn a_name_beside_much_that_is_left_is_hardly_trusted() {
-        let name = |left: f64| {
-            let mut found = finding(100.0, &[]);
-            weigh(&mut found, left);
-            found.probabilities.name
-        };
-        assert!(name(0.0) > 0.85 && name(100.0) < 0.3 && name(10.0) < name(0.0));
-    }
-
-    #[test]
     fn none_is_less_probable_the_more_the_criterion_would_lose() {
         let none = |loss: f64| {
             let mut found = finding(loss, &[]);
-            weigh(&mut found, 0.0);
+            weigh(&mut found);
             found.probabilities.none
         };
         assert!(none(20.0) > none(100.0) && none(100.0) > none(1000.0));

@@ -57,6 +57,7 @@ fn a_pose_is_reached_in_the_posture_that_it_states() {
                 clock: false,
                 direction: None,
                 start: None,
+                uncertainty: true,
                 gate: Gate::default(),
             };
             let answers = Corrector::new(&arm, None, None, manner).batch(poses.iter().map(target).collect());
