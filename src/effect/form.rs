@@ -38,8 +38,8 @@ pub trait Placed: Effect + Any {
         0..0
     }
     /// Which of its parameters are of one size: what the rows say of some of them bounds the others.
-    fn of_one_size(&self) -> std::ops::Range<usize> {
-        0..0
+    fn of_one_size(&self) -> Vec<usize> {
+        Vec::new()
     }
     /// Parameters, by their numbers, that are held to a size known beforehand (one sigma, SI), so that they carry on no further than that
     /// where the rows do not determine them.

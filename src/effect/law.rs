@@ -4,6 +4,9 @@ use super::{ArmState, Basis, LONG_AFTER, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
+/// Share of its fitted range by which a law of few numbers goes on beyond it.
+const FURTHER: f64 = 0.5;
+
 /// Functions of one variable; the same whatever the rows that they were fitted to.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Factor {
@@ -11,7 +14,8 @@ pub struct Factor {
     pub of: Variable,
     /// Which functions of it.
     pub basis: Basis,
-    /// What the fitted rows have of the variable (SI), beyond which the functions hold their values at its ends; none while it is sought.
+    /// What the fitted rows have of the variable (SI): curves hold their values at its ends, other functions half of it beyond. None while
+    /// the law is sought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within: Option<[f64; 2]>,
 }
@@ -28,10 +32,17 @@ impl Factor {
         Self { of, basis, within: None }
     }
 
-    /// The same, held at the ends of a range; a variable of several numbers has none.
+    /// The same, fitted to rows of this range; a variable of several numbers has none.
     pub fn held_within(self, [low, high]: [f64; 2]) -> Self {
         let held = self.of.components() == 1 && low <= high;
         Self { within: held.then_some([low, high]), ..self }
+    }
+
+    /// The variable, where nothing more was seen at the place where the functions are held. A law of few numbers goes on for a while.
+    fn held(&self, u: f64) -> f64 {
+        let Some([low, high]) = self.within else { return u };
+        let further = if self.basis.is_curve() { 0.0 } else { FURTHER * (high - low) };
+        u.clamp(low - further, high + further)
     }
 
     /// By how much the variable is beyond the fitted range in a row, as a share of that range, at most 1; 0 inside.
@@ -53,7 +64,7 @@ impl Factor {
     fn values(&self, robot: &RobotModel, state: &ArmState, each: &mut dyn FnMut(usize, f64)) {
         for component in 0..self.of.components() {
             if let Some(u) = self.of.value(component, robot, state) {
-                let u = self.within.map_or(u, |[low, high]| u.clamp(low, high));
+                let u = self.held(u);
                 self.basis.values(u, &mut |k, value| each(component * self.basis.count() + k, value));
             }
         }

@@ -212,8 +212,9 @@ impl Placed for UnweighedWindup {
         self.cause
     }
 
-    fn of_one_size(&self) -> std::ops::Range<usize> {
-        0..self.shape.moments.len()
+    /// Moments beside the arm's lines, which are small: those along them are as large as links are heavy.
+    fn of_one_size(&self) -> Vec<usize> {
+        (0..self.shape.moments.len()).filter(|k| !self.shape.moments[*k].outwards).collect()
     }
 
     fn variables(&self) -> Vec<Variable> {

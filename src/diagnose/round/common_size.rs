@@ -7,13 +7,18 @@
 use super::fit_state::{EstimatedCause, FitState, Fitter};
 use crate::estimate::{Covariance, Model, Prior};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use std::ops::Range;
 
 /// The size is searched from the plausible one downwards over so many e-folds, in so many steps.
 const FOLDS: f64 = 12.0;
 const STEPS: usize = 120;
 /// Sizes are asked anew after each fit with priors, so often at most.
 const FITS: usize = 2;
+/// Twice the logarithm of the evidence, below the greatest, at which a size is spoken against.
+const AGAINST: f64 = 6.0;
+/// A combination this many times (squared) its standard error is shown by the rows.
+const SHOWN: f64 = 9.0;
+/// A coefficient is hardly ever smaller than this share of the largest that is not of the family: the arm's own lines bend a little.
+const BESIDE: f64 = 0.2;
 
 impl Fitter<'_> {
     /// The state with coefficients of one size held to the size that the rows show; itself where no cause has any.
@@ -37,9 +42,11 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         if family.len() < 2 {
             continue;
         }
-        let own = range.start + family.start..range.start + family.end;
+        let own: Vec<usize> = family.iter().map(|k| range.start + k).collect();
         let specs = cause.form.parameters(&state.model.robot);
-        let Some(size) = size(&state.model, covariance, own, specs[family.start].prior_sigma) else { continue };
+        let Some(size) = size(&state.model, covariance, &own, specs[family[0]].prior_sigma) else { continue };
+        let others = range.clone().filter(|k| !own.contains(k)).map(|k| state.model.x[k].abs());
+        let size = size.max(BESIDE * others.fold(0.0, f64::max));
         any = true;
         let sigma = |k: usize| if family.contains(&k) { size } else { specs[k].prior_sigma };
         cause.priors = (0..specs.len()).map(|k| Prior { mean: 0.0, sigma: sigma(k) }).collect();
@@ -47,10 +54,9 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
     any.then_some(causes)
 }
 
-/// The size (SI) of the greatest evidence, at most `plausible`; none where the parameters were not all estimated.
-fn size(model: &Model, covariance: &Covariance, own: Range<usize>, plausible: f64) -> Option<f64> {
-    let own: Vec<usize> = own.collect();
-    let block = covariance.block(&own)?;
+/// The largest size (SI) that the evidence allows, at most `plausible`; none where the parameters were not all estimated.
+fn size(model: &Model, covariance: &Covariance, own: &[usize], plausible: f64) -> Option<f64> {
+    let block = covariance.block(own)?;
     let values = DVector::from_iterator(own.len(), own.iter().map(|k| model.x[*k]));
     let prior = |k: usize| model.known(k).prior.map_or(0.0, |prior| prior.sigma.powi(-2));
     let posterior = block.try_inverse()?;
@@ -63,5 +69,12 @@ fn size(model: &Model, covariance: &Covariance, own: Range<usize>, plausible: f6
         each.map(|(p, b)| (p.max(0.0), b)).map(|(p, b)| b * b / (p + size.powi(-2)) - (size * size * p).ln_1p()).sum()
     };
     let sizes = (0..=STEPS).map(|step| plausible * (-FOLDS * step as f64 / STEPS as f64).exp());
-    sizes.max_by(|a, b| evidence(*a).total_cmp(&evidence(*b)))
+    let all: Vec<(f64, f64)> = sizes.map(|size| (size, evidence(size))).collect();
+    let best = all.iter().map(|(_, evidence)| *evidence).fold(f64::NEG_INFINITY, f64::max);
+    // From the plausible size downwards: the loosest that rows do not speak against.
+    let loosest = all.into_iter().find(|(_, evidence)| *evidence >= best - AGAINST).map(|(size, _)| size)?;
+    // What rows clearly show is as large as it is.
+    let shown =
+        eigenvalues.iter().zip(along.iter()).filter(|(p, b)| **p > 0.0 && **b * **b > SHOWN * **p).map(|(p, b)| (b / p).abs());
+    Some(shown.fold(loosest, f64::max).min(plausible))
 }
