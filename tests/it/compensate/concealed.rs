@@ -106,16 +106,15 @@ fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
     let geometry = Corrector::new(&plain, None, None, options()).batch(targets.iter().map(|t| command(case, t)).collect());
     let corrected = misses(case, &arm, &targets, &commands);
     let without = misses(case, &plain, &targets, &geometry);
-    let each = commands.iter().zip(&outside).zip(corrected.iter().zip(&without));
-    let outcome = |((command, outside), (miss, plain)): ((&CorrectedCommand, &bool), (&Option<f64>, &Option<f64>))| Outcome {
-        outside: *outside,
-        miss: miss.unwrap_or(f64::NAN),
-        plain: plain.unwrap_or(f64::NAN),
-        u95: command.uncertainty.map_or(f64::NAN, |uncertainty| uncertainty.u95 * 1e3),
-        remarked: !command.remarks.is_empty(),
-        refused: command.q.is_none(),
+    let outcome = |k: usize| Outcome {
+        outside: outside[k],
+        miss: corrected[k].unwrap_or(f64::NAN),
+        plain: without[k].unwrap_or(f64::NAN),
+        u95: commands[k].uncertainty.map_or(f64::NAN, |uncertainty| uncertainty.u95 * 1e3),
+        remarked: !commands[k].remarks.is_empty(),
+        refused: commands[k].q.is_none(),
     };
-    (each.map(outcome).collect(), named.join(", "))
+    ((0..targets.len()).map(outcome).collect(), named.join(", "))
 }
 
 const GEOMETRY: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
