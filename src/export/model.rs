@@ -54,6 +54,9 @@ impl Export {
                 self.poses
             ),
         ];
+        if self.identified.convention.is_none() {
+            lines.extend(self.identified.counting());
+        }
         let robot = &self.identified.model.robot;
         let difference = self.identified.convention.as_ref().and_then(|convention| convention.difference(robot));
         lines.extend(difference.map(|difference| {
