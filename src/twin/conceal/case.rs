@@ -4,7 +4,7 @@ use super::design::{Content, Design};
 use super::family::{Bench, Collection, Column, Draft};
 use super::points::{self, Amount, FIT};
 use super::robots::Kind;
-use super::size::{Concealed, Sight, beyond, drafts, size};
+use super::size::{Concealed, Sight, beyond, drafts, drawn, size};
 use super::visible::Site;
 use crate::robot::description::{JointKind, RobotDescription};
 use crate::twin::effect::{HoldingFriction, Physical};
@@ -132,7 +132,9 @@ impl Case {
         let shadow = site.shadow();
         let bench = Bench::new(&robot, &ranges, to_fit);
         let sight = Sight { site: &site, shadow: &shadow, noise: 1e-3 * noise_mm[0] };
-        let (drafts, concealed) = if beyond_list {
+        let (drafts, concealed) = if content == Content::Foreign {
+            drawn(&bench, &sight, &mut draw)
+        } else if beyond_list {
             beyond(design, content, &bench, &sight, &mut draw)
         } else {
             let drafts = drafts(design, content, &bench, &mut draw);

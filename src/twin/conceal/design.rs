@@ -27,6 +27,8 @@ pub struct Design {
     pub pairs: f64,
     /// With an effect outside every list.
     pub open: f64,
+    /// With an effect that is drawn at random, shape and place.
+    pub foreign: f64,
     /// Share of effects in another form than the obvious one.
     pub other_forms: f64,
     /// Share of effects of natural size; the others are sized to a drawn visibility.
@@ -57,6 +59,7 @@ impl Default for Design {
             nulls: 0.0,
             pairs: 0.0,
             open: 0.0,
+            foreign: 0.0,
             other_forms: 0.5,
             natural: 0.2,
             faulty: 0.08,
@@ -78,6 +81,8 @@ pub enum Content {
     Single(usize),
     /// Two effects, of these rows.
     Pair(usize, usize),
+    /// One effect that is in no list, its shape and place drawn at random.
+    Foreign,
 }
 
 impl Design {
@@ -109,6 +114,8 @@ impl Design {
         for turn in 0..room(&out, count(self.open)) {
             out.push(Content::Single(open[turn % open.len()]));
         }
+        let foreign = room(&out, count(self.foreign));
+        out.extend(vec![Content::Foreign; foreign]);
         let pairs = if paired.len() > 1 { room(&out, count(self.pairs)) } else { 0 };
         for _ in 0..pairs {
             let first = draw.index(paired.len());

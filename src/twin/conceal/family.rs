@@ -3,6 +3,7 @@
 //! A family draws effects of a natural size for the robot and the plan at hand; how large they end up is decided by how visible
 //! they are. Names and places are the canonical ones.
 
+pub(super) mod foreign;
 mod gears;
 mod instruments;
 mod interactions;

@@ -47,6 +47,7 @@ impl Case {
             Content::Null => (String::new(), "null"),
             Content::Single(row) if families[row].name == "unknown" => ("unknown".into(), "open"),
             Content::Single(row) => (families[row].name.into(), "single"),
+            Content::Foreign => ("unknown".into(), "foreign"),
             Content::Pair(a, b) => (format!("{}+{}", families[a].name, families[b].name), "pair"),
         };
         pretty(&json!({

@@ -1,7 +1,7 @@
 //! How large concealed effects are: each is scaled until it is as visible as drawn, when geometry has absorbed what it can.
 
 use super::design::{Content, Design};
-use super::family::{Bench, Cause, Draft, Form};
+use super::family::{Bench, Cause, Draft, Form, foreign::foreign};
 use super::visible::{Shadow, Site, norm};
 use crate::twin::effect::Physical;
 use crate::twin::noise::Noise;
@@ -49,7 +49,7 @@ fn causes(drafts: &[Draft]) -> Vec<(Cause, &'static str)> {
 /// Draws the families of a case; a pair does not sit twice in one place.
 pub(super) fn drafts(design: &Design, content: Content, bench: &Bench, draw: &mut Noise) -> Vec<Draft> {
     let rows = match content {
-        Content::Null => vec![],
+        Content::Null | Content::Foreign => vec![],
         Content::Single(row) => vec![row],
         Content::Pair(first, second) => vec![first, second],
     };
@@ -172,6 +172,35 @@ pub(super) fn beyond(
         let mut concealed = seen(causes, sight);
         concealed.iter_mut().for_each(|one| one.strange = form == Form::Other);
         let plain = concealed.iter().filter(|one| one.cause.sized).all(|one| one.strength >= PLAIN[0]);
+        out = (drafts, concealed);
+        if plain {
+            break;
+        }
+    }
+    out
+}
+
+/// Root mean square per axis of an effect drawn at random, in standard deviations of a coordinate.
+const FOREIGN: [f64; 2] = [2.0, 20.0];
+
+/// Draws an effect at random until geometry leaves enough of it to be seen; its whole displacement is made `FOREIGN` times the noise.
+pub(super) fn drawn(bench: &Bench, sight: &Sight, draw: &mut Noise) -> (Vec<Draft>, Vec<Concealed>) {
+    let mut out = (Vec::new(), Vec::new());
+    for _ in 0..DRAWS {
+        let draft = foreign(bench, draw);
+        let ratio = draw.size(FOREIGN[0], FOREIGN[1]);
+        let drafts = vec![draft];
+        let mut causes = causes(&drafts);
+        // Twice: what hangs on the load is not quite proportional.
+        for _ in 0..2 {
+            let whole = alone(&causes, 0, sight.site);
+            let found = norm(&whole) / (whole.len().max(1) as f64).sqrt() / sight.noise;
+            let cause = &mut causes[0].0;
+            cause.physical = cause.physical.iter().map(|effect| effect.scaled(ratio / found.max(1e-6))).collect();
+        }
+        let mut concealed = seen(causes, sight);
+        concealed.iter_mut().for_each(|one| one.strange = true);
+        let plain = concealed.iter().all(|one| one.strength >= PLAIN[0]);
         out = (drafts, concealed);
         if plain {
             break;

@@ -10,6 +10,7 @@ mod base_shift;
 mod base_sway;
 mod cable_drag;
 mod counterbalance;
+mod foreign;
 mod gear_cyclic;
 mod gear_eccentricity;
 mod gear_flank;
@@ -52,6 +53,7 @@ pub use base_shift::BaseShift;
 pub use base_sway::BaseSway;
 pub use cable_drag::{CableDrag, Pull};
 pub use counterbalance::{Balancer, Counterbalance};
+pub use foreign::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
 pub use gear_cyclic::{GearCyclic, GearMotorCyclic};
 pub use gear_eccentricity::GearEccentricity;
 pub use gear_flank::GearFlank;
@@ -246,6 +248,8 @@ physical! {
     TrackerRefraction,
     /// The tracker's stand swings slowly.
     TrackerSway,
+    /// A drawn shape in one direction of motion.
+    Foreign,
 }
 
 impl Physical {

@@ -1,0 +1,218 @@
+//! Effects drawn at random, so that no list holds them: any shape over any variable in any direction of motion.
+
+use super::{Bench, Column, Draft, joint, link, sized};
+use crate::twin::effect::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical};
+use crate::twin::matrix::{self, Vector};
+use crate::twin::noise::Noise;
+use std::f64::consts::TAU;
+
+/// Motions, evenly drawn: a joint's shift is along its axis or across it.
+const MOTIONS: [ForeignMotion; 12] = [
+    ForeignMotion::JointTurn,
+    ForeignMotion::JointTurn,
+    ForeignMotion::JointShift,
+    ForeignMotion::JointTilt,
+    ForeignMotion::LinkShift,
+    ForeignMotion::LinkBend,
+    ForeignMotion::BaseShift,
+    ForeignMotion::BaseTurn,
+    ForeignMotion::ToolShift,
+    ForeignMotion::Range,
+    ForeignMotion::Azimuth,
+    ForeignMotion::Elevation,
+];
+
+/// Waves of a smooth shape.
+const WAVES: usize = 12;
+/// Shortest and longest length of a smooth shape, share of its variable's way.
+const LENGTHS: [f64; 2] = [0.08, 0.8];
+/// Warm-up and swing end about here, C.
+const WARMTH_C: [f64; 2] = [20.0, 35.0];
+/// Share of effects of two variables.
+const PRODUCTS: f64 = 0.35;
+
+/// Draws an effect of natural size.
+pub(crate) fn foreign(bench: &Bench, draw: &mut Noise) -> Draft {
+    let motion = MOTIONS[draw.index(MOTIONS.len())];
+    let seat = seat(bench, motion, draw);
+    let mut courses = vec![course(bench, motion, seat, &[], draw)];
+    let alone = match &courses[0].over {
+        // Those alone are a gap and a payload: names of the list.
+        ForeignVariable::Approach(number) => !(motion == ForeignMotion::JointTurn && *number == seat),
+        ForeignVariable::Payload => false,
+        _ => true,
+    };
+    if !alone || draw.chance(PRODUCTS) {
+        let second = course(bench, motion, seat, &courses, draw);
+        courses.push(second);
+    }
+    let direction = direction(bench, motion, seat, draw);
+    let size = draw.sign() * draw.size(40.0, 200.0);
+    let columns: Vec<Column> = courses.iter().filter_map(|course| column(&course.over)).collect();
+    let form = form(&courses);
+    let effect = Physical::Foreign(Foreign { motion, seat, direction, size, courses });
+    let (place, same) = places(bench, motion, seat);
+    let draft = Draft::new(form, vec![sized("unknown", place, vec![effect])]).needing(&columns);
+    same.into_iter().fold(draft, |draft, place| draft.accepting("unknown", place))
+}
+
+/// The joint or link that moves: not the last joint's turn, which hardly moves the tool, and links with a length.
+fn seat(bench: &Bench, motion: ForeignMotion, draw: &mut Noise) -> usize {
+    match motion {
+        ForeignMotion::JointTurn => bench.turning(draw),
+        ForeignMotion::JointShift | ForeignMotion::JointTilt => bench.turning(draw),
+        ForeignMotion::LinkShift | ForeignMotion::LinkBend => {
+            let long = bench.long_links();
+            long.get(draw.index(long.len())).copied().unwrap_or(1)
+        }
+        _ => 1,
+    }
+}
+
+/// A unit vector: along a joint's axis or across it, along a link or across it, anywhere.
+fn direction(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise) -> Vector {
+    let arrow = draw.vector(1.0, 1.0);
+    let along = draw.chance(0.5);
+    let own = &bench.robot.joints[seat - 1];
+    let end = bench.robot.joints.get(seat).map_or(bench.robot.tool, |next| next.point);
+    let (line, along) = match motion {
+        ForeignMotion::JointShift => (own.axis, along),
+        ForeignMotion::JointTilt => (own.axis, false),
+        ForeignMotion::LinkShift => (matrix::minus(end, own.point), along),
+        ForeignMotion::LinkBend => (matrix::minus(end, own.point), false),
+        _ => return arrow,
+    };
+    let line = matrix::scale(line, 1.0 / matrix::norm(line).max(1e-9));
+    let across = matrix::minus(arrow, matrix::scale(line, matrix::dot(line, arrow)));
+    if along { line } else { matrix::scale(across, 1.0 / matrix::norm(across).max(1e-9)) }
+}
+
+/// A shape over a variable that is none of `others`; only one of an effect's variables remembers.
+fn course(bench: &Bench, motion: ForeignMotion, seat: usize, others: &[ForeignCourse], draw: &mut Noise) -> ForeignCourse {
+    loop {
+        let (over, between) = variable(bench, motion, seat, draw);
+        let kind = std::mem::discriminant(&over);
+        let taken = |other: &ForeignCourse| {
+            std::mem::discriminant(&other.over) == kind || (other.over.is_remembered() && over.is_remembered())
+        };
+        if others.iter().any(taken) {
+            continue;
+        }
+        let two_values = matches!(over, ForeignVariable::Approach(_) | ForeignVariable::Payload);
+        let shape = if two_values { ForeignShape::Straight } else { shape(draw) };
+        return ForeignCourse { over, between, shape };
+    }
+}
+
+/// A variable, and the values between which it moves.
+fn variable(bench: &Bench, motion: ForeignMotion, seat: usize, draw: &mut Noise) -> (ForeignVariable, [f64; 2]) {
+    let instrument = matches!(motion, ForeignMotion::Range | ForeignMotion::Azimuth | ForeignMotion::Elevation);
+    let anywhere = instrument || matches!(motion, ForeignMotion::BaseShift | ForeignMotion::BaseTurn | ForeignMotion::ToolShift);
+    // Half of what sits on the chain depends on its own joint.
+    let other = 1 + draw.index(bench.joints());
+    let number = if !anywhere && draw.chance(0.5) { seat } else { other };
+    let range = bench.ranges_deg[number - 1].map(f64::to_radians);
+    let width = range[1] - range[0];
+    let reach: f64 = {
+        let ends = bench.robot.joints.iter().skip(1).map(|joint| joint.point).chain([bench.robot.tool]);
+        let spans = bench.robot.joints.iter().zip(ends).map(|(joint, end)| matrix::norm(matrix::minus(end, joint.point)));
+        spans.sum()
+    };
+    match draw.index(11) {
+        0..=2 => (ForeignVariable::Angle(number), range),
+        3 => (ForeignVariable::Approach(number), [-1.0, 1.0]),
+        4 => (ForeignVariable::LastMove(number), [-0.7 * width, 0.7 * width]),
+        5 if !instrument => {
+            let loaded = bench.loaded();
+            let number = loaded.get(draw.index(loaded.len())).copied().unwrap_or(1);
+            (ForeignVariable::Load(number), [-bench.peak[number - 1], bench.peak[number - 1]])
+        }
+        6 => (ForeignVariable::Payload, [0.0, bench.robot.payload_mass]),
+        7 => (ForeignVariable::Temperature, WARMTH_C),
+        8 => {
+            let far = if instrument { 2.0 * reach } else { reach };
+            (ForeignVariable::Space(draw.vector(1.0, 1.0)), [-far, far])
+        }
+        9 => (ForeignVariable::Relaxing(number, draw.size(10.0, 120.0)), [-0.7 * width, 0.7 * width]),
+        10 => {
+            let limit = draw.uniform(0.05, 0.4) * width;
+            (ForeignVariable::Slipping(number, limit), [-limit, limit])
+        }
+        _ => (ForeignVariable::Time, [0.0, bench.end_s]),
+    }
+}
+
+/// Smooth in half of the effects, else with corners or jumps.
+fn shape(draw: &mut Noise) -> ForeignShape {
+    match draw.index(4) {
+        0 | 1 => {
+            // Random Fourier features of a Gaussian process with a squared exponential kernel.
+            let length = draw.size(LENGTHS[0], LENGTHS[1]);
+            let amplitude = (2.0 / WAVES as f64).sqrt();
+            ForeignShape::Smooth(
+                (0..WAVES).map(|_| [amplitude * draw.normal(), draw.normal() / length, draw.uniform(0.0, TAU)]).collect(),
+            )
+        }
+        2 => {
+            let inner = 1 + draw.index(3);
+            ForeignShape::Corners(points(&[0.0, 1.0], inner, draw))
+        }
+        _ => {
+            let inner = 1 + draw.index(3);
+            ForeignShape::Jumps(points(&[], inner, draw))
+        }
+    }
+}
+
+/// Drawn values at `fixed` places and at some well inside, in their order.
+fn points(fixed: &[f64], inner: usize, draw: &mut Noise) -> Vec<[f64; 2]> {
+    let mut places: Vec<f64> = fixed.to_vec();
+    places.extend((0..inner).map(|_| draw.uniform(0.15, 0.85)));
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    places.into_iter().map(|at| [at, draw.normal()]).collect()
+}
+
+/// What nobody can see without.
+fn column(over: &ForeignVariable) -> Option<Column> {
+    match over {
+        ForeignVariable::Approach(_) => Some(Column::Direction),
+        ForeignVariable::Time | ForeignVariable::Relaxing(..) => Some(Column::Time),
+        ForeignVariable::Temperature => Some(Column::Temperature),
+        _ => None,
+    }
+}
+
+fn form(courses: &[ForeignCourse]) -> &'static str {
+    let memory = courses.iter().any(|course| course.over.is_remembered());
+    match (courses, memory) {
+        ([_, _, ..], true) => "product with memory",
+        ([_, _, ..], false) => "product of two",
+        (_, true) => "memory",
+        ([one], _) => match one.shape {
+            ForeignShape::Straight => "straight",
+            ForeignShape::Smooth(_) => "smooth",
+            ForeignShape::Corners(_) => "corners",
+            ForeignShape::Jumps(_) => "jumps",
+        },
+        _ => "nothing",
+    }
+}
+
+/// Its place, and those where the same motion of the chain may be put as well.
+fn places(bench: &Bench, motion: ForeignMotion, seat: usize) -> (String, Vec<String>) {
+    let carrier = if seat == 1 { "base".to_string() } else { link(seat - 1) };
+    let (base, tracker) = ("base".to_string(), "tracker".to_string());
+    match motion {
+        ForeignMotion::JointTurn if seat == 1 => (joint(1), vec![base]),
+        ForeignMotion::JointTurn => (joint(seat), vec![]),
+        ForeignMotion::JointShift | ForeignMotion::JointTilt => (joint(seat), vec![carrier]),
+        ForeignMotion::LinkShift | ForeignMotion::LinkBend if seat < bench.joints() => (link(seat), vec![joint(seat + 1)]),
+        ForeignMotion::LinkShift | ForeignMotion::LinkBend => (link(seat), vec!["tool".into()]),
+        ForeignMotion::BaseShift | ForeignMotion::BaseTurn => (base, vec![tracker, joint(1)]),
+        ForeignMotion::ToolShift => ("tool".into(), vec![link(bench.joints()), joint(bench.joints())]),
+        // The turn of the whole instrument about its standing axis.
+        ForeignMotion::Azimuth => (tracker, vec![base]),
+        ForeignMotion::Range | ForeignMotion::Elevation => (tracker, vec![]),
+    }
+}
