@@ -1,6 +1,7 @@
 //! Diagnosis of recordings with concealed effects: what was hidden is named and placed, and nothing else.
 
 mod flanks;
+mod foreign;
 mod left_out;
 mod possible;
 mod said;

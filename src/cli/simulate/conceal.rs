@@ -197,6 +197,7 @@ pub(super) fn design(arguments: &ConcealArguments) -> Result<Design> {
         nulls: arguments.nulls,
         pairs: arguments.pairs,
         open: arguments.open,
+        foreign: 0.0,
         other_forms: arguments.other_forms,
         natural: arguments.natural,
         faulty: arguments.faulty,

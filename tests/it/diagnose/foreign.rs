@@ -1,0 +1,76 @@
+//! Concealed effects that are in no list, shape and place drawn at random: where they are found, what they are called, what is left.
+//!
+//! `CALIB_RECORDINGS=100 cargo test --test it -- diagnose::foreign --nocapture` prints every recording.
+
+use super::left_out::said;
+use crate::compensate::concealed::from_environment;
+use calib::twin::conceal::case::Case;
+use calib::twin::conceal::design::{Content, Design};
+
+/// Whether a finding's place is, or spans, the one given: `link 2-4` is link 3, too.
+fn is_there(found: &str, place: &str) -> bool {
+    let span = |text: &str| {
+        let (kind, numbers) = text.split_once(' ')?;
+        let (from, to) = numbers.split_once('-').unwrap_or((numbers, numbers));
+        Some((kind.to_string(), from.parse::<usize>().ok()?, to.parse::<usize>().ok()?))
+    };
+    match (span(found), span(place)) {
+        (Some((kind, from, to)), Some((wanted, number, _))) => kind == wanted && (from..=to).contains(&number),
+        _ => found == place,
+    }
+}
+
+#[test]
+fn what_is_in_no_list_is_diagnosed_and_counted() {
+    let (count, seed) = (from_environment("CALIB_RECORDINGS", 2) as usize, from_environment("CALIB_SEED", 31));
+    let design = Design { seed, cases: count, foreign: 1.0, faulty: 0.0, ..Design::default() };
+    let (mut silent, mut placed, mut misplaced, mut wrong, mut sound, mut bound, mut worse, mut harmed) =
+        (0, 0, 0, 0, 0, 0, 0, 0);
+    for (number, content) in design.contents().into_iter().enumerate() {
+        assert_eq!(content, Content::Foreign);
+        let case = Case::make(&design, number, content).expect("a case");
+        let one = &case.concealed[0];
+        let said = said(&case, &[]);
+        let places: Vec<&str> =
+            std::iter::once(&one.cause.place).chain(case.accepted.iter().map(|(_, place)| place)).map(String::as_str).collect();
+        let first = said.found.iter().max_by(|a, b| a.3.total_cmp(&b.3));
+        let right = first.map(|(_, place, ..)| places.iter().any(|wanted| is_there(place, wanted)));
+        let named = said.found.iter().any(|(name, _, probability, _)| name != "unknown" && *probability >= 0.5);
+        let floor = 3f64.sqrt() * case.noise_mm[1];
+        let (within, is_worse, is_harmed) = (said.after < 1.15 * floor, said.after > said.before, said.after > 1.2 * said.before);
+        match right {
+            None => silent += 1,
+            Some(true) => placed += 1,
+            Some(false) => misplaced += 1,
+        }
+        wrong += usize::from(named);
+        sound += usize::from(said.verdict != "unexplained");
+        bound += usize::from(within);
+        worse += usize::from(is_worse);
+        harmed += usize::from(is_harmed);
+        let numbers = one.cause.physical.iter().map(|effect| format!("{effect:?}").chars().take(400).collect::<String>());
+        println!(
+            "{} {} at {} ({places:?}), L {:.0}, {} rows, raw {:.3} mm, held out {:.4} -> {:.4} (noise {floor:.4}), {}{}{}{}{}: {:?}\n    {}",
+            case.name,
+            one.form,
+            one.cause.place,
+            one.strength,
+            case.fit,
+            one.raw_mm,
+            said.before,
+            said.after,
+            said.verdict,
+            if right == Some(true) { " PLACED" } else { "" },
+            if named { " NAMED" } else { "" },
+            if within { " WITHIN" } else { "" },
+            if is_worse { " WORSE" } else { "" },
+            said.found,
+            numbers.collect::<String>()
+        );
+    }
+    println!(
+        "{count} foreign: place right {placed}, wrong {misplaced}, nothing found {silent}; wrong names with 0.5 or more {wrong}; explained or nothing missing {sound}; held out within 1.15 of the noise {bound}, worse than before {worse}, by more than a fifth {harmed}"
+    );
+    assert_eq!(silent + placed + misplaced, count);
+    assert!(harmed <= worse && wrong <= placed + misplaced);
+}
