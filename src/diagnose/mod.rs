@@ -13,6 +13,7 @@ mod closed_form;
 mod judge;
 mod locate;
 mod misfit;
+mod open_world;
 mod outside;
 mod pool;
 mod round;
@@ -89,10 +90,12 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
+        let settled = open_world::settle(judged, search.pool, &survey, &fitter, &mut tell);
+        let (judged, odds) = (settled.judged, settled.odds);
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let without = question.without;
-        let round = LastRound { pool: search.pool, survey: &survey, judged, without, first, last, located };
+        let round = LastRound { pool: search.pool, survey: &survey, judged, odds, without, first, last, located };
         return conclude(round, &fitter, &before);
     }
 }

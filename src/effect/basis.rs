@@ -155,7 +155,7 @@ impl Basis {
     }
 
     /// The values of its functions at `u`, numbered.
-    pub(super) fn values(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
+    pub(crate) fn at(&self, u: f64, each: &mut dyn FnMut(usize, f64)) {
         match *self {
             Self::Linear { zero, per } => each(0, (u - zero) / per),
             Self::Straight { zero, per } => {
@@ -244,7 +244,7 @@ mod tests {
     fn a_curve_is_straight_across_a_gap_and_as_before_beside_it() {
         let values = |basis: Basis, u: f64| {
             let mut out = vec![0.0; basis.count()];
-            basis.values(u, &mut |k, value| out[k] = value);
+            basis.at(u, &mut |k, value| out[k] = value);
             out
         };
         let (low, high, count) = (-1.0, 2.0, 12);

@@ -65,7 +65,7 @@ impl Factor {
         for component in 0..self.of.components() {
             if let Some(u) = self.of.value(component, robot, state) {
                 let u = self.held(u);
-                self.basis.values(u, &mut |k, value| each(component * self.basis.count() + k, value));
+                self.basis.at(u, &mut |k, value| each(component * self.basis.count() + k, value));
             }
         }
     }

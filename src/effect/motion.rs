@@ -33,6 +33,18 @@ pub enum Motion {
         /// Whether it turns with the joint.
         turning: bool,
     },
+    /// A joint is displaced along its axis or across it, the link before carrying the directions.
+    Slide {
+        /// From 0.
+        joint: usize,
+        /// Along the axis, or in both directions across it.
+        along: bool,
+    },
+    /// A link bends in its middle, about both directions across it.
+    Bend {
+        /// From 0.
+        link: usize,
+    },
     /// Neighbouring links grow along themselves, each in proportion to its length.
     Links {
         /// Link, from 0.
@@ -103,7 +115,8 @@ impl Motion {
     /// Where it acts.
     pub fn place(&self) -> Place {
         match *self {
-            Self::Joint { joint } | Self::Axis { joint, .. } => Place::Joint(joint),
+            Self::Joint { joint } | Self::Axis { joint, .. } | Self::Slide { joint, .. } => Place::Joint(joint),
+            Self::Bend { link } => Place::Links(link, link),
             Self::Coupled { by, moved } => Place::Coupled(by, moved),
             Self::Links { first, last } => Place::Links(first, last),
             Self::Base { .. } => Place::Base,
@@ -116,7 +129,7 @@ impl Motion {
     pub(super) fn unit(&self, robot: &RobotModel) -> Unit {
         match *self {
             Self::Joint { joint } | Self::Coupled { moved: joint, .. } if robot.is_revolute(joint) => Unit::Radian,
-            Self::Axis { .. } | Self::Instrument { of: Polar::Azimuth | Polar::Elevation } => Unit::Radian,
+            Self::Axis { .. } | Self::Bend { .. } | Self::Instrument { of: Polar::Azimuth | Polar::Elevation } => Unit::Radian,
             _ => Unit::Millimetre,
         }
     }
@@ -151,6 +164,21 @@ impl Motion {
                     out.shift(count * i + k, p, station, screw(normal, robot.point(joint)) * value);
                 }
             }
+            Self::Slide { joint, along } => {
+                let axis = along.then(|| robot.axis(joint));
+                let across = robot.normals(joint).iter().filter(|_| !along).map(|(_, normal)| normal);
+                for (i, direction) in axis.into_iter().chain(across).enumerate() {
+                    let moved = direction * value;
+                    out.shift(count * i + k, p, joint, Twist::new(moved.x, moved.y, moved.z, 0.0, 0.0, 0.0));
+                }
+            }
+            Self::Bend { link } => {
+                let along = extent(robot, link);
+                let middle = robot.point(link) + 0.5 * along;
+                for (i, normal) in across(&along).iter().enumerate() {
+                    out.shift(count * i + k, p, link + 1, screw(normal, &middle) * value);
+                }
+            }
             Self::Links { first, last } => {
                 for link in first..=last {
                     let growth = extent(robot, link) * value;
@@ -175,6 +203,13 @@ fn shift(station: usize, axes: Axes, k: usize, value: f64, p: &[f64], out: &mut 
 pub(super) fn extent(robot: &RobotModel, link: usize) -> Vector3<f64> {
     let end = if link + 1 < robot.joints() { *robot.point(link + 1) } else { robot.home().translation };
     end - robot.point(link)
+}
+
+/// Two unit vectors across a direction and each other.
+fn across(along: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let least = along.iamin();
+    let first = along.cross(&Vector3::ith(least, 1.0)).normalize();
+    [first, along.cross(&first).normalize()]
 }
 
 /// Shorter links (m) neither bend nor grow visibly.

@@ -274,6 +274,11 @@ pub struct PointMotion {
 }
 
 impl PointMotion {
+    /// A variable of one number in this row; none where the row does not tell.
+    pub(crate) fn value(&self, robot: &RobotModel, data: &Measurements, row: usize, of: Variable) -> Option<f64> {
+        of.value(0, robot, &ArmState::new(data, row, &self.posture, self.point))
+    }
+
     /// Derivative of the point by each parameter of an effect at zero, through `emit(parameter, derivative)`, as
     /// [`EffectStack::derivatives`].
     pub fn derivatives(

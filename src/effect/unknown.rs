@@ -190,6 +190,13 @@ impl Cause for Unknown {
                 axes.flat_map(|(_, axis)| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Radian, WIDE))).collect()
             }
             Motion::Links { .. } => counted.map(|k| (format!("c{k}"), Unit::One, WIDE)).collect(),
+            Motion::Slide { along: true, .. } => counted.map(|k| (format!("s{k}"), Unit::Millimetre, WIDE)).collect(),
+            Motion::Slide { .. } => {
+                ["u", "v"].iter().flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Millimetre, WIDE))).collect()
+            }
+            Motion::Bend { .. } => {
+                ["a", "b"].iter().flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Radian, WIDE))).collect()
+            }
             motion => {
                 let numbers = counted.flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
                 numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()
@@ -253,12 +260,14 @@ impl Cause for Unknown {
             }
             (Basis::Creep { .. }, _) => "creep".into(),
             (Basis::Sign, Variable::Gravity { .. }) => "side".into(),
+            (basis, Variable::Gravity { axis: Some(axis) }) if basis.is_curve() => format!("gravity_{}", ["x", "y", "z"][axis]),
             (_, Variable::Gravity { .. }) => "sag".into(),
+            (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),
             (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),
             (Basis::Settling { .. }, _) | (_, Variable::Temperature) => "warm".into(),
             (_, Variable::Payload) => "payload".into(),
             (_, Variable::Approach { .. } | Variable::Load { .. }) => names.join("_"),
-            _ if frame => String::new(),
+            _ if frame && !term.basis().is_curve() => String::new(),
             _ => names.join("_"),
         }
     }

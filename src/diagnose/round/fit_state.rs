@@ -91,6 +91,8 @@ pub(crate) struct Fitter<'a> {
     pub repeatability: JointRepeatability,
     /// Covariance of every row's point per squared joint deviation.
     spread: Vec<Matrix3<f64>>,
+    /// What repeats show of the joints' repeatability, rad: nothing of it rests on a residual.
+    repeated: f64,
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
     /// Autocorrelated noise of standing points; none where it is white.
@@ -116,6 +118,7 @@ impl<'a> Fitter<'a> {
             free: None,
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: Vec::new(),
+            repeated: 0.0,
             asked: false,
             correlated: None,
             estimated: 0,
@@ -127,6 +130,7 @@ impl<'a> Fitter<'a> {
         fitter.spread = spreads(&now.model, &fitter.data);
         let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
         fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
+        fitter.repeated = fitter.repeatability.sigma;
         if fitter.repeatability.sigma > 0.0 {
             fitter.data.spread = Some(scaled(&fitter.spread, fitter.repeatability.sigma));
             now = fitter.fit(&base, Vec::new());
@@ -153,6 +157,12 @@ impl<'a> Fitter<'a> {
         };
         let now = self.repeatability.sigma;
         ((other - now).abs() > SETTLED * other.max(now)).then_some(other)
+    }
+
+    /// The recording with the noise that its statement and repeats show, whatever a residual was said to be.
+    pub fn without_inferred_noise(&self) -> Measurements {
+        let spread = (self.repeated > 0.0).then(|| scaled(&self.spread, self.repeated));
+        Measurements { spread, ..self.data.clone() }
     }
 
     /// Takes the noise that a residual showed.

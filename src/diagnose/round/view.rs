@@ -6,6 +6,7 @@ use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{DeclaredForm, Hypothesis, Survey, Variable, hypotheses};
 use crate::estimate::Model;
+use crate::robot::Measurements;
 
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
@@ -19,8 +20,13 @@ pub(crate) struct RoundView<'a> {
 
 impl<'a> RoundView<'a> {
     pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
+        Self::on(&fitter.data, now, fitter)
+    }
+
+    /// On the same rows with other noise.
+    pub fn on(data: &'a Measurements, now: &'a FitState, fitter: &Fitter) -> Self {
         let compliance = compliance(&now.model);
-        let mut problem = WhitenedProblem::new(&now.model, &fitter.data, thinned(&fitter.data, &now.screening.kept));
+        let mut problem = WhitenedProblem::new(&now.model, data, thinned(data, &now.screening.kept));
         if compliance.iter().any(|compliance| *compliance > 0.0) {
             problem = problem.with_currents();
         }
@@ -28,8 +34,13 @@ impl<'a> RoundView<'a> {
         if let Some(noise) = fitter.correlated {
             problem = problem.with_autocorrelation(noise);
         }
-        let pose = poses(&fitter.data, &problem.rows, autocorrelation_time);
+        let pose = poses(data, &problem.rows, autocorrelation_time);
         Self { pose, autocorrelation_time, torque: problem.torques(), compliance, problem }
+    }
+
+    /// How many rows of what is left count as one.
+    pub fn autocorrelation_time(&self) -> f64 {
+        self.autocorrelation_time
     }
 
     pub fn survey(&self) -> Survey<'_> {

@@ -5,7 +5,7 @@
 mod autocorrelated;
 mod currents;
 
-use crate::effect::{Deflection, Effect, Form, PointMotion};
+use crate::effect::{Basis, Deflection, Effect, Form, Law, Motion, PointMotion, Term, Unknown, Variable};
 use crate::estimate::{Model, Prior, Weight};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use autocorrelated::AutocorrelatedNoise;
@@ -79,7 +79,7 @@ impl<'a> WhitenedProblem<'a> {
     }
 
     /// Takes a column's points to their innovations.
-    fn innovate(&self, column: &mut [f64]) {
+    pub fn innovate(&self, column: &mut [f64]) {
         if let Some(innovations) = &self.innovations {
             innovations.apply(&mut column[..3 * self.rows.len()]);
         }
@@ -152,6 +152,20 @@ impl<'a> WhitenedProblem<'a> {
             }
         }
         out
+    }
+
+    /// Whitened motions of the points by each direction of a motion, whatever the row; noise is not made white in time.
+    pub fn directions(&self, motion: Motion) -> Vec<Vec<f64>> {
+        // One from the beginning of time.
+        let always = Law::new(Variable::Time, Basis::After { at: f64::MIN });
+        let columns = self.motions_by(&Term::new(&Unknown, motion, always).into());
+        columns.chunks(self.residual_rows().max(1)).map(<[f64]>::to_vec).collect()
+    }
+
+    /// A variable of one number at every row; none where some row does not tell.
+    pub fn values(&self, of: Variable) -> Option<Vec<f64>> {
+        let one = |(row, motion): (&usize, &PointMotion)| motion.value(self.robot, self.data, *row, of);
+        self.rows.iter().zip(&self.motions).map(one).collect()
     }
 
     /// Columns of some parameters of the model itself, and what each motor has of its own.

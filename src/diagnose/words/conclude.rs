@@ -2,7 +2,6 @@
 
 use super::findings::findings;
 use super::last_round::LastRound;
-use super::probability::weigh;
 use super::statement::{next, not_observable, not_tried, slower_than_noise};
 use super::unseen::by_speed;
 use crate::diagnose::closed_form::FormulaSearch;
@@ -33,7 +32,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let model = state.model.held_within(data, &state.screening.kept);
     let predicted = model.predict(data);
     let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
-    let (rest, mut findings) = without_small_rests(findings(&last));
+    let (rest, findings) = without_small_rests(findings(&last));
     let basis = basis(fitter);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
     let lack_of_fit = state.fitted.repeated.as_ref().and_then(|repeated| repeated.lack_of_fit);
@@ -43,12 +42,14 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let is_stated = data.noise_basis != NoiseBasis::Inferred && basis != NoiseBasis::Repeats;
     let above_stated = is_stated && misfit.beyond_stated > LOUD;
     let verdict = match verdict(&findings, &misfit, something_left, fitter.repeatability) {
-        VerdictKind::NothingMissing if above_stated => VerdictKind::Unexplained,
+        // What lasts from point to point may be the air, and may be a cause that follows time.
+        VerdictKind::NothingMissing if above_stated || fitter.correlated.is_some() => VerdictKind::Unexplained,
+        // A noise that is taken from what is left cannot explain what is left.
+        VerdictKind::Explained if above_stated && basis == NoiseBasis::Inferred => VerdictKind::Unexplained,
         other => other,
     };
     let nameless = !something_left && only_unknown(&findings);
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
-    findings.iter_mut().for_each(weigh);
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
     not_observable.extend(by_speed(&last));
@@ -119,6 +120,17 @@ fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
     findings.into_iter().partition(small)
 }
 
+/// What has no name explains nothing where it is more than this share of what was found.
+const NAMELESS: f64 = 0.1;
+
+/// The share of findings without a name in what all findings gain.
+fn nameless_share(findings: &[Finding]) -> f64 {
+    let gains = |of: &dyn Fn(&Finding) -> bool| -> f64 {
+        findings.iter().filter(|finding| finding.is_physics() && of(finding)).filter_map(|finding| finding.evidence).map(|e| e.gain).sum()
+    };
+    gains(&|finding| finding.effect == Unknown::NAME) / gains(&|_| true).max(f64::MIN_POSITIVE)
+}
+
 /// Whether something was found, and none of it has a name.
 fn only_unknown(findings: &[Finding]) -> bool {
     let mut physics = findings.iter().filter(|finding| finding.is_physics()).peekable();
@@ -127,7 +139,7 @@ fn only_unknown(findings: &[Finding]) -> bool {
 
 fn verdict(findings: &[Finding], misfit: &Misfit, something_left: bool, repeatability: JointRepeatability) -> VerdictKind {
     let blind = repeatability.repeats < REPEATS && misfit.noise_floor > NOT_NOISE * misfit.instrument;
-    if blind || something_left || only_unknown(findings) {
+    if blind || something_left || nameless_share(findings) > NAMELESS {
         VerdictKind::Unexplained
     } else if findings.is_empty() {
         VerdictKind::NothingMissing

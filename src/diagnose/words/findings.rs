@@ -5,8 +5,10 @@ use super::groups::{FindingKey, REFINEMENT, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
 use super::rivals::{FIRM, exact, rivals};
-use super::statement::{left_out, not_so, sentence};
+use super::probability::weigh;
+use super::statement::{left_out, none_of_the_list, not_so, sentence};
 use crate::diagnose::judge::FoldGain;
+use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
@@ -24,7 +26,13 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let set = last.set();
     let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
     let groups = groups(state, &last.judged.set, last.pool, last.survey);
-    let mut out: Vec<Finding> = groups.into_iter().map(|(key, members)| finding(last, &whole, key, &members)).collect();
+    let judged = |(key, members): (FindingKey, Vec<usize>)| {
+        let (mut own, odds) = (finding(last, &whole, key, &members), last.odds.get(&key));
+        weigh(&mut own, odds);
+        odds.into_iter().for_each(|odds| unnamed(&mut own, odds));
+        own
+    };
+    let mut out: Vec<Finding> = groups.into_iter().map(judged).collect();
     let data = last.survey.data;
     let by_the_way_there = |form: &Form| match form.variables().first() {
         Some(Variable::LastMove) => true,
@@ -33,10 +41,30 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     };
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
-    out.extend(faults(last, unknown));
+    let mut faults = faults(last, unknown);
+    faults.iter_mut().for_each(|fault| weigh(fault, None));
+    out.extend(faults);
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     out
+}
+
+/// What is more probably none of the list than what it is called loses its name, which becomes a rival; the size of what has no law is told by
+/// the evidence of its free form.
+fn unnamed(finding: &mut Finding, odds: &NameOdds) {
+    let has_no_law = finding.has_no_law();
+    if let Some(evidence) = finding.evidence.as_mut().filter(|_| has_no_law) {
+        evidence.delta_bic = 2.0 * odds.log;
+    }
+    let Probabilities { name, place, none } = finding.probabilities;
+    if finding.effect == Unknown::NAME || none <= 0.5 {
+        return;
+    }
+    finding.statement = none_of_the_list(finding.place, &finding.statement, none, odds.share);
+    finding.rivals.retain(|rival| rival.effect != Unknown::NAME);
+    finding.rivals.insert(0, RivalCause { effect: finding.effect, place: finding.place, delta_bic: 0.0, probability: name });
+    finding.effect = Unknown::NAME;
+    finding.probabilities = Probabilities { name: none, place, none: 0.0 };
 }
 
 /// All causes together.

@@ -1,15 +1,20 @@
 //! What the last round looked at, and what stands of what it found.
 
+use super::groups::FindingKey;
 use crate::diagnose::judge::JudgedCauses;
+use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::types::Located;
 use crate::effect::{Effect, Survey};
+use std::collections::BTreeMap;
 
 /// The last round, judged.
 pub(crate) struct LastRound<'a, 'b> {
     pub pool: &'b CachedHypotheses<'a>,
     pub survey: &'b Survey<'a>,
     pub judged: JudgedCauses,
+    /// Of every finding, that it is none of the list.
+    pub odds: BTreeMap<FindingKey, NameOdds>,
     /// Names of causes that are not to be given.
     pub without: &'b [String],
     /// The gate's probability at the start and at the end.

@@ -12,7 +12,7 @@ mod statement;
 mod unseen;
 
 pub(crate) use conclude::conclude;
-pub(crate) use groups::{FindingGroups, groups};
+pub(crate) use groups::{FindingGroups, FindingKey, groups};
 pub(crate) use last_round::LastRound;
 pub use statement::other_means;
 

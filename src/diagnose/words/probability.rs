@@ -6,7 +6,8 @@
 //! this project's own making (`tests/reference/calibrate_probability.py`), and are judged by others in the proof: in 296 of them, which
 //! weighed 0.3 each, the cause had been left out of the list: what is stated allows for physics that nobody has listed.
 
-use crate::diagnose::types::{Evidence, Finding, Probabilities};
+use crate::diagnose::open_world::NameOdds;
+use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::effect::Unknown;
 
 /// T.
@@ -22,13 +23,17 @@ const SAME_PLACE: f64 = 0.34;
 /// Faults of single rows are seen as such or not at all.
 const FAULT: f64 = 0.98;
 
-/// Sets the probabilities of a finding and of its rivals.
-pub(super) fn weigh(finding: &mut Finding) {
+/// Sets the probabilities of a finding and of its rivals; `odds` are those of a free form against names.
+pub(super) fn weigh(finding: &mut Finding, odds: Option<&NameOdds>) {
     let Some(evidence) = finding.evidence else {
         finding.probabilities = Probabilities { name: FAULT, place: FAULT, none: 1.0 - FAULT };
         return;
     };
-    let none = none(&evidence, finding.effect == Unknown::NAME);
+    let nameless = finding.effect == Unknown::NAME;
+    if let Some(odds) = odds.filter(|_| nameless) {
+        return weigh_nameless(finding, odds);
+    }
+    let none = odds.map_or_else(|| none(&evidence, nameless), |odds| odds.none);
     // Only identities differ by nothing at all.
     let loss = |delta: f64| if delta == 0.0 { IDENTITY } else { delta.max(0.0) };
     let weight = |delta: f64| (-loss(delta) / (2.0 * TEMPERATURE)).exp();
@@ -38,8 +43,19 @@ pub(super) fn weigh(finding: &mut Finding) {
     }
     let name = (1.0 - none) / whole;
     let there = finding.rivals.iter().filter(|rival| rival.place == finding.place).map(|rival| rival.probability);
-    let place = name + there.sum::<f64>() + SAME_PLACE * none;
+    let place = odds.map_or(name + there.sum::<f64>() + SAME_PLACE * none, |odds| odds.place);
     finding.probabilities = Probabilities { name, place: place.min(1.0), none };
+}
+
+/// Of a finding without a name: rivals share what free forms leave.
+fn weigh_nameless(finding: &mut Finding, odds: &NameOdds) {
+    let weight = |rival: &RivalCause| (-rival.delta_bic.max(0.0) / (2.0 * TEMPERATURE)).exp();
+    let whole: f64 = finding.rivals.iter().map(weight).sum();
+    for rival in &mut finding.rivals {
+        rival.probability = (1.0 - odds.none) * weight(rival) / whole.max(f64::MIN_POSITIVE);
+    }
+    let none = if finding.rivals.is_empty() { 1.0 - odds.none } else { 0.0 };
+    finding.probabilities = Probabilities { name: odds.none, place: odds.place, none };
 }
 
 fn none(evidence: &Evidence, no_law: bool) -> f64 {
@@ -50,7 +66,6 @@ fn none(evidence: &Evidence, no_law: bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::types::RivalCause;
     use crate::effect::Place;
 
     fn finding(delta_bic: f64, rivals: &[(&'static str, usize, f64)]) -> Finding {
@@ -76,7 +91,7 @@ mod tests {
     #[test]
     fn names_and_none_add_up_to_one_and_equal_rivals_share_alike() {
         let mut found = finding(200.0, &[("backlash", 1, -1.0), ("zero_shift", 2, 3.0), ("counterbalance", 2, 0.0)]);
-        weigh(&mut found);
+        weigh(&mut found, None);
         let Probabilities { name, place, none } = found.probabilities;
         let rivals: Vec<f64> = found.rivals.iter().map(|rival| rival.probability).collect();
         assert!((name + none + rivals.iter().sum::<f64>() - 1.0).abs() < 1e-12);
@@ -88,7 +103,7 @@ mod tests {
     fn none_is_less_probable_the_more_the_criterion_would_lose() {
         let none = |loss: f64| {
             let mut found = finding(loss, &[]);
-            weigh(&mut found);
+            weigh(&mut found, None);
             found.probabilities.none
         };
         assert!(none(20.0) > none(100.0) && none(100.0) > none(1000.0));

@@ -2,7 +2,7 @@
 
 use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Summary, Survey, cause, figure};
+use crate::effect::{Place, Cause, Clock, DeclaredCause, DeclaredForm, Measure, Summary, Survey, cause, figure};
 
 /// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
 pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
@@ -18,6 +18,12 @@ pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: f64) -> St
         summary.place,
         figure(rms * 1e6, 0)
     )
+}
+
+/// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
+pub(super) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
+    let holds = if share < 0.995 { format!(", which holds {:.0} % of it", 100.0 * share) } else { String::new() };
+    format!("what acts at {place} is no cause of the list, with probability {none:.2}; nearest is{holds}: {nearest}")
 }
 
 /// The sentence of a finding whose name the user has excluded.

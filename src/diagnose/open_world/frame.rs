@@ -1,0 +1,126 @@
+//! The residual without any cause and the columns of whatever moves it, both with geometry projected off.
+
+use crate::diagnose::pool::{orthonormal, project};
+use crate::diagnose::round::{FitState, Fitter, RoundView};
+use crate::effect::{Form, Motion, Variable};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use nalgebra::{DMatrix, DVector};
+
+/// Columns of a group, projected, with their products among each other and with the residual.
+pub(super) struct Block {
+    /// Residual rows x columns.
+    pub columns: Mat<f64>,
+    /// Mean squared motion (m2) of the tool by a unit of each column's coefficient.
+    pub square: Vec<f64>,
+    pub products: Products,
+}
+
+/// What the evidence of a group needs.
+#[derive(Clone)]
+pub(super) struct Products {
+    pub gram: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+}
+
+/// The last model's rows.
+pub(super) struct Frame<'a> {
+    pub view: &'a RoundView<'a>,
+    base: Mat<f64>,
+    /// Without the causes of the model.
+    residual: Vec<f64>,
+    /// Variance of one row's axis, m2, by which columns become lengths.
+    variance: Vec<f64>,
+}
+
+impl<'a> Frame<'a> {
+    pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter) -> Self {
+        let problem = &view.problem;
+        let base = orthonormal(&problem.jacobian(fitter.free()));
+        let variance = problem.rows.iter().map(|row| problem.data.noise(*row).powi(2) / 3.0).collect();
+        let mut residual = problem.residual.clone();
+        for (cause, range) in now.causes.iter().zip(&now.ranges) {
+            let columns = problem.columns(&cause.form);
+            for (column, k) in columns.chunks(problem.residual_rows()).zip(range.clone()) {
+                residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * now.model.x[k]);
+            }
+        }
+        project(base.as_ref(), &mut residual);
+        Self { view, base, residual, variance }
+    }
+
+    /// Parameters of the base model.
+    pub fn rank(&self) -> usize {
+        self.base.ncols()
+    }
+
+    pub fn residual_rows(&self) -> usize {
+        self.residual.len()
+    }
+
+    pub fn square(&self) -> f64 {
+        self.residual.iter().map(|value| value * value).sum()
+    }
+
+    /// Products of some columns with the residual.
+    pub fn along(&self, columns: MatRef<'_, f64>) -> DVector<f64> {
+        let residual = MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1);
+        dense(product(columns, residual).as_ref()).column(0).into_owned()
+    }
+
+    /// A form of the list or of the model.
+    pub fn block(&self, form: &Form) -> Block {
+        self.of_columns(self.view.problem.motions_by(form))
+    }
+
+    /// A motion along the functions of a row in `values`, one after another: all products of a direction and a function.
+    pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> Block {
+        let (rows, points) = (self.residual.len(), 3 * self.view.problem.rows.len());
+        let mut raw = vec![0.0; rows * directions.len() * values.len()];
+        for ((direction, value), column) in
+            directions.iter().flat_map(|direction| values.iter().map(move |value| (direction, value))).zip(raw.chunks_mut(rows))
+        {
+            let of_points = column[..points].chunks_exact_mut(3).zip(direction.chunks_exact(3)).zip(value);
+            of_points.for_each(|((own, along), value)| (0..3).for_each(|axis| own[axis] = along[axis] * value));
+        }
+        self.of_columns(raw)
+    }
+
+    /// Whitened motions of the tool by each direction of a motion.
+    pub fn directions(&self, motion: Motion) -> Vec<Vec<f64>> {
+        self.view.problem.directions(motion)
+    }
+
+    /// A variable at every row; none where some row does not tell.
+    pub fn values(&self, of: Variable) -> Option<Vec<f64>> {
+        self.view.problem.values(of)
+    }
+
+    fn of_columns(&self, mut raw: Vec<f64>) -> Block {
+        let rows = self.residual.len();
+        let square = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
+        raw.chunks_mut(rows).for_each(|column| self.view.problem.innovate(column));
+        project(self.base.as_ref(), &mut raw);
+        let columns = MatRef::from_column_major_slice(&raw, rows, raw.len() / rows).to_owned();
+        let gram = dense(product(columns.as_ref(), columns.as_ref()).as_ref());
+        let gradient = self.along(columns.as_ref());
+        Block { columns, square, products: Products { gram, gradient } }
+    }
+
+    fn mean_square(&self, column: &[f64]) -> f64 {
+        let squares = column.chunks_exact(3).zip(&self.variance);
+        squares.map(|(row, variance)| row.iter().map(|value| value * value).sum::<f64>() * variance).sum::<f64>()
+            / self.variance.len().max(1) as f64
+    }
+}
+
+/// Transpose of `a` times `b`.
+pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut products = Mat::zeros(a.ncols(), b.ncols());
+    matmul(products.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+    products
+}
+
+pub(super) fn dense(of: MatRef<'_, f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(i, j)])
+}

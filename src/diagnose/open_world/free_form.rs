@@ -1,0 +1,164 @@
+//! The free form of a place: groups that join one after another while each pays for itself.
+
+use super::evidence::{GroupEvidence, evidence, log_mean};
+use super::frame::{Block, Frame, dense, product};
+use super::groups::{FreeGroup, GroupColumns, name_of};
+use super::state::State;
+use crate::effect::{Place, Survey};
+use faer::{Mat, MatRef};
+use nalgebra::DMatrix;
+
+/// Groups of a place at most.
+const GROUPS: usize = 4;
+/// ln of the evidence by which a further group must pay for itself, beyond the price of its choice.
+const PAYS: f64 = 1.0;
+/// Groups whose shorter lengths are looked at.
+const CLOSER: usize = 10;
+
+/// A group in a free form.
+#[derive(Debug, Clone)]
+pub(super) struct FreeTerm {
+    pub group: FreeGroup,
+    /// Prior variances of its coefficients, SI.
+    pub variances: Vec<f64>,
+}
+
+/// What the free form of a place says.
+#[derive(Debug, Clone)]
+pub(super) struct FreeForm {
+    pub place: Place,
+    /// ln of its evidence over that of the state that it is beside; the choice among groups is in it.
+    pub log: f64,
+    pub terms: Vec<FreeTerm>,
+    /// By how much the squared residual, over the noise, falls with it.
+    pub gain: f64,
+}
+
+/// The groups of a place with their columns.
+pub(super) struct PlaceGroups {
+    pub place: Place,
+    groups: Vec<FreeGroup>,
+    blocks: Vec<Block>,
+    variances: Vec<Vec<Vec<f64>>>,
+    /// Products of the columns of the model's causes with those of each.
+    known: Vec<DMatrix<f64>>,
+}
+
+/// What the model's causes and the list are, beside which free forms are asked.
+pub(super) struct Surroundings<'f, 'a> {
+    pub frame: &'f Frame<'a>,
+    pub survey: &'f Survey<'f>,
+    /// Columns of all causes of the model.
+    pub causes: MatRef<'f, f64>,
+    /// Names that are taken out of the list.
+    pub without: &'f [String],
+}
+
+impl PlaceGroups {
+    pub fn of(place: Place, around: &Surroundings) -> Self {
+        let mut columns = GroupColumns::new(around.frame);
+        let all = columns.of(place, around.survey);
+        let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
+        out.take(all, &mut columns, around);
+        out
+    }
+
+    fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &Surroundings) {
+        let is_listed = |group: &FreeGroup| name_of(group).is_some_and(|name| around.without.iter().all(|out| out != name));
+        let free: Vec<FreeGroup> = groups.into_iter().filter(|group| !is_listed(group)).collect();
+        for group in free {
+            let Some(block) = columns.block(&group) else { continue };
+            self.known.push(dense(product(around.causes, block.columns.as_ref()).as_ref()));
+            self.variances.push(group.variances(&block));
+            self.groups.push(group);
+            self.blocks.push(block);
+        }
+    }
+
+    /// The evidence of every group beside a state, with its best length.
+    fn scan(&self, state: &State) -> Vec<(GroupEvidence, usize)> {
+        let seen: Vec<_> = self.blocks.iter().zip(&self.known).map(|(block, known)| state.beside(block, known)).collect();
+        let of = |g: usize, length: usize| evidence(&seen[g].gram, &seen[g].gradient, &self.variances[g][length]);
+        // Two lengths of all, every length of the best ones.
+        let first = |g: usize| {
+            let last = self.variances[g].len() - 1;
+            let ends: Vec<GroupEvidence> = if last == 0 { vec![of(g, 0)] } else { vec![of(g, 0), of(g, last)] };
+            (mixed(&ends), if last > 0 && ends[1].log > ends[0].log { last } else { 0 })
+        };
+        let mut out: Vec<(GroupEvidence, usize)> = (0..self.groups.len()).map(first).collect();
+        let mut order: Vec<usize> = (0..out.len()).filter(|g| self.variances[*g].len() > 2).collect();
+        order.sort_by(|a, b| out[*b].0.log.total_cmp(&out[*a].0.log));
+        for g in order.into_iter().take(CLOSER) {
+            let all: Vec<GroupEvidence> = (0..self.variances[g].len()).map(|length| of(g, length)).collect();
+            let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
+            out[g] = (GroupEvidence { log: log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>()), ..all[best] }, best);
+        }
+        out
+    }
+
+    /// The price of a group's choice: all motions and variables alike, and within a motion that steps all times.
+    fn price(&self, g: usize) -> f64 {
+        let choices: f64 = self.groups.iter().map(|group| 1.0 / group.of as f64).sum();
+        choices.max(1.0).ln() + (self.groups[g].of as f64).ln()
+    }
+
+    /// The best group alone, and the evidence of them all as alternatives.
+    pub fn first(&self, state: &State) -> f64 {
+        let logs: Vec<f64> =
+            self.scan(state).iter().enumerate().map(|(g, (found, _))| found.log - self.price(g)).collect();
+        if logs.is_empty() { f64::NEG_INFINITY } else { super::evidence::log_sum(&logs) }
+    }
+
+    /// The free form beside a state.
+    pub fn greedy(&mut self, state: &State, around: &Surroundings) -> FreeForm {
+        let (mut now, mut log, mut terms) = (state.clone(), f64::NEG_INFINITY, Vec::new());
+        let mut columns = GroupColumns::new(around.frame);
+        for step in 0..GROUPS {
+            let scan = self.scan(&now);
+            let paid = |g: usize| scan[g].0.log - self.price(g);
+            let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
+            let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
+            if step == 0 {
+                log = super::evidence::log_sum(&(0..scan.len()).map(paid).collect::<Vec<_>>());
+                if paid(best) < 0.0 {
+                    break;
+                }
+            } else if paid(best) < PAYS {
+                break;
+            } else {
+                log += paid(best);
+            }
+            let (found, length) = scan[best];
+            let square = found.amplitude * found.amplitude;
+            let variances: Vec<f64> = self.variances[best][length].iter().map(|variance| variance * square).collect();
+            now = now.with(around.frame, self.blocks[best].columns.as_ref(), &variances);
+            let group = self.groups[best];
+            terms.push(FreeTerm { group, variances });
+            if step == 0 {
+                let products = columns.products(&group, around.survey);
+                self.take(products, &mut columns, around);
+            }
+        }
+        FreeForm { place: self.place, log, terms, gain: now.gain() - state.gain() }
+    }
+}
+
+fn mixed(all: &[GroupEvidence]) -> GroupEvidence {
+    let best = all.iter().copied().max_by(|a, b| a.log.total_cmp(&b.log));
+    let log = log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>());
+    GroupEvidence { log, amplitude: best.map_or(0.0, |best| best.amplitude) }
+}
+
+/// Columns one after another as one matrix.
+pub(super) fn side_by_side(blocks: &[Block], rows: usize) -> Mat<f64> {
+    let count = blocks.iter().map(|block| block.columns.ncols()).sum();
+    let mut out = Mat::zeros(rows, count);
+    let mut at = 0;
+    for block in blocks {
+        for k in 0..block.columns.ncols() {
+            out.col_as_slice_mut(at).copy_from_slice(block.columns.col_as_slice(k));
+            at += 1;
+        }
+    }
+    out
+}

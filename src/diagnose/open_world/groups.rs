@@ -1,0 +1,259 @@
+//! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
+
+use super::frame::{Block, Frame};
+use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use std::f64::consts::PI;
+
+/// Correlation lengths of smooth functions, shares of their variable's range.
+const LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02];
+/// Cosines of the travel of a joint over its own angle, where gears turn; over another motion's own angle and over time; and over what
+/// else there is.
+const FINEST: usize = 48;
+const FINE: usize = 16;
+const COARSE: usize = 8;
+/// Cosines of each of two variables.
+const EACH: usize = 4;
+/// Cosines have no slope at the ends of their range: it is wider than the rows' by this share at either end.
+const MARGIN: f64 = 0.1;
+/// A variable of no more values than this is a number of its own, not a range.
+const LEVELS: usize = 3;
+/// Steps in time that are tried.
+const STEPS: usize = 40;
+/// Shorter links (m) have no free form of their own.
+const SHORT: f64 = 1e-3;
+
+/// A motion, and functions of the recording's variables that it follows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FreeGroup {
+    pub motion: Motion,
+    pub law: Law,
+    /// How many steps it is one of; 1 for smooth functions.
+    pub of: usize,
+}
+
+impl FreeGroup {
+    pub fn place(&self) -> Place {
+        self.motion.place()
+    }
+
+    /// As what may join the model: a law without a name.
+    pub fn hypothesis(&self) -> Hypothesis {
+        Hypothesis::new(Term::new(&Unknown, self.motion, self.law), 1)
+    }
+
+    /// Prior variances of its functions, one list a length.
+    fn spectra(&self) -> Vec<Vec<f64>> {
+        let factors: Vec<Vec<Vec<f64>>> = self.law.factors().map(|factor| spectra(&factor.basis)).collect();
+        match factors.as_slice() {
+            [first, second] => first
+                .iter()
+                .zip(second.iter().cycle())
+                .map(|(a, b)| a.iter().flat_map(|x| b.iter().map(move |y| x * y)).collect())
+                .collect(),
+            _ => factors.into_iter().next().unwrap_or_default(),
+        }
+    }
+
+    /// Prior variances of the block's columns, of unit mean square at the tool; a list a length.
+    pub fn variances(&self, block: &Block) -> Vec<Vec<f64>> {
+        let functions = self.law.count();
+        let one = |spectrum: Vec<f64>| {
+            let all: Vec<f64> = (0..block.square.len()).map(|k| spectrum[k % functions]).collect();
+            let size: f64 = all.iter().zip(&block.square).map(|(variance, square)| variance * square).sum();
+            all.into_iter().map(|variance| variance / size.max(f64::MIN_POSITIVE)).collect()
+        };
+        self.spectra().into_iter().map(one).collect()
+    }
+}
+
+/// Prior variances of a basis' functions: for every length the spectral density of a Matern kernel with smoothness 3/2.
+fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
+    let Basis::Cosines { count, .. } = *basis else { return vec![vec![1.0; basis.count()]] };
+    let lengths = match count {
+        FINEST.. => &LENGTHS[..],
+        FINE.. => &LENGTHS[..4],
+        COARSE.. => &LENGTHS[..3],
+        _ => &LENGTHS[..2],
+    };
+    let density = |length: f64| {
+        let of = |k: usize| {
+            let wave = PI * k as f64 * length / (1.0 + 2.0 * MARGIN);
+            1.0 / (3.0 + wave * wave).powi(2)
+        };
+        let all: Vec<f64> = (1..=count).map(of).collect();
+        let sum: f64 = all.iter().sum();
+        all.into_iter().map(|density| density / sum).collect()
+    };
+    lengths.iter().copied().map(density).collect()
+}
+
+/// Directions of motions and values of variables at every row, computed once.
+pub(super) struct GroupColumns<'f, 'a> {
+    frame: &'f Frame<'a>,
+    directions: Vec<(Motion, Vec<Vec<f64>>)>,
+    values: Vec<(Variable, Option<Vec<f64>>)>,
+}
+
+impl<'f, 'a> GroupColumns<'f, 'a> {
+    pub fn new(frame: &'f Frame<'a>) -> Self {
+        Self { frame, directions: Vec::new(), values: Vec::new() }
+    }
+
+    /// A variable at every row, where every row tells it.
+    fn values(&mut self, of: Variable) -> Option<&[f64]> {
+        if !self.values.iter().any(|(other, _)| *other == of) {
+            self.values.push((of, self.frame.values(of)));
+        }
+        self.values.iter().find(|(other, _)| *other == of).and_then(|(_, values)| values.as_deref())
+    }
+
+    pub fn block(&mut self, group: &FreeGroup) -> Option<Block> {
+        let mut functions: Vec<Vec<f64>> = vec![vec![1.0; self.frame.view.problem.rows.len()]];
+        for factor in group.law.factors() {
+            let values = self.values(factor.of)?;
+            let mut own = vec![vec![0.0; values.len()]; factor.basis.count()];
+            values.iter().enumerate().for_each(|(row, u)| factor.basis.at(*u, &mut |k, value| own[k][row] = value));
+            let times = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).map(|(x, y)| x * y).collect();
+            functions = functions.iter().flat_map(|a| own.iter().map(move |b| times(a, b))).collect();
+        }
+        if !self.directions.iter().any(|(other, _)| *other == group.motion) {
+            self.directions.push((group.motion, self.frame.directions(group.motion)));
+        }
+        let directions = self.directions.iter().find(|(other, _)| *other == group.motion).map(|(_, all)| all.as_slice())?;
+        Some(self.frame.free(directions, &functions))
+    }
+
+    /// A smooth function, or a straight one of what has few values; none of what hardly varies.
+    fn basis(&mut self, of: Variable, count: usize) -> Option<Basis> {
+        let values = self.values(of)?;
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| (low.min(*u), high.max(*u)));
+        let span = high - low;
+        if !(span > 1e-9 * high.abs().max(low.abs()) && span > 1e-12) {
+            return None;
+        }
+        let mut distinct: Vec<f64> = Vec::new();
+        for value in values {
+            if !distinct.iter().any(|other| (other - value).abs() < 1e-9 * span) {
+                distinct.push(*value);
+            }
+            if distinct.len() > LEVELS {
+                return Some(Basis::Cosines { low: low - MARGIN * span, high: high + MARGIN * span, count });
+            }
+        }
+        Some(Basis::Linear { zero: 0.5 * (low + high), per: 0.5 * span })
+    }
+
+    /// All groups of a place.
+    pub fn of(&mut self, place: Place, survey: &Survey) -> Vec<FreeGroup> {
+        let mut out = Vec::new();
+        for (motion, variables) in motions(place, survey) {
+            for (of, count) in variables {
+                if let Some(basis) = self.basis(of, count) {
+                    out.push(FreeGroup { motion, law: Law::new(of, basis), of: 1 });
+                }
+            }
+            if steps(motion) {
+                let all: Vec<f64> = survey.changes(STEPS).collect();
+                let step = |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
+                out.extend(all.iter().map(step));
+            }
+        }
+        out
+    }
+
+    /// Products of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
+    pub fn products(&mut self, group: &FreeGroup, survey: &Survey) -> Vec<FreeGroup> {
+        if group.law.times.is_some() || group.of > 1 {
+            return Vec::new();
+        }
+        let of = group.law.first.of;
+        let Some(first) = self.basis(of, EACH) else { return Vec::new() };
+        let all = motions(group.place(), survey);
+        let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
+        let product = |(other, _): (Variable, usize)| {
+            let second = self.basis(other, EACH).filter(|_| other != of)?;
+            Some(FreeGroup { law: Law::new(of, first).times(other, second), ..*group })
+        };
+        others.filter_map(product).collect()
+    }
+}
+
+/// Whether what moves so may step at a time.
+fn steps(motion: Motion) -> bool {
+    matches!(motion, Motion::Joint { .. } | Motion::Base { .. } | Motion::Tool { .. })
+}
+
+/// Places with a free form.
+pub(super) fn places(survey: &Survey) -> Vec<Place> {
+    let joints = 0..survey.joints();
+    let links = joints.clone().filter(|link| link + 1 < survey.joints() && length(survey, *link) > SHORT);
+    let all = joints.map(Place::Joint).chain(links.map(|link| Place::Links(link, link)));
+    let instrument = survey.seen_from_outside().then_some(Place::Tracker);
+    all.chain([Place::Base, Place::Tool]).chain(instrument).collect()
+}
+
+fn length(survey: &Survey, link: usize) -> f64 {
+    (survey.robot.point(link + 1) - survey.robot.point(link)).norm()
+}
+
+/// The motions of a place, and what each may follow with how many cosines.
+fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
+    let joints = survey.joints();
+    let angles = |own: usize| {
+        (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { FINE } else { COARSE }))
+    };
+    let passing = || [(Variable::Time, FINE), (Variable::Temperature, COARSE), (Variable::Payload, COARSE)].into_iter();
+    let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
+    let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, COARSE));
+    let moved = |joint: usize| (Variable::Move { joint }, COARSE);
+    match place {
+        Place::Joint(joint) => {
+            let own: Vec<_> = angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain([moved(joint)]).collect();
+            let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { FINEST } else { *count }));
+            let mut out = vec![(Motion::Joint { joint }, finest.collect())];
+            if survey.robot.is_revolute(joint) {
+                out.push((Motion::Axis { joint, about: None, turning: false }, own.clone()));
+                out.push((Motion::Slide { joint, along: true }, own.clone()));
+                out.push((Motion::Slide { joint, along: false }, own));
+            }
+            out
+        }
+        Place::Links(link, _) => {
+            let own: Vec<_> =
+                angles(joints).chain(passing()).chain(sides()).chain(load(link)).chain(load(link + 1)).collect();
+            vec![(Motion::Links { first: link, last: link }, own.clone()), (Motion::Bend { link }, own)]
+        }
+        Place::Tracker => {
+            let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, FINE));
+            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).collect();
+            [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
+        }
+        Place::Tool => {
+            let gravity = (0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, COARSE));
+            let last = joints.saturating_sub(1);
+            let own: Vec<_> = angles(last).chain(passing()).chain(sides()).chain(gravity).chain([moved(last)]).collect();
+            vec![(Motion::Tool { axes: Axes::Place }, own)]
+        }
+        _ => {
+            let loads = (0..joints.min(3)).filter_map(load);
+            let own: Vec<_> = angles(0).chain(passing()).chain(sides()).chain(loads).chain([moved(0)]).collect();
+            [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
+        }
+    }
+}
+
+/// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.
+pub(super) fn name_of(group: &FreeGroup) -> Option<&'static str> {
+    let first = group.law.first;
+    match (group.motion, first.of, group.law.times) {
+        (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some("backlash"),
+        (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some("zero_shift"),
+        (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some("base_shift"),
+        (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some("tool_shift"),
+        (Motion::Joint { joint }, Variable::Angle { joint: a }, Some(times)) => {
+            let Variable::Angle { joint: b } = times.of else { return None };
+            ((a == joint || b == joint) && a.abs_diff(b) == 1).then_some("cable_drag")
+        }
+        _ => None,
+    }
+}

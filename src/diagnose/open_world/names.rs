@@ -1,0 +1,242 @@
+//! The odds that a finding is none of the list: evidence of its name and of its rivals against that of free forms instead of it and beside it.
+
+use super::evidence::{evidence, log_sum};
+use super::free_form::{FreeForm, PlaceGroups, Surroundings};
+use super::groups::places;
+use super::state::State;
+use crate::diagnose::judge::JudgedCauses;
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::FitState;
+use crate::diagnose::words::FindingKey;
+use crate::effect::{Effect, Place, Unknown};
+use rayon::prelude::*;
+
+/// Prior of a cause that is in no list.
+const OPEN: f64 = 0.3;
+/// Prior odds that nothing is there.
+const NOTHING: f64 = 0.5;
+/// Rivals whose evidence is asked.
+const RIVALS: usize = 12;
+/// A law of the list is never quite the true one: what a free form at its own place adds is its finer shape below this share of both.
+const FINER: f64 = 0.1;
+/// ln of the evidence by which a free form must be better than a name with a free form beside it, to stand in its place.
+const CLEARLY: f64 = 3.0;
+/// Places at which a free form is asked with more than one group.
+const CLOSER: usize = 2;
+
+/// What is said against a finding's name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NameOdds {
+    /// That it is none of the list, by evidence and priors.
+    pub none: f64,
+    /// That it acts at its place, whatever it is.
+    pub place: f64,
+    /// ln of the evidence of the finding beside all others, without a price.
+    pub log: f64,
+    /// What it holds of all that the best free form beside it explains with it.
+    pub share: f64,
+}
+
+/// A finding's odds, and what would stand in its place.
+pub(super) struct Contested {
+    pub members: Vec<usize>,
+    pub odds: NameOdds,
+    /// The best free form instead of it, where it says more than the finding with a free form beside it.
+    pub instead: Option<FreeForm>,
+    /// A law of the list that says more than what has no name, by its number among the hypotheses.
+    pub named: Option<usize>,
+}
+
+/// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
+pub(super) fn survey_places(states: &[(State, Option<Place>)], around: &Surroundings) -> Vec<(Vec<(Place, f64)>, Vec<FreeForm>)> {
+    let all = places(around.survey);
+    let firsts: Vec<Vec<f64>> = all
+        .par_iter()
+        .map(|place| {
+            let groups = PlaceGroups::of(*place, around);
+            states.iter().map(|(state, _)| groups.first(state)).collect()
+        })
+        .collect();
+    let mut wanted: Vec<(usize, usize)> = Vec::new();
+    for (s, (_, own)) in states.iter().enumerate() {
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        order.sort_by(|a, b| firsts[*b][s].total_cmp(&firsts[*a][s]));
+        let mut chosen: Vec<usize> = order.into_iter().take(CLOSER).filter(|p| firsts[*p][s] > 0.0).collect();
+        chosen.extend((0..all.len()).filter(|p| Some(all[*p]) == *own && !chosen.contains(p)).collect::<Vec<_>>());
+        wanted.extend(chosen.into_iter().map(|p| (p, s)));
+    }
+    let by_place: Vec<usize> = (0..all.len()).filter(|p| wanted.iter().any(|(other, _)| other == p)).collect();
+    let forms: Vec<Vec<(usize, FreeForm)>> = by_place
+        .par_iter()
+        .map(|p| {
+            let own = wanted.iter().filter(|(other, _)| other == p);
+            own.map(|(_, s)| (*s, PlaceGroups::of(all[*p], around).greedy(&states[*s].0, around))).collect()
+        })
+        .collect();
+    let forms: Vec<(usize, FreeForm)> = forms.into_iter().flatten().collect();
+    (0..states.len())
+        .map(|s| {
+            let mut own: Vec<FreeForm> = forms.iter().filter(|(of, _)| *of == s).map(|(_, form)| form.clone()).collect();
+            own.sort_by(|a, b| b.log.total_cmp(&a.log));
+            let log = |p: usize| own.iter().find(|form| form.place == all[p]).map_or(firsts[p][s], |form| form.log);
+            ((0..all.len()).map(|p| (all[p], log(p))).collect(), own)
+        })
+        .collect()
+}
+
+/// A finding's part of the model.
+pub(super) struct Named<'n> {
+    pub key: FindingKey,
+    pub members: &'n [usize],
+    /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
+    pub own: Vec<(usize, f64)>,
+}
+
+/// What the judgement of a finding rests on.
+pub(super) struct Case<'c, 'f, 'a> {
+    pub around: &'c Surroundings<'f, 'a>,
+    pub pool: &'c CachedHypotheses<'a>,
+    pub judged: &'c JudgedCauses,
+}
+
+impl Case<'_, '_, '_> {
+    /// `rest` is the state without the finding, `instead` the free forms beside it; `beside` are those beside everything.
+    pub fn odds(
+        &self,
+        named: &Named,
+        rest: &State,
+        instead: &(Vec<(Place, f64)>, Vec<FreeForm>),
+        beside: &(Vec<(Place, f64)>, Vec<FreeForm>),
+    ) -> Contested {
+        let (effect, place) = named.key;
+        let frame = self.around.frame;
+        let set = &self.judged.set;
+        let own = {
+            let columns = named.own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
+            let picked = faer::Mat::from_fn(frame.residual_rows(), columns.len(), |i, j| self.around.causes[(i, columns[j])]);
+            let variances: Vec<f64> = named.own.iter().map(|(_, variance)| *variance).collect();
+            self.evidence_of(rest, &picked, &variances)
+        };
+        let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
+        let [open, listed] = self.priors(instead.0.len());
+        let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
+        let mine = listed + own.log - price(named.members);
+        let best_beside = beside.1.first();
+        let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);
+        let refined = beside.1.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
+        let mut names: Vec<(Place, f64)> = Vec::new();
+        if is_named {
+            names.push((place, mine));
+            names.extend(refined.map(|form| (place, mine + form.log + 0.5f64.ln())));
+        }
+        let rivals = self.listed(named.members, rest);
+        names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
+        let mut free: Vec<(Place, f64)> = instead.0.iter().map(|(place, log)| (*place, open + log)).collect();
+        if !is_named {
+            free.push((place, open + own.log - price(named.members)));
+        } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= FINER) {
+            free.push((place, open + mine + form.log));
+        }
+        let logs = |of: &[(Place, f64)]| log_sum(&of.iter().map(|(_, log)| *log).collect::<Vec<_>>());
+        let here = |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
+        let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
+        let odds = NameOdds {
+            none: (logs(&free) - all).exp(),
+            place: (log_sum(&[here(&names), here(&free)]) - all).exp(),
+            log: own.log,
+            share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
+        };
+        let alternative = instead.1.first().filter(|form| !form.terms.is_empty());
+        let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
+        let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + CLEARLY).cloned();
+        let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
+        let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
+        let better = |rival: &&Listed| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
+        Contested { members: named.members.to_vec(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+    }
+
+    /// ln of a hypothesis' prior odds, negative; of what is called by a name only when it is fitted those of its kind and place.
+    fn price(&self, h: usize) -> f64 {
+        let hypothesis = &self.pool.hypotheses[h];
+        if hypothesis.form.cause().is_nameless() {
+            return hypothesis.tried.ln() + (hypothesis.form.place().count(self.around.survey.joints()) as f64).ln();
+        }
+        0.5 * self.pool.prior_penalty[h]
+    }
+
+    /// ln of the prior odds of a free form at a place, and of a law of the list by its price, over each other's share.
+    pub fn priors(&self, places: usize) -> [f64; 2] {
+        [OPEN.ln() - (places.max(1) as f64).ln(), (1.0 - OPEN).ln() - self.all_prices()]
+    }
+
+    /// ln of the sum of the prior odds of all laws of the list.
+    fn all_prices(&self) -> f64 {
+        let named = (0..self.pool.hypotheses.len()).filter(|h| !self.pool.hypotheses[*h].form.cause().is_nameless());
+        log_sum(&named.map(|h| -self.price(h)).collect::<Vec<_>>())
+    }
+
+    /// Evidence and fall of the squared residual of columns beside a state.
+    fn evidence_of(&self, rest: &State, columns: &faer::Mat<f64>, variances: &[f64]) -> Own {
+        let with = |square: f64| {
+            let scaled: Vec<f64> = variances.iter().map(|variance| variance * square).collect();
+            rest.with(self.around.frame, columns.as_ref(), &scaled).gain() - rest.gain()
+        };
+        let products = rest.of_columns(self.around.frame, columns.as_ref());
+        let found = evidence(&products.gram, &products.gradient, variances);
+        Own { log: found.log, gain: with(found.amplitude * found.amplitude) }
+    }
+
+    /// Laws of the list beside all causes but some, the best of each name and place, with their prices.
+    pub fn listed(&self, without: &[usize], rest: &State) -> Vec<Listed> {
+        let mut others: Vec<usize> =
+            (0..self.judged.set.len()).filter(|i| !without.contains(i)).map(|i| self.judged.set[i]).collect();
+        others.sort_unstable();
+        let given = self.pool.given(&others);
+        let mut tried: Vec<FindingKey> = Vec::new();
+        let mut out = Vec::new();
+        for (_, h) in &given.falls {
+            let form = &self.pool.hypotheses[*h].form;
+            let key = (form.name(), form.place());
+            if form.cause().is_nameless() || self.pool.of_torque_model[*h] || tried.contains(&key) {
+                continue;
+            }
+            tried.push(key);
+            let block = self.around.frame.block(form);
+            let size: f64 = block.square.iter().sum();
+            let variances = vec![1.0 / size.max(f64::MIN_POSITIVE); block.square.len()];
+            let products = rest.of_columns(self.around.frame, block.columns.as_ref());
+            let found = evidence(&products.gram, &products.gradient, &variances);
+            out.push(Listed { key, at: *h, log: found.log - self.price(*h) });
+            if out.len() == RIVALS {
+                break;
+            }
+        }
+        out
+    }
+}
+
+/// A law of the list in the place of something.
+pub(super) struct Listed {
+    pub key: FindingKey,
+    /// Its number among the hypotheses.
+    pub at: usize,
+    /// ln of its evidence with its price among the laws of the list.
+    pub log: f64,
+}
+
+struct Own {
+    log: f64,
+    gain: f64,
+}
+
+/// Roots of the prior variances of a cause's coefficients as they are in the model: of a free form its own, of a law those of its size.
+pub(super) fn fitted_variances(state: &FitState, cause: usize, square: &[f64]) -> Vec<f64> {
+    let own = &state.causes[cause];
+    if own.form.cause().is_nameless() && own.priors.len() == square.len() {
+        return own.priors.iter().map(|prior| prior.sigma * prior.sigma).collect();
+    }
+    let x = &state.model.x[state.ranges[cause].clone()];
+    let all: f64 = square.iter().sum();
+    let size: f64 = x.iter().zip(square).map(|(x, square)| x * x * square).sum();
+    square.iter().map(|_| size.max(1e-12) / all.max(f64::MIN_POSITIVE)).collect()
+}

@@ -1,0 +1,86 @@
+//! What is in the model, as a part of the covariance of the rows: the rest is seen through its inverse.
+//!
+//! With columns Z of unit prior variance and noise variance 1/s: X' C^-1 X = s X'X - Y'Y, Y = L^-1 s Z'X, L L' = 1 + s Z'Z.
+
+use super::frame::{Block, Frame, Products, dense, product};
+use faer::{Mat, MatRef};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Causes and free forms under their priors.
+#[derive(Clone)]
+pub(super) struct State {
+    /// The columns of the model's causes that are in it, by their numbers, with the roots of their prior variances.
+    picked: Vec<(usize, f64)>,
+    /// All of its columns times the roots of their prior variances, the picked ones first; residual rows x count.
+    columns: Mat<f64>,
+    factor: Option<Cholesky<f64, Dyn>>,
+    along: DVector<f64>,
+    /// Over the variance of the noise, in the variances of the rows.
+    scale: f64,
+}
+
+impl State {
+    /// Of some of the model's causes, whose columns are `all`, and noise.
+    pub fn of(frame: &Frame, all: MatRef<'_, f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
+        let columns = Mat::from_fn(frame.residual_rows(), picked.len(), |i, j| all[(i, picked[j].0)] * picked[j].1);
+        Self { picked, columns, factor: None, along: DVector::zeros(0), scale }.factored(frame)
+    }
+
+    /// With more columns of these prior variances.
+    pub fn with(&self, frame: &Frame, columns: MatRef<'_, f64>, variances: &[f64]) -> Self {
+        let (old, new) = (self.columns.ncols(), columns.ncols());
+        let column = |i: usize, j: usize| {
+            if j < old { self.columns[(i, j)] } else { columns[(i, j - old)] * variances[j - old].sqrt() }
+        };
+        let columns = Mat::from_fn(frame.residual_rows(), old + new, column);
+        Self { columns, ..self.clone() }.factored(frame)
+    }
+
+    fn factored(mut self, frame: &Frame) -> Self {
+        let count = self.columns.ncols();
+        let gram = dense(product(self.columns.as_ref(), self.columns.as_ref()).as_ref());
+        self.factor = Cholesky::new(DMatrix::identity(count, count) + gram * self.scale).filter(|_| count > 0);
+        self.along = frame.along(self.columns.as_ref()) * self.scale;
+        if let Some(factor) = &self.factor {
+            factor.l_dirty().solve_lower_triangular_mut(&mut self.along);
+        }
+        self
+    }
+
+    /// The products of any columns beside the state.
+    pub fn of_columns(&self, frame: &Frame, columns: MatRef<'_, f64>) -> Products {
+        let gradient = frame.along(columns);
+        let (mut gram, mut gradient) = (dense(product(columns, columns).as_ref()) * self.scale, gradient * self.scale);
+        if let Some(factor) = &self.factor {
+            let mut share = dense(product(self.columns.as_ref(), columns).as_ref()) * self.scale;
+            factor.l_dirty().solve_lower_triangular_mut(&mut share);
+            gram.gemm_tr(-1.0, &share, &share, 1.0);
+            gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
+        }
+        Products { gram, gradient }
+    }
+
+    /// What the squared residual, over the noise, falls by.
+    pub fn gain(&self) -> f64 {
+        self.along.norm_squared()
+    }
+
+    /// A group's products beside the state; `known` are those of the columns of all the model's causes with the group's.
+    pub fn beside(&self, block: &Block, known: &DMatrix<f64>) -> Products {
+        let (mut gram, mut gradient) = (&block.products.gram * self.scale, &block.products.gradient * self.scale);
+        let Some(factor) = &self.factor else { return Products { gram, gradient } };
+        let (picked, count) = (self.picked.len(), self.columns.ncols());
+        let mut share = DMatrix::zeros(count, gram.ncols());
+        for (i, (k, root)) in self.picked.iter().enumerate() {
+            share.row_mut(i).copy_from(&(known.row(*k) * (root * self.scale)));
+        }
+        if count > picked {
+            let more = product(self.columns.subcols(picked, count - picked), block.columns.as_ref());
+            share.rows_mut(picked, count - picked).copy_from(&(dense(more.as_ref()) * self.scale));
+        }
+        factor.l_dirty().solve_lower_triangular_mut(&mut share);
+        gram.gemm_tr(-1.0, &share, &share, 1.0);
+        gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
+        Products { gram, gradient }
+    }
+}
