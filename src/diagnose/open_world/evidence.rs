@@ -62,20 +62,26 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, variances: 
 
 /// ln of the evidence at a squared amplitude, of a Gram matrix T in tridiagonal form: (a^2 g' (1 + a^2 T)^-1 g - ln det (1 + a^2 T)) / 2.
 fn at_amplitude(square: f64, diagonal: &[f64], beside: &[f64], along: &DVector<f64>) -> f64 {
-    let (mut pivot, mut value, mut fit, mut log) = (1.0, 0.0, 0.0, 0.0);
+    let (mut pivot, mut value, mut fit, mut log, mut product) = (1.0, 0.0, 0.0, 0.0, 1.0);
     for (k, own) in diagonal.iter().enumerate() {
         // Rounding makes a pivot no smaller than one.
         let (last, off) = (pivot, if k > 0 { square * beside[k - 1] } else { 0.0 });
         pivot = f64::max(1.0 + square * own - off * off / last, 1.0);
         value = along[k] - off / last * value;
         fit += value * value / pivot;
-        log += pivot.ln();
+        product *= pivot;
+        // Logarithms cost more than products, which must not overflow.
+        if product > 1e200 {
+            log += product.ln();
+            product = 1.0;
+        }
     }
-    0.5 * (square * fit - log)
+    0.5 * (square * fit - log - product.ln())
 }
 
 fn amplitudes() -> impl Iterator<Item = f64> {
-    (0..AMPLITUDES).map(|k| SMALLEST * libm::pow(LARGEST / SMALLEST, k as f64 / (AMPLITUDES - 1) as f64))
+    let step = libm::pow(LARGEST / SMALLEST, 1.0 / (AMPLITUDES - 1) as f64);
+    std::iter::successors(Some(SMALLEST), move |amplitude| Some(amplitude * step)).take(AMPLITUDES)
 }
 
 /// ln of a sum of exponentials; minus infinity of none.

@@ -122,5 +122,9 @@ pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 }
 
 pub(super) fn dense(of: MatRef<'_, f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(i, j)])
+    let mut out = DMatrix::zeros(of.nrows(), of.ncols());
+    for (mut own, column) in out.column_iter_mut().zip(of.col_iter()) {
+        own.iter_mut().zip(column.iter()).for_each(|(own, value)| *own = *value);
+    }
+    out
 }

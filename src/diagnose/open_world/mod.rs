@@ -11,9 +11,11 @@ mod evidence;
 mod frame;
 mod free_form;
 mod groups;
+mod look;
 mod names;
 mod settle;
 mod state;
+mod step;
 
 pub(crate) use names::NameOdds;
 pub(crate) use settle::settle;

@@ -85,21 +85,21 @@ pub(super) fn survey_places(states: &[(State, Option<Place>)], around: &Surround
 }
 
 /// A finding's part of the model.
-pub(super) struct Named<'n> {
+pub(super) struct Named {
     pub key: FindingKey,
-    pub members: &'n [usize],
+    pub members: Vec<usize>,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
     pub own: Vec<(usize, f64)>,
 }
 
 /// What the judgement of a finding rests on.
-pub(super) struct Case<'c, 'f, 'a> {
+pub(super) struct Case<'c, 'f, 'a, 'p> {
     pub around: &'c Surroundings<'f, 'a>,
-    pub pool: &'c CachedHypotheses<'a>,
+    pub pool: &'c CachedHypotheses<'p>,
     pub judged: &'c JudgedCauses,
 }
 
-impl Case<'_, '_, '_> {
+impl Case<'_, '_, '_, '_> {
     /// `rest` is the state without the finding, `instead` the free forms beside it; `beside` are those beside everything.
     pub fn odds(
         &self,
@@ -120,7 +120,7 @@ impl Case<'_, '_, '_> {
         let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
         let [open, listed] = self.priors(instead.0.len());
         let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
-        let mine = listed + own.log - price(named.members);
+        let mine = listed + own.log - price(&named.members);
         let best_beside = beside.1.first();
         let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);
         let refined = beside.1.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
@@ -129,11 +129,11 @@ impl Case<'_, '_, '_> {
             names.push((place, mine));
             names.extend(refined.map(|form| (place, mine + form.log + 0.5f64.ln())));
         }
-        let rivals = self.listed(named.members, rest);
+        let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
         let mut free: Vec<(Place, f64)> = instead.0.iter().map(|(place, log)| (*place, open + log)).collect();
         if !is_named {
-            free.push((place, open + own.log - price(named.members)));
+            free.push((place, open + own.log - price(&named.members)));
         } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= FINER) {
             free.push((place, open + mine + form.log));
         }
@@ -152,11 +152,11 @@ impl Case<'_, '_, '_> {
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
         let better = |rival: &&Listed| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
-        Contested { members: named.members.to_vec(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+        Contested { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
     }
 
     /// ln of a hypothesis' prior odds, negative; of what is called by a name only when it is fitted those of its kind and place.
-    fn price(&self, h: usize) -> f64 {
+    pub fn price(&self, h: usize) -> f64 {
         let hypothesis = &self.pool.hypotheses[h];
         if hypothesis.form.cause().is_nameless() {
             return hypothesis.tried.ln() + (hypothesis.form.place().count(self.around.survey.joints()) as f64).ln();

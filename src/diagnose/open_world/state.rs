@@ -22,17 +22,26 @@ pub(super) struct State {
 impl State {
     /// Of some of the model's causes, whose columns are `all`, and noise.
     pub fn of(frame: &Frame, all: MatRef<'_, f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
-        let columns = Mat::from_fn(frame.residual_rows(), picked.len(), |i, j| all[(i, picked[j].0)] * picked[j].1);
+        let mut columns = Mat::zeros(frame.residual_rows(), picked.len());
+        for (j, (k, root)) in picked.iter().enumerate() {
+            let column = columns.col_as_slice_mut(j).iter_mut().zip(all.col(*k).iter());
+            column.for_each(|(own, value)| *own = value * root);
+        }
         Self { picked, columns, factor: None, along: DVector::zeros(0), scale }.factored(frame)
     }
 
     /// With more columns of these prior variances.
     pub fn with(&self, frame: &Frame, columns: MatRef<'_, f64>, variances: &[f64]) -> Self {
         let (old, new) = (self.columns.ncols(), columns.ncols());
-        let column = |i: usize, j: usize| {
-            if j < old { self.columns[(i, j)] } else { columns[(i, j - old)] * variances[j - old].sqrt() }
-        };
-        let columns = Mat::from_fn(frame.residual_rows(), old + new, column);
+        let mut all = Mat::zeros(frame.residual_rows(), old + new);
+        for j in 0..old {
+            all.col_as_slice_mut(j).copy_from_slice(self.columns.col_as_slice(j));
+        }
+        for (j, variance) in variances.iter().enumerate() {
+            let column = all.col_as_slice_mut(old + j).iter_mut().zip(columns.col(j).iter());
+            column.for_each(|(own, value)| *own = value * variance.sqrt());
+        }
+        let columns = all;
         Self { columns, ..self.clone() }.factored(frame)
     }
 
@@ -58,6 +67,12 @@ impl State {
             gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
         }
         Products { gram, gradient }
+    }
+
+    /// ln of the evidence over that of noise alone.
+    pub fn log(&self) -> f64 {
+        let determinant = self.factor.as_ref().map_or(0.0, |factor| factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum());
+        0.5 * self.gain() - determinant
     }
 
     /// What the squared residual, over the noise, falls by.

@@ -1,0 +1,189 @@
+//! A look at a judged model: free forms of all places beside it, instead of it, and instead of each of its findings.
+
+use super::frame::{Block, Frame};
+use super::free_form::{FreeForm, Surroundings, side_by_side};
+use super::names::{Case, Contested, Named, fitted_variances, survey_places};
+use super::state::State;
+use super::step::{Change, Step};
+use crate::diagnose::judge::JudgedCauses;
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::{Fitter, RoundView};
+use crate::diagnose::words::{FindingGroups, FindingKey, groups};
+use crate::effect::{Effect, Place, Survey};
+use faer::Mat;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// ln of the evidence of a free form beside everything, over the number of places, above which it joins; and by which one is better than all
+/// causes together where it stands in their place.
+const STRONG: f64 = 3.0;
+/// ln of what each cause's size costs beside a known one.
+const SIZE: f64 = 3.0;
+/// What goes may cost this share of the folds' rms.
+const WORSE: f64 = 0.01;
+/// A noise that is larger than stated by less than this share, in squares, is the stated one.
+const LOUDER: f64 = 1.05;
+
+/// A judged model with its rows, projected.
+pub(super) struct Sighted<'v> {
+    frame: Frame<'v>,
+    judged: &'v JudgedCauses,
+    fitter: &'v Fitter<'v>,
+    blocks: Vec<Block>,
+    /// Columns of all causes, and which are each one's.
+    all: Mat<f64>,
+    ranges: Vec<Range<usize>>,
+}
+
+impl<'v> Sighted<'v> {
+    pub fn of(view: &'v RoundView<'v>, judged: &'v JudgedCauses, fitter: &'v Fitter<'v>) -> Self {
+        let frame = Frame::of(view, &judged.state, fitter);
+        let blocks: Vec<Block> = judged.state.causes.iter().map(|cause| frame.block(&cause.form)).collect();
+        let all = side_by_side(&blocks, frame.residual_rows());
+        let mut at = 0;
+        let range = |block: &Block| {
+            at += block.square.len();
+            at - block.square.len()..at
+        };
+        let ranges = blocks.iter().map(range).collect();
+        Self { frame, judged, fitter, blocks, all, ranges }
+    }
+
+    /// Columns of some causes with the roots of their prior variances.
+    fn picked(&self, is_in: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
+        let variances = |i: usize| fitted_variances(&self.judged.state, i, &self.blocks[i].square);
+        let of = |i: usize| self.ranges[i].clone().zip(variances(i));
+        (0..self.blocks.len()).filter(|i| is_in(*i)).flat_map(of).map(|(k, variance)| (k, variance.sqrt())).collect()
+    }
+
+    fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> State {
+        State::of(&self.frame, self.all.as_ref(), self.picked(is_in), scale)
+    }
+}
+
+/// Free forms beside a judged model.
+pub(super) struct Look<'l, 'v, 'a> {
+    sight: &'l Sighted<'v>,
+    pool: &'l CachedHypotheses<'a>,
+    around: Surroundings<'l, 'v>,
+    scale: f64,
+    whole: State,
+    beside: (Vec<(Place, f64)>, Vec<FreeForm>),
+    findings: FindingGroups,
+}
+
+impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
+    pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
+        let without = sight.fitter.question.without;
+        let around = Surroundings { frame: &sight.frame, survey, causes: sight.all.as_ref(), without };
+        let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
+        let mut whole = sight.state(&|_| true, scale);
+        let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
+        let louder = louder(&sight.frame, &whole, beside.1.first(), scale, sight.fitter);
+        if louder > LOUDER {
+            scale /= louder;
+            whole = sight.state(&|_| true, scale);
+            beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
+        }
+        let findings = groups(&sight.judged.state, &sight.judged.set, pool, survey);
+        Self { sight, pool, around, scale, whole, beside, findings }
+    }
+
+    fn case(&self) -> Case<'_, 'l, 'v, 'a> {
+        Case { around: &self.around, pool: self.pool, judged: self.sight.judged }
+    }
+
+    fn change<'c>(&'c self, without: &'c [usize], worse: f64) -> Change<'c, 'a> {
+        Change { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
+    }
+
+    /// The free form of one place instead of all causes, where it says more than they do together.
+    pub fn alone(&self) -> Option<Step> {
+        let set = &self.sight.judged.set;
+        if self.findings.len() < 2 {
+            return None;
+        }
+        let none = self.sight.state(&|_| false, self.scale);
+        let best = survey_places(&[(none, None)], &self.around).remove(0).1.into_iter().next()?;
+        let case = self.case();
+        let [open, listed] = case.priors(self.beside.0.len());
+        let price: f64 = set.iter().map(|h| case.price(*h) - listed + SIZE).sum();
+        let more = best.log + open - (self.whole.log() - price);
+        let all: Vec<usize> = (0..set.len()).collect();
+        let sentence = || format!("a free form at {} says more than all causes: {more:.0} nats of evidence", best.place);
+        (more > STRONG).then(|| self.change(&all, 0.0).free(&best.terms, sentence()))?
+    }
+
+    /// A law of the list or the free form of a place beside everything.
+    pub fn joining(&self, refused: &mut Vec<Place>) -> Option<Step> {
+        let price = (self.beside.0.len().max(1) as f64).ln();
+        let form = self.beside.1.iter().find(|form| form.log - price > STRONG && !refused.contains(&form.place))?;
+        let case = self.case();
+        let [open, listed] = case.priors(self.beside.0.len());
+        let laws = case.listed(&[], &self.whole);
+        let law = laws.into_iter().max_by(|a, b| a.log.total_cmp(&b.log)).filter(|law| law.log + listed > form.log + open);
+        let named = law.and_then(|law| {
+            let hypothesis = self.pool.hypotheses[law.at].clone();
+            let sentence = format!("{} at {} joins: it says more than a free form", law.key.0, law.key.1);
+            self.change(&[], 0.0).law(hypothesis, sentence)
+        });
+        let free = || {
+            let sentence = format!("a free form at {} joins: {:.0} nats of evidence", form.place, form.log);
+            self.change(&[], 0.0).free(&form.terms, sentence)
+        };
+        let step = named.or_else(free);
+        if step.is_none() {
+            refused.push(form.place);
+        }
+        step
+    }
+
+    /// The odds of every finding.
+    pub fn contested(&self) -> BTreeMap<FindingKey, Contested> {
+        let blocks = &self.sight.blocks;
+        let size =
+            |i: usize, of: usize| 1.0 / (of as f64 * blocks[i].square.iter().sum::<f64>()).max(f64::MIN_POSITIVE);
+        let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| {
+            let own = members.iter().flat_map(|i| self.sight.ranges[*i].clone().map(|k| (k, size(*i, members.len()))));
+            Named { key: *key, members: members.clone(), own: own.collect() }
+        };
+        let named: Vec<Named> = self.findings.iter().map(named).collect();
+        let rest = |own: &Named| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));
+        let rests: Vec<(State, Option<Place>)> = named.iter().map(rest).collect();
+        let instead = survey_places(&rests, &self.around);
+        let case = self.case();
+        let odds = named.iter().zip(&rests).zip(&instead);
+        odds.map(|((own, (rest, _)), instead)| (own.key, case.odds(own, rest, instead, &self.beside))).collect()
+    }
+
+    /// What stands in the place of a finding: a law of the list for what has no name, a free form for a name, or nothing.
+    pub fn exchange(&self, contested: &BTreeMap<FindingKey, Contested>) -> Option<Step> {
+        let christened = contested.values().find_map(|own| {
+            let law = self.pool.hypotheses[own.named?].clone();
+            let sentence = format!("{} at {} says more than a law without a name", law.form.name(), law.form.place());
+            self.change(&own.members, 0.0).law(law, sentence)
+        });
+        let freed = || {
+            contested.iter().find_map(|((effect, place), own)| {
+                let form = own.instead.as_ref()?;
+                let sentence = format!("a free form at {} says more than {effect} at {place}", form.place);
+                self.change(&own.members, 0.0).free(&form.terms, sentence)
+            })
+        };
+        let dropped = || {
+            contested.iter().filter(|(_, own)| own.odds.log < 0.0).find_map(|((effect, place), own)| {
+                let sentence = format!("{effect} at {place} is withdrawn: nothing is left for it beside the others");
+                self.change(&own.members, WORSE).free(&[], sentence)
+            })
+        };
+        christened.or_else(freed).or_else(dropped)
+    }
+}
+
+/// By how much the noise is larger, in squares, than what repeats and statements say: what the richest model leaves, repeats weighing in.
+fn louder(frame: &Frame, whole: &State, richest: Option<&FreeForm>, scale: f64, fitter: &Fitter) -> f64 {
+    let left = frame.square() * scale - whole.gain() - richest.map_or(0.0, |form| form.gain);
+    let repeats = 3.0 * fitter.repeatability.repeats as f64;
+    let freedom = (frame.residual_rows().saturating_sub(frame.rank())) as f64 * scale;
+    (repeats + left.max(0.0)) / (repeats + freedom).max(1.0)
+}

@@ -1,0 +1,64 @@
+//! A model changed: causes taken out, laws and free forms put in, fitted anew and held against folds.
+
+use super::free_form::FreeTerm;
+use crate::diagnose::judge::{FoldErrors, JudgedCauses};
+use crate::diagnose::pool::CachedHypotheses;
+use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
+use crate::effect::{Effect, Hypothesis};
+use crate::estimate::Prior;
+
+/// A changed model.
+pub(super) struct Step {
+    pub state: FitState,
+    /// Causes that stay, by their positions.
+    pub kept: Vec<usize>,
+    pub new: Vec<Hypothesis>,
+    /// What was done.
+    pub sentence: String,
+}
+
+/// What is changed of a judged model.
+pub(super) struct Change<'c, 'a> {
+    pub judged: &'c JudgedCauses,
+    pub pool: &'c CachedHypotheses<'a>,
+    pub fitter: &'c Fitter<'c>,
+    /// Causes that go, by their positions.
+    pub without: &'c [usize],
+    /// Share of the folds' rms that it may cost.
+    pub worse: f64,
+}
+
+impl Change<'_, '_> {
+    /// With a law of the list.
+    pub fn law(&self, law: Hypothesis, sentence: String) -> Option<Step> {
+        let robot = self.pool.problem.robot;
+        let zeros = vec![0.0; law.form.parameters(robot).len()];
+        let cause = EstimatedCause::shrunk(law.form.clone(), robot, zeros);
+        self.with(vec![law], vec![cause], sentence)
+    }
+
+    /// With a free form, or nothing.
+    pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<Step> {
+        let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis()).collect();
+        let prior = |variance: &f64| Prior { mean: 0.0, sigma: variance.sqrt() };
+        let cause = |(hypothesis, term): (&Hypothesis, &FreeTerm)| EstimatedCause {
+            form: hypothesis.form.clone(),
+            coefficients: vec![0.0; term.variances.len()],
+            priors: term.variances.iter().map(prior).collect(),
+        };
+        let causes = new.iter().zip(terms).map(cause).collect();
+        self.with(new, causes, sentence)
+    }
+
+    /// Where folds are no worse by more than the share; causes of the same key go.
+    fn with(&self, new: Vec<Hypothesis>, causes: Vec<EstimatedCause>, sentence: String) -> Option<Step> {
+        let Self { judged, pool, fitter, .. } = *self;
+        let keys: Vec<String> = new.iter().map(|hypothesis| hypothesis.form.key()).collect();
+        let stays = |i: &usize| !self.without.contains(i) && !keys.contains(&pool.keys[judged.set[*i]]);
+        let kept: Vec<usize> = (0..judged.set.len()).filter(stays).collect();
+        let causes: Vec<EstimatedCause> = kept.iter().map(|i| judged.state.causes[*i].clone()).chain(causes).collect();
+        let state = fitter.fit(&judged.state.model, causes);
+        let (before, after) = (FoldErrors::of(&judged.state, fitter)?, FoldErrors::of(&state, fitter)?);
+        (after.gain_over(&before) > -self.worse * before.rms()).then_some(Step { state, kept, new, sentence })
+    }
+}
