@@ -2,19 +2,21 @@
 //!
 //! # The map
 //! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
-//! has no files and no frames: a crate of its own, `calib-numerics`, rooted in `src/numerics.rs` and handed on here, so that the compiler
-//! keeps it so. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
+//! has no files and no frames: a package of its own, `calib-numerics` in `src/numerics`. The **twin** is another, `calib-twin` in `src/twin`,
+//! which does not depend on it. What both use is the package `calib-foundation` in `src/foundation`. All three are handed on here, and the
+//! compiler keeps their walls. **Columns** (`store`) has no robots. [`table`] is the only bridge between a Parquet row and a Rust value;
 //! [`stage`] is the only place where both towers are used; [`pipeline`] is the only caller of stages. Data goes one way:
 //! YAML -> draft -> `Plan` -> stage -> tables -> report. Nothing is updated in place, no layer calls back up.
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
 //! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`description`] | the robot as plain data | - |
 //! | [`shell`] | words for a shell, in scripts and in what one is told to type | - |
 //! | [`raw`] | the files of others: regular ones alone, decoded without a panic | - |
 //! | [`yaml`] | YAML as a tree with places, and trees as typed values with every fault | - |
 //! | [`spatial`] | pose, twist, exp, adjoint, left Jacobian | - |
-//! | [`robot`] | the robot as data, its import, its screws, its gravity torques | spatial, yaml |
+//! | [`robot`] | import of robots, their screws, their gravity torques; rows as measured | description, spatial, yaml |
 //! | [`effect`] | the library of physical effects, one file each, and their composition | robot, spatial |
 //! | [`observation`] | the kinds of measurement, one file each: columns, residual, noise, derivatives, rank | effect, robot, spatial |
 //! | [`estimate`] | least squares, observability, swarm, network | effect, observation, robot, spatial |
@@ -67,15 +69,15 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | `src/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
+//! | effect | `src/numerics/effect/<name>.rs`, which implements [`effect::Cause`] | its `mod`, and one line in [`effect::CAUSES`] |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose` |
-//! | kind of measurement | `src/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
+//! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | stage | `src/stage/<name>.rs` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, `src/table/<kind>.rs` | one line in [`table::TABLES`] |
 //! | export format | `src/export/<name>.rs`, which implements [`export::Format`] | its `mod`, and one line in [`export::FORMATS`] |
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
-//! An effect step by step, with a file that a test compiles and fits: `src/effect/README.md`.
+//! An effect step by step, with a file that a test compiles and fits: `src/numerics/effect/README.md`.
 //!
 //! House rules: one idea one file, named by its noun, 60 to 250 lines, 400 at most; no function above 80 lines; names of types once. Verbs
 //! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.
@@ -135,9 +137,9 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
-pub use calib_numerics::{
-    compensate, diagnose, effect, error, estimate, observation, robot, spatial, statistics, twin, units, yaml,
-};
+pub use calib_foundation::{description, statistics, units};
+pub use calib_numerics::{compensate, diagnose, effect, error, estimate, observation, robot, spatial, yaml};
+pub use calib_twin as twin;
 
 pub mod program;
 pub mod raw;

@@ -1,9 +1,9 @@
 //! DH and modified DH tables as calib's own robot file, so that calib reads back what it wrote.
 
 use super::{Export, Format};
+use crate::description::JointKind;
 use crate::error::{Error, Result, one_line};
 use crate::estimate::choose::spread;
-use crate::robot::description::JointKind;
 use crate::robot::import::{RobotFileText, read_calib};
 use crate::robot::{DhRow, DhTable, RobotModel};
 use crate::yaml::quoted;

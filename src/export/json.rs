@@ -1,8 +1,8 @@
 //! The whole model as one JSON document: description, parameters with sigma, what rigid geometry leaves out.
 
 use super::{Export, Format};
+use crate::description::JointKind;
 use crate::error::{Error, Result};
-use crate::robot::description::JointKind;
 use serde_json::json;
 
 pub(super) struct Json;

@@ -4,8 +4,8 @@
 use super::model::{PLACEHOLDER, placeholder_inertia};
 use super::xml::{self, Xml, empty, numbers, offset};
 use super::{Export, Format};
+use crate::description::{JointDescription, JointKind, RobotDescription};
 use crate::error::{Result, one_line};
-use crate::robot::description::{JointDescription, JointKind, RobotDescription};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::io;
 

@@ -1,10 +1,10 @@
 //! What is exported: the corrected geometry, and how well it stands for the whole model.
 
 use crate::compensate::{LeftOut, distance, left_out, rigid};
+use crate::description::RobotDescription;
 use crate::error::one_line;
 use crate::estimate::choose::spread;
 use crate::identified::IdentifiedModel;
-use crate::robot::description::RobotDescription;
 
 /// Poses over which geometry and model are compared where no recording is at hand.
 const POSES: usize = 500;

@@ -12,13 +12,13 @@ use standing::unexplained_of;
 pub use standing::{standing_of, wrong_setup_of};
 
 use crate::compensate::{Coverage, IdentifiedArm, Scatter, Uncertainty};
+use crate::description::RobotDescription;
 use crate::effect::Load;
 use crate::error::{Error, Result, nearest};
 use crate::estimate::network::Correction;
 use crate::estimate::{Covariance, Model};
 use crate::pipeline::{Manifest, Plan, RunStatus, StageReport};
 use crate::raw::ending;
-use crate::robot::description::RobotDescription;
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::stage::{Diagnose, Stage};
 use crate::store::frame::Frame;

@@ -1,8 +1,8 @@
 //! A robot file by its path, as verbs take it beside a model.
 
+use crate::description::RobotDescription;
 use crate::error::{Error, Result};
 use crate::raw;
-use crate::robot::description::RobotDescription;
 use crate::robot::import::{RobotFileText, read_calib, read_case};
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Proposed poses as columns, CSV and Parquet: the joints as an engineer enters them at the controller, deg and mm, in its counting.
 
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Result};
 use crate::raw::ending;
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::units::Unit;
 use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};

@@ -2,12 +2,12 @@
 
 use super::site::site;
 use super::{PoseRequest, recorded, wish};
+use crate::description::RobotDescription;
 use crate::effect::{EffectContext, EffectStack, Load, identified, whole};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::estimate::choose::{Aim, Proposal, Score, Site, propose};
 use crate::identified::robot_file;
-use crate::robot::description::RobotDescription;
 use crate::robot::{JointConvention, Measurements, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;

@@ -1,8 +1,8 @@
 //! Recordings that proposed poses are compared with.
 
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result};
 use crate::estimate::choose::median;
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::{Measurements, NoiseBasis};
 use crate::table::{Loose, Recording, from_file};
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! Where the arm may go, by what was asked and what the robot file says.
 
 use super::PoseRequest;
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result, counted};
 use crate::estimate::choose::Site;
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::Unit;
 
 /// Where the arm may go; a joint without limits keeps to its range in `recorded`, where there is one.

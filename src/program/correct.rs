@@ -3,9 +3,9 @@
 use super::literal::JOINTS;
 use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
 use crate::compensate::Corrector;
+use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};
 use crate::robot::RobotModel;
-use crate::robot::description::RobotDescription;
 
 /// Faults told of a program: more are of a file that is none.
 const MOST_FAULTS: usize = 500;

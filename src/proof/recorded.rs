@@ -1,6 +1,6 @@
 //! A simulated recording as the files that a user of that robot would have, and beside them every true number.
 
-use crate::robot::description::RobotDescription;
+use crate::description::RobotDescription;
 use crate::table::{Recording, Truth};
 use crate::twin::folder::{self, Decimals, Log};
 

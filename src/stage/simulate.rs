@@ -1,7 +1,7 @@
 //! `simulate`: a recording from a twin of the robot whose truth is known.
 
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result, counted};
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::{Instrument, START, SigmaSource};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Robot, Truth, TruthRow};

@@ -1,8 +1,8 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
 
+use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::error::{Error, Result};
 use crate::robot::Bound;
-use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::Unit;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

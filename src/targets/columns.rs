@@ -1,8 +1,8 @@
 //! Which column of the targets holds what, by its name: `q1_deg`, `A1_deg`, `x_mm`, `qw`, `a_deg`, `payload_kg`, `temp_c`, `dir1`, ...
 
 use crate::compensate::Stated;
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result};
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::units::{Header, Quantity, Unit};
 
 /// What a column holds; joints and axes from 0.

@@ -12,8 +12,8 @@ mod whole;
 pub use columns::Units;
 pub use whole::{unwritten, whole};
 
+use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};
-use crate::robot::description::RobotDescription;
 
 /// Rows that are told of one file.
 const MOST: usize = 20;

@@ -3,8 +3,8 @@
 use super::columns::{ColumnRole, TargetColumns};
 use super::{Layout, unstated_payload};
 use crate::compensate::{CommandTarget, turns};
+use crate::description::{JointKind, RobotDescription};
 use crate::error::{Fault, counted};
-use crate::robot::description::{JointKind, RobotDescription};
 use crate::robot::{Bound, ONE_AND_A_HALF_TURNS};
 use crate::units::{Quantity, Unit};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

@@ -6,7 +6,7 @@
 use super::matrix::{self, Matrix, Vector};
 use super::motion::Motion;
 use super::truth::TrueRobot;
-use crate::robot::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointKind, RobotDescription};
 
 /// A joint with the link that it moves, in the frame of that link.
 #[derive(Debug, Clone)]

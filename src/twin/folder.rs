@@ -1,7 +1,7 @@
 //! A recording as the files that a user has: robot.json, controller.csv, tracker.csv.
 
 use super::matrix::Vector;
-use crate::robot::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointKind, RobotDescription};
 use serde_json::{Value, json};
 use std::fmt::Write;
 

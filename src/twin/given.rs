@@ -1,6 +1,6 @@
 //! Poses that are given instead of drawn, as somebody proposed them: joints, the side from which each joint comes, the load.
 
-use crate::robot::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

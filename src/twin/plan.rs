@@ -8,7 +8,7 @@ use super::given::GivenPose;
 use super::matrix::{self, Vector};
 use super::motion::Motion;
 use super::noise::{Noise, Purpose};
-use crate::robot::description::RobotDescription;
+use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -204,7 +204,7 @@ pub(super) fn ranges(robot: &RobotDescription, poses: &Poses) -> Result<Vec<[f64
         return Err(format!("poses.range_deg has {} ranges, the robot {} joints", poses.range_deg.len(), robot.joints.len()));
     }
     let si = |revolute: bool, x: f64| if revolute { x.to_radians() } else { 1e-3 * x };
-    let joints = robot.joints.iter().map(|joint| joint.kind == crate::robot::description::JointKind::Revolute);
+    let joints = robot.joints.iter().map(|joint| joint.kind == calib_foundation::description::JointKind::Revolute);
     Ok(poses.range_deg.iter().zip(joints).map(|(range, revolute)| range.map(|x| si(revolute, x))).collect())
 }
 

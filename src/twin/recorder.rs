@@ -13,7 +13,7 @@ use super::statics::Row;
 use super::tracker::{Beam, Tracker};
 use super::truth::{ARCSEC, TrueRobot};
 use super::way::{Path, Way};
-use crate::robot::description::RobotDescription;
+use calib_foundation::description::RobotDescription;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

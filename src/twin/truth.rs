@@ -5,7 +5,7 @@
 
 use super::matrix::Vector;
 use super::true_value::{TrueValue, true_value};
-use crate::robot::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

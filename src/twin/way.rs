@@ -3,7 +3,7 @@
 use super::arm::Arm;
 use super::noise::{Noise, Purpose};
 use super::plan::{self, Poses};
-use crate::robot::description::{JointKind, RobotDescription};
+use calib_foundation::description::{JointKind, RobotDescription};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

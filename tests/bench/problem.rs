@@ -1,9 +1,9 @@
 //! What the benches fit: a robot, its recording, and which of its rows.
 
 use crate::fixture;
+use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::effect::{EffectContext, EffectStack, Load, identified};
 use calib::estimate::{FitOptions, Fitted, Model, align, fit};
-use calib::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;

@@ -2,9 +2,9 @@
 
 use crate::desk::{Desk, table};
 use crate::fixture;
+use calib::description::{JointKind, RobotDescription};
 use calib::effect::{Effect, Form, Load};
 use calib::robot::RobotModel;
-use calib::robot::description::{JointKind, RobotDescription};
 use calib::stage::{Labelled, Report, ReportReads};
 use calib::table::*;
 use serde_json::json;

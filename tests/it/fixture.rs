@@ -1,6 +1,6 @@
 //! Robots that tests share: four kinematics, as plain data.
 
-use calib::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use calib::description::{Coupling, JointDescription, JointKind, RobotDescription};
 
 /// Axis, point (mm), kind per joint.
 type Chain<'a> = &'a [([f64; 3], [f64; 3], JointKind)];

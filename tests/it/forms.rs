@@ -317,7 +317,7 @@ fn every_cause_is_listed_once_and_described() {
             assert_eq!(effect.name(), about.name);
         }
     }
-    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/effect")).expect("the effects' folder");
+    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/src/numerics/effect")).expect("the effects' folder");
     let sources =
         folder.filter_map(|file| Some(file.ok()?.path())).filter(|path| path.extension().is_some_and(|end| end == "rs"));
     let files: Vec<String> = sources.filter_map(|path| std::fs::read_to_string(path).ok()).collect();

@@ -9,8 +9,8 @@ mod tables;
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
+use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Known, Model, ParameterStatus, Prior, fit, gauge};
-use calib::robot::description::RobotDescription;
 use calib::robot::{MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};

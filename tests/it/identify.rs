@@ -1,9 +1,9 @@
 //! Least squares on position data: rank as the theory says, truth recovered, uncertainty honest.
 
 use crate::fixture;
+use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Stop, align, fit};
-use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;

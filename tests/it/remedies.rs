@@ -2,8 +2,8 @@
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, recording};
+use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, Remedy, align, fit, remedies};
-use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 
 fn identify(description: &RobotDescription, data: &Measurements, effects: &[&str]) -> (Model, Fitted) {

@@ -2,8 +2,8 @@
 
 use crate::arms::{ARMS, Arm};
 use crate::desk::{Desk, shared};
+use calib::description::{Coupling, JointKind, RobotDescription};
 use calib::robot::RobotModel;
-use calib::robot::description::{Coupling, JointKind, RobotDescription};
 use calib::robot::import::{Imported, RobotFileText, read_calib, read_case};
 use calib::stage::{RawFile, ReadRobot, RobotFormat, RobotReads, Stage};
 use calib::table::{Robot, Table};

@@ -1,9 +1,9 @@
 //! Mistakes of a recording are found, named and set aside; heavy tails, missing physics and clean recordings are left alone.
 
 use crate::fixture;
+use calib::description::RobotDescription;
 use calib::effect::{EffectContext, EffectStack, Load, whole};
 use calib::estimate::{FitOptions, Model, Screening, SuspectKind, align, fit, fit_screened};
-use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::{Pose, Twist};
 use nalgebra::Vector3;

@@ -53,11 +53,15 @@ pub fn files(dir: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// `store/key.rs` -> `store::key`, `store/mod.rs` -> `store`, `lib.rs` -> the root.
+/// `store/key.rs` -> `store::key`, `store/mod.rs` -> `store`, `lib.rs` -> the root. What the packages below `src` hold has the path by which
+/// the crate `calib` hands it on: `numerics/effect/form.rs` -> `effect::form`, `twin/arm.rs` -> `twin::arm`.
 fn module_of(file: &str) -> Vec<String> {
     let mut parts: Vec<String> = file.trim_end_matches(".rs").split('/').map(String::from).collect();
     if parts.last().is_some_and(|last| ["mod", "lib"].contains(&last.as_str())) {
         parts.pop();
+    }
+    if parts.len() > 1 && ["foundation", "numerics"].contains(&parts[0].as_str()) {
+        parts.remove(0);
     }
     parts
 }
@@ -141,8 +145,16 @@ fn absolute(path: &[String], module: &[String], modules: &[Vec<String>]) -> Opti
     let mut base = module.to_vec();
     let mut rest = path;
     match rest.first()?.as_str() {
-        "crate" | "calib" => {
+        "crate" if module.first().is_some_and(|first| first == "twin") => {
+            base.truncate(1);
+            rest = &rest[1..];
+        }
+        "crate" | "calib" | "calib_foundation" | "calib_numerics" => {
             base.clear();
+            rest = &rest[1..];
+        }
+        "calib_twin" => {
+            base = vec!["twin".into()];
             rest = &rest[1..];
         }
         "self" => rest = &rest[1..],
@@ -321,6 +333,11 @@ fn g<'a>(x: &'a str) -> char { let _ = r#"crate::text::b"#; let _ = "crate::text
 fn k() { std::mem::swap(); child::call(self::own::Six); vec![super::super::top::Seven]; }
 "##;
     let words = |path: &str| path.split("::").map(String::from).collect::<Vec<_>>();
+    let named: Vec<Vec<String>> = uses("use crate::arm::Arm; use calib_foundation::units::Unit;", &words("twin::motion"), &[])
+        .into_iter()
+        .map(|one| one.path)
+        .collect();
+    assert_eq!(named, [words("twin::arm::Arm"), words("units::Unit")]);
     let modules = [words("room::here"), words("room::here::child")];
     let found: Vec<(usize, String, bool)> = uses(text, &words("room::here"), &modules)
         .into_iter()

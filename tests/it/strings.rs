@@ -109,7 +109,7 @@ fn calib_speaks_in_the_terms_of_the_field() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let pages = ["README.md", "pipelines/README.md", "pipelines/gallery.md", "pipelines/proof/README.md", "schemas/README.md"]
         .into_iter()
-        .chain(["src/cli/README.md", "src/effect/README.md", "tests/it/forms/sentences.txt"])
+        .chain(["src/cli/README.md", "src/numerics/effect/README.md", "tests/it/forms/sentences.txt"])
         .map(|page| (page.to_string(), fs::read_to_string(root.join(page)).expect("a page")));
     let said: Vec<(String, String)> = sentences().into_iter().chain(pages).collect();
     assert!(said.len() > 1000, "only {} sentences", said.len());

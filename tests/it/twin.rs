@@ -1,7 +1,7 @@
 //! The twin: its own kinematics and statics against numbers worked out by hand, its noise, its seeds, and the stage.
 
+use calib::description::{JointDescription, JointKind, RobotDescription};
 use calib::error::Result;
-use calib::robot::description::{JointDescription, JointKind, RobotDescription};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::stage::{Context, OpenedInput, RawFile, Remainder, Services, Simulate, SimulateReads, SimulateWrites, Sink, Stage};
 use calib::table::Robot;

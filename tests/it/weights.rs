@@ -1,11 +1,11 @@
 //! Wind-up of arms whose masses nobody knows: gravity's torque of whatever masses is made of the moments that the form has.
 
 use crate::fixture;
+use calib::description::RobotDescription;
 use calib::effect::{
     Clock, Deflection, Direction, Effect, EffectContext, EffectStack, Form, Load, ParameterEstimate, ParameterSpec, Place,
     Summary, Survey, hypotheses, people, whole,
 };
-use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, RobotModel};
 use calib::spatial::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};

@@ -1,4 +1,4 @@
-"""Fits the numbers of src/diagnose/words/probability.rs to proofs (`calib simulate prove --out DIR ...`) by maximum likelihood.
+"""Fits the numbers of src/numerics/diagnose/words/probability.rs to proofs (`calib simulate prove --out DIR ...`) by maximum likelihood.
 
     python3 tests/reference/calibrate_probability.py DIR[=CAUSE,CAUSE] [DIR ...]
 

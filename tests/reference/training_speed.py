@@ -90,7 +90,7 @@ class Vectorised:
 
 
 def swarm(loss, seed, bound=1.0, share=0.6, pull=2.0, inertia=(0.9, 0.4), fastest=0.2):
-    """Beetle swarm optimisation with calib's parameters (src/estimate/swarm/beetle_swarm.rs); the best value."""
+    """Beetle swarm optimisation with calib's parameters (src/numerics/estimate/swarm/beetle_swarm.rs); the best value."""
     rng = np.random.default_rng(seed)
     shape, limit = (BEETLES, loss.size), 2 * bound * fastest
     x, v = rng.uniform(-bound, bound, shape), limit * rng.uniform(-1, 1, shape)

@@ -6,13 +6,13 @@ use super::points::{self, Amount, FIT};
 use super::robots::Kind;
 use super::size::{Concealed, Sight, beyond, drafts, drawn, size};
 use super::visible::Site;
-use crate::robot::description::{JointKind, RobotDescription};
-use crate::twin::effect::{HoldingFriction, Physical};
-use crate::twin::noise::{Noise, Purpose};
-use crate::twin::plan::{Climate, Point, Poses};
-use crate::twin::recorder::{Experiment, Motors, Shot};
-use crate::twin::tracker::{SCATTERS, Scatter, Tracker};
-use crate::twin::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
+use crate::effect::{HoldingFriction, Physical};
+use crate::noise::{Noise, Purpose};
+use crate::plan::{Climate, Point, Poses};
+use crate::recorder::{Experiment, Motors, Shot};
+use crate::tracker::{SCATTERS, Scatter, Tracker};
+use crate::truth::{ARCSEC, CouplingError, LinkError, TrueRobot};
+use calib_foundation::description::{JointKind, RobotDescription};
 use std::collections::BTreeSet;
 
 /// A recording that was tampered with.

@@ -3,8 +3,8 @@
 use super::family::{Collection, Family};
 use super::layout::Layout;
 use super::robots::Kind;
-use crate::twin::noise::{Noise, Purpose};
-use crate::twin::tracker::Scatter;
+use crate::noise::{Noise, Purpose};
+use crate::tracker::Scatter;
 
 /// Shares and bounds of a set of cases; everything else comes from the seed.
 #[derive(Debug, Clone, PartialEq)]

@@ -13,14 +13,14 @@ mod mounts;
 mod unlisted;
 
 use super::robots::{ALL_KINDS, KINDS, Kind};
-use crate::robot::description::RobotDescription;
-use crate::twin::arm::Arm;
-use crate::twin::effect::Physical;
-use crate::twin::equilibrium::settle;
-use crate::twin::noise::Noise;
-use crate::twin::plan::Point;
-use crate::twin::statics::Row;
-use crate::twin::truth::ARCSEC;
+use crate::arm::Arm;
+use crate::effect::Physical;
+use crate::equilibrium::settle;
+use crate::noise::Noise;
+use crate::plan::Point;
+use crate::statics::Row;
+use crate::truth::ARCSEC;
+use calib_foundation::description::RobotDescription;
 
 /// A column of the recording that may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -154,7 +154,7 @@ impl<'a> Bench<'a> {
             for (peak, torque) in bench.peak.iter_mut().zip(&rest.torque) {
                 *peak = peak.max(torque.abs());
             }
-            let loads = crate::twin::statics::Loads::new(&arm, &rest.posture, point.payload_kg);
+            let loads = crate::statics::Loads::new(&arm, &rest.posture, point.payload_kg);
             let (_, moment) = loads.wrench(0, [0.0; 3]);
             bench.overturning = bench.overturning.max(moment[0].hypot(moment[1]));
         }
@@ -188,8 +188,7 @@ impl<'a> Bench<'a> {
     /// Links (from 1) with a length worth the name.
     fn long_links(&self) -> Vec<usize> {
         let end = |index: usize| self.robot.joints.get(index + 1).map_or(self.robot.tool, |next| next.point);
-        let span =
-            |index: usize| crate::twin::matrix::norm(crate::twin::matrix::minus(end(index), self.robot.joints[index].point));
+        let span = |index: usize| crate::matrix::norm(crate::matrix::minus(end(index), self.robot.joints[index].point));
         (1..self.joints()).filter(|number| span(number - 1) > 0.15).collect()
     }
 

@@ -5,10 +5,10 @@ use super::design::Content;
 use super::family::Column;
 use super::points::FIT;
 use super::size::Concealed;
-use crate::robot::description::RobotDescription;
-use crate::twin::effect::Physical;
-use crate::twin::folder::{Decimals, Log, robot};
-use crate::twin::recorder::Shot;
+use crate::effect::Physical;
+use crate::folder::{Decimals, Log, robot};
+use crate::recorder::Shot;
+use calib_foundation::description::RobotDescription;
 use serde_json::{Value, json};
 
 /// A file's name and its bytes.

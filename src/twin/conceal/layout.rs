@@ -1,8 +1,8 @@
 //! The order of measured poses: anywhere from row to row, or one after the other along lines and curves in joint space.
 
-use crate::twin::arm::Arm;
-use crate::twin::noise::Noise;
-use crate::twin::plan::{self, Poses};
+use crate::arm::Arm;
+use crate::noise::Noise;
+use crate::plan::{self, Poses};
 use std::ops::Range;
 
 /// How poses follow each other.

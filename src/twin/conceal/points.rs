@@ -2,10 +2,10 @@
 
 use super::layout::Layout;
 use super::robots::Kind;
-use crate::twin::arm::Arm;
-use crate::twin::noise::{Noise, Purpose};
-use crate::twin::plan::{self, Climate, Point, Poses};
-use crate::twin::truth::TrueRobot;
+use crate::arm::Arm;
+use crate::noise::{Noise, Purpose};
+use crate::plan::{self, Climate, Point, Poses};
+use crate::truth::TrueRobot;
 
 /// Blocks of the plan: points to fit and points held out.
 pub const FIT: usize = 0;

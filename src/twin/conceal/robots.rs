@@ -1,6 +1,6 @@
 //! The robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
 
-use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use calib_foundation::description::{Coupling, JointDescription, JointKind, RobotDescription};
 
 /// A robot that recordings are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -3,8 +3,8 @@
 use super::design::{Content, Design};
 use super::family::{Bench, Cause, Draft, Form, foreign::foreign};
 use super::visible::{Shadow, Site, norm};
-use crate::twin::effect::Physical;
-use crate::twin::noise::Noise;
+use crate::effect::Physical;
+use crate::noise::Noise;
 
 /// A cause with how visible it is at the points to fit.
 #[derive(Debug, Clone)]

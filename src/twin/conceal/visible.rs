@@ -1,17 +1,17 @@
 //! What is left of an effect when geometry, ratios and couplings have absorbed what they can: differences of the twin by its own
 //! true numbers, orthogonalised (modified Gram-Schmidt, twice), and the effect's displacement less its shadow on them.
 
-use crate::robot::description::RobotDescription;
-use crate::twin::arm::Arm;
-use crate::twin::effect::{self, Physical};
-use crate::twin::equilibrium::{settle, sighted};
-use crate::twin::matrix;
-use crate::twin::memory;
-use crate::twin::motion::Motion;
-use crate::twin::plan::Point;
-use crate::twin::statics::Row;
-use crate::twin::tracker::Tracker;
-use crate::twin::truth::TrueRobot;
+use crate::arm::Arm;
+use crate::effect::{self, Physical};
+use crate::equilibrium::{settle, sighted};
+use crate::matrix;
+use crate::memory;
+use crate::motion::Motion;
+use crate::plan::Point;
+use crate::statics::Row;
+use crate::tracker::Tracker;
+use crate::truth::TrueRobot;
+use calib_foundation::description::RobotDescription;
 
 /// What a recording is made of, but for its effects and its noise.
 #[derive(Debug, Clone, Copy)]

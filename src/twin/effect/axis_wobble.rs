@@ -1,8 +1,8 @@
 //! A bearing whose axis tilts as the joint turns.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
-use crate::twin::truth::ARCSEC;
+use crate::matrix;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Lost motion: the joint stops short on the side from which it comes, unless the load holds the teeth together.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A gap that wears or loosens while the arm works: lost motion that grows with time.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! The foundation tilts under the overturning moment of the whole arm about its foot.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
+use crate::matrix::{self, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

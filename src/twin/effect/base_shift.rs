@@ -1,8 +1,8 @@
 //! The base steps on its foundation at some time: a collision, a loosened anchor.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::motion::step;
+use crate::matrix::{self, Vector};
+use crate::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! The base swings slowly, as a floor does with a neighbour's machine or the sun: an effect that no list expects.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::motion::step;
+use crate::matrix::{self, Vector};
+use crate::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A hose package that pulls on a joint; how hard depends on that joint and on another one, along which it is led.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -7,11 +7,11 @@ pub use shape::ForeignShape;
 pub use variable::ForeignVariable;
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Matrix, Vector};
-use crate::twin::memory::Moment;
-use crate::twin::polar::Polar;
-use crate::twin::statics::Row;
-use crate::twin::truth::ARCSEC;
+use crate::matrix::{self, Matrix, Vector};
+use crate::memory::Moment;
+use crate::polar::Polar;
+use crate::statics::Row;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use variable::Seen;

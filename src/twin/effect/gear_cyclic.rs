@@ -3,7 +3,7 @@
 //! A mesh is also softer with fewer teeth in contact, so that the wind-up itself repeats: that part grows with the torque.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

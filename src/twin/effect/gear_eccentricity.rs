@@ -1,7 +1,7 @@
 //! A wheel or code disc set off its centre by much: the error repeats with every turn but is no pure sine.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Two flanks of a wheel's teeth, ground in two settings: each has its own run-out, and the joint runs on the one that drives it.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A gear whose run-out grows with what it carries: a soft mesh, teeth that share the load unevenly.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A gear that is softer under little torque than under much: teeth and rollers that first have to come into full contact.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

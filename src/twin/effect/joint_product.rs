@@ -1,7 +1,7 @@
 //! A joint whose error is a product of two other angles: an effect that no list expects.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

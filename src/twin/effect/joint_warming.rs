@@ -2,8 +2,8 @@
 //! gear's ratio, or its spring softens.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::memory::{self, Moment};
-use crate::twin::truth::ARCSEC;
+use crate::memory::{self, Moment};
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@
 //! `M L^2/(2 EI) + F L^3/(3 EI)` across its axis; along its axis a moment twists it by `M L/GJ`.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
+use crate::matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A link that gives way at its middle, as a casting with a weak flange does.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
+use crate::matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! A payload that is heavier than declared, or whose centre lies elsewhere.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::arm::Arm;
-use crate::twin::matrix::{self, Vector};
+use crate::arm::Arm;
+use crate::matrix::{self, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -4,8 +4,8 @@
 //! which slips at its own travel (stop operators of Prandtl and Ishlinskii).
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::memory::Moment;
-use crate::twin::truth::ARCSEC;
+use crate::memory::Moment;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

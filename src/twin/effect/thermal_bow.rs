@@ -1,7 +1,7 @@
 //! A bent link that grows: how much of the growth reaches the next body depends on how the next joint stands.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
+use crate::matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

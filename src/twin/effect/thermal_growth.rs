@@ -1,7 +1,7 @@
 //! A warm link is longer: every span of it grows by expansion times temperature rise.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
+use crate::matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Metal that lags the thermometer: a thick casting is still cold where the sensor on its skin is warm.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
-use crate::twin::memory::{self, Moment};
+use crate::matrix;
+use crate::memory::{self, Moment};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! A link that warms up at its own pace: behind the sensor, or with no sensor at all.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix;
+use crate::matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! The reflector or the tool steps in its mounting at some time.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
+use crate::matrix::{self, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,10 +1,10 @@
 //! The tracker's horizontal circle sits off its axis, or is no circle: its azimuth errs with its azimuth.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::Vector;
-use crate::twin::polar::Polar;
-use crate::twin::statics::Row;
-use crate::twin::truth::ARCSEC;
+use crate::matrix::Vector;
+use crate::polar::Polar;
+use crate::statics::Row;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

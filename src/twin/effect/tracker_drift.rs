@@ -1,8 +1,8 @@
 //! The tracker's stand creeps, and the base frame with it as the tracker sees it.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::motion::step;
+use crate::matrix::{self, Vector};
+use crate::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

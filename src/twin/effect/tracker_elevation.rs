@@ -1,10 +1,10 @@
 //! The head of the tracker: its vertical index is off, it sags, its vertical circle is eccentric, or its transit axis is tilted.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::Vector;
-use crate::twin::polar::Polar;
-use crate::twin::statics::Row;
-use crate::twin::truth::ARCSEC;
+use crate::matrix::Vector;
+use crate::polar::Polar;
+use crate::statics::Row;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,8 +1,8 @@
 //! Somebody knocks against the tracker's stand: to the data the robot's base steps the other way.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::motion::step;
+use crate::matrix::{self, Vector};
+use crate::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

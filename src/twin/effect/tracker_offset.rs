@@ -1,9 +1,9 @@
 //! The tracker's ranges are off: by a dead path or the reflector's constant, by a cyclic part, by the square of the range.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::Vector;
-use crate::twin::polar::Polar;
-use crate::twin::statics::Row;
+use crate::matrix::Vector;
+use crate::polar::Polar;
+use crate::statics::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

@@ -1,9 +1,9 @@
 //! Air changes its index of refraction as it warms: ranges scale with the deviation of its temperature, about 1 um/m/K.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::memory::{self, Moment};
-use crate::twin::statics::Row;
+use crate::matrix::{self, Vector};
+use crate::memory::{self, Moment};
+use crate::statics::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

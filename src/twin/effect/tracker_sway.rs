@@ -1,8 +1,8 @@
 //! The tracker's stand swings slowly, as a tripod does in the sun or beside a machine: an effect that no list expects.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::motion::step;
+use crate::matrix::{self, Vector};
+use crate::motion::step;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

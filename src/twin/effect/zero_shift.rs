@@ -1,7 +1,7 @@
 //! A joint's zero steps at some time: a collision, a slipped belt, a new mastering.
 
 use super::{Act, Motion, State, TrueValue, true_value};
-use crate::twin::truth::ARCSEC;
+use crate::truth::ARCSEC;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 //! Only numbers that mean the same in both are compared; a curve of another form has no true slope.
 
 use super::paper::{Cause, Finding, Number};
-use crate::units::Unit;
+use calib_foundation::units::Unit;
 
 /// Whether a stated 95 % interval holds the true number.
 #[derive(Debug, Clone, PartialEq)]

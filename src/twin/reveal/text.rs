@@ -5,7 +5,7 @@ use super::mark::Case;
 use super::place::Places;
 use super::reliability::{Bin, Reliability, Subject};
 use super::share::Share;
-use crate::statistics::quantile;
+use calib_foundation::statistics::quantile;
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -6,9 +6,9 @@ use crate::desk::{Desk, table};
 use calib::compensate::{
     CommandTarget, CorrectedCommand, CorrectionOptions, Corrector, Coverage, Gate, IdentifiedArm, Scatter, Uncertainty,
 };
+use calib::description::RobotDescription;
 use calib::effect::Load;
 use calib::estimate::Model;
-use calib::robot::description::RobotDescription;
 use calib::robot::{JointConvention, RobotModel};
 use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads};
 use calib::table::{CovarianceTable, Findings, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};

@@ -12,7 +12,7 @@ use calib::spatial::Pose;
 /// Poses within the limits, 5 deg off every border of a quadrant and of a limit.
 fn poses(robot: &RobotModel, maker: &Maker) -> Vec<Vec<f64>> {
     let pose = |k: usize| -> Vec<f64> {
-        let at = |(j, joint): (usize, &calib::robot::description::JointDescription)| {
+        let at = |(j, joint): (usize, &calib::description::JointDescription)| {
             let [low, high] = joint.limits.expect("limits");
             low + (high - low) * (0.5 + 0.48 * (1.7 * k as f64 + 2.3 * j as f64 + 0.1).sin())
         };

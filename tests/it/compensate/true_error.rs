@@ -2,11 +2,11 @@
 
 use crate::desk::{Desk, table};
 use calib::compensate::{Circumstance, IdentifiedArm as Identified, Nominal, Reach, SETTLED, ToolGoal, least_change, one_step};
+use calib::description::{JointKind, RobotDescription};
 use calib::effect::Load;
 use calib::estimate::Model;
 use calib::estimate::network::Correction;
 use calib::robot::RobotModel;
-use calib::robot::description::{JointKind, RobotDescription};
 use calib::stage::{Diagnose, DiagnoseReads, Identify, IdentifyReads, Learn, LearnReads};
 use calib::table::{Findings, Network, Parameters, Prediction, Recording, Robot, Split, SplitRow, Verdict};
 use calib::twin::arm::Arm;

@@ -3,8 +3,8 @@
 use super::{CASE, calib, case_with, concealed, ended, refused};
 use crate::desk::{Desk, table};
 use crate::fixture;
+use calib::description::RobotDescription;
 use calib::error::Error;
-use calib::robot::description::RobotDescription;
 use calib::stage::split::{SplitBy, SplitReads};
 use calib::stage::{Diagnose, DiagnoseReads, Simulate, SimulateReads};
 use calib::table::{FindingRow, Findings, Recording, Robot, Split, Verdict};

@@ -3,9 +3,9 @@
 use super::{SIGMA, THREE};
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
+use calib::description::RobotDescription;
 use calib::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use calib::observation::{KINDS, MeasurementKind, Weight, rank};
-use calib::robot::description::RobotDescription;
 use calib::robot::{Anchor, MeasurementSetup, Measurements, Readings, RobotModel, Target};
 use calib::spatial::{Pose, Twist};
 use nalgebra::{Matrix3, Vector3};

@@ -61,7 +61,7 @@ pub fn walk() -> String {
     let file = include_str!("seat_compliance.rs");
     let (code, _) = file.split_once("\n#[cfg(test)]\n").expect("a cause, then its test");
     format!(
-        "1. **Write one file**, `src/effect/seat_compliance.rs`: a law at a place. A test compiles the file below as it stands here and fits it to a recording \
+        "1. **Write one file**, `src/numerics/effect/seat_compliance.rs`: a law at a place. A test compiles the file below as it stands here and fits it to a recording \
          (`cargo test --test it seat_compliance`); in the library its first line reads `use super::{{...}}`.\n\n```rust\n{}\n```\n\n\
          2. **Make it known** by two lines: `mod seat_compliance;` in [`mod.rs`](mod.rs), and `&seat_compliance::SeatCompliance,` in the list `CAUSES` of \
          [`cause.rs`](cause.rs), behind the causes that a model has before it.\n\
@@ -76,7 +76,7 @@ pub fn walk() -> String {
 
 #[test]
 fn a_cause_is_one_file_and_two_lines_as_the_walk_says() {
-    let folder = root().join("src/effect");
+    let folder = root().join("src/numerics/effect");
     let read = |name: &str| fs::read_to_string(folder.join(name)).expect("a file");
     let (modules, list) = (read("mod.rs"), read("cause.rs"));
     let mut count = 0;

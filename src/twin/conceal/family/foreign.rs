@@ -1,9 +1,9 @@
 //! Effects drawn at random, so that no list holds them: any shape over any variable in any direction of motion.
 
 use super::{Bench, Column, Draft, joint, link, sized};
-use crate::twin::effect::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical};
-use crate::twin::matrix::{self, Vector};
-use crate::twin::noise::Noise;
+use crate::effect::{Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable, Physical};
+use crate::matrix::{self, Vector};
+use crate::noise::Noise;
 use std::f64::consts::TAU;
 
 /// Motions, evenly drawn: a joint's shift is along its axis or across it.

@@ -1,11 +1,11 @@
 //! What sits on a joint: its gear, its encoder, its bearing, its zero, its hoses.
 
 use super::{Bench, Cause, Column, Draft, Form, fixed, joint, sized};
-use crate::twin::effect::{
+use crate::effect::{
     AxisWobble, Backlash, CableDrag, Curve, GearCyclic, GearEccentricity, GearMotorCyclic, JointCompliance, JointHardening,
     Physical, Pull, ZeroShift,
 };
-use crate::twin::noise::Noise;
+use crate::noise::Noise;
 
 /// The linear spring of a joint that turns by so many arcsec under its largest torque.
 pub(super) fn spring(bench: &Bench, number: usize, arcsec: f64) -> Physical {

@@ -1,10 +1,10 @@
 //! What is wrong with the instrument: its circles, its ranges, its air, its stand.
 
 use super::{Bench, Column, Draft, Form, sized};
-use crate::twin::effect::{
+use crate::effect::{
     Circle, Physical, TrackerCircle, TrackerElevation, TrackerKnock, TrackerOffset, TrackerRefraction, TrackerSway,
 };
-use crate::twin::noise::Noise;
+use crate::noise::Noise;
 
 fn tracker(effect: &'static str, form: &'static str, physical: Physical) -> Draft {
     Draft::new(form, vec![sized(effect, "tracker".into(), vec![physical])])

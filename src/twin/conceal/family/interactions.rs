@@ -3,10 +3,8 @@
 use super::gears::spring;
 use super::memories::{RISE_K, warming};
 use super::{Bench, Cause, Column, Draft, Form, fixed, joint, link, sized};
-use crate::twin::effect::{
-    Backlash, BacklashGrowth, GearFlank, GearLoad, Heat, JointHysteresis, JointWarming, Physical, ThermalBow,
-};
-use crate::twin::noise::Noise;
+use crate::effect::{Backlash, BacklashGrowth, GearFlank, GearLoad, Heat, JointHysteresis, JointWarming, Physical, ThermalBow};
+use crate::noise::Noise;
 
 pub(super) fn gear_load(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.bearing(draw)?;

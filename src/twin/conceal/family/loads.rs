@@ -2,11 +2,9 @@
 
 use super::gears::springs;
 use super::{Bench, Draft, Form, fixed, joint, link, sized};
-use crate::twin::effect::{
-    Balancer, BaseCompliance, Counterbalance, LinkCompliance, LinkHinge, LinkMass, PayloadError, Physical,
-};
-use crate::twin::noise::Noise;
-use crate::twin::truth::ARCSEC;
+use crate::effect::{Balancer, BaseCompliance, Counterbalance, LinkCompliance, LinkHinge, LinkMass, PayloadError, Physical};
+use crate::noise::Noise;
+use crate::truth::ARCSEC;
 
 pub(super) fn link_compliance(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     // Bending needs a length, and a load that the next joint feels.

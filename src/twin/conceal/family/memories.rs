@@ -1,8 +1,8 @@
 //! What follows from the rows before: friction before it slides, heat that cools off, metal that lags.
 
 use super::{Bench, Column, Draft, Form, joint, link, sized};
-use crate::twin::effect::{Heat, JointWarming, Physical, Presliding, ThermalLag};
-use crate::twin::noise::Noise;
+use crate::effect::{Heat, JointWarming, Physical, Presliding, ThermalLag};
+use crate::noise::Noise;
 
 pub(super) fn presliding(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let number = bench.turning(draw);

@@ -1,10 +1,10 @@
 //! What changes in time or in the log: heat, steps of mountings, the creeping tracker, logs that are behind.
 
 use super::{Bench, Column, Draft, Form, fixed, link, sized};
-use crate::twin::effect::{
+use crate::effect::{
     BaseShift, Course, JointLogLag, Physical, ThermalGrowth, ThermalWarmUp, ToolShift, TrackerDrift, TrackerScale,
 };
-use crate::twin::noise::Noise;
+use crate::noise::Noise;
 
 pub(super) fn thermal_growth(bench: &Bench, form: Form, draw: &mut Noise) -> Option<Draft> {
     let long = bench.long_links();

@@ -1,8 +1,8 @@
 //! Effects that are in no list: a diagnosis should say where they sit and what they look like, and give them no name.
 
 use super::{Bench, Column, Draft, Form, joint, sized};
-use crate::twin::effect::{BaseSway, JointBump, JointHinge, JointProduct, Physical};
-use crate::twin::noise::Noise;
+use crate::effect::{BaseSway, JointBump, JointHinge, JointProduct, Physical};
+use crate::noise::Noise;
 
 fn unknown(form: &'static str, number: usize, effect: Physical) -> Option<Draft> {
     Some(Draft::new(form, vec![sized("unknown", joint(number), vec![effect])]))

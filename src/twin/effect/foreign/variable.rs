@@ -1,8 +1,8 @@
 //! What a drawn effect is a function of: the row, the load, the place in space, or what the arm lived through.
 
-use crate::twin::matrix::{self, Vector};
-use crate::twin::memory::Moment;
-use crate::twin::statics::Row;
+use crate::matrix::{self, Vector};
+use crate::memory::Moment;
+use crate::statics::Row;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

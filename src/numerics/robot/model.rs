@@ -1,6 +1,6 @@
 //! The robot as a product of exponentials: screws at the zero pose, forward kinematics (Eqs. 1-2 of the paper).
 
-use crate::robot::description::{JointKind, RobotDescription};
+use crate::description::{JointKind, RobotDescription};
 use crate::robot::setup::MeasurementSetup;
 use crate::robot::travel::Travel;
 use crate::spatial::{Pose, Twist, hat, screw};

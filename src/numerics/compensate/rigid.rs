@@ -4,9 +4,9 @@
 
 use super::arm::IdentifiedArm;
 use super::solve::Chain;
+use crate::description::RobotDescription;
 use crate::effect::Place;
 use crate::estimate::Model;
-use crate::robot::description::RobotDescription;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Twist;
 use nalgebra::{Matrix3, Vector3};

@@ -1,8 +1,11 @@
 //! The twin: recordings of a robot whose truth is known, made by other mathematics than the estimator's.
 //!
 //! Plain 4x4 arrays, link by link transforms, statics by summing forces over bodies, effects by their physical definition. It shares
-//! the robot's description with the rest of the crate and nothing else, else the tool would mark its own homework.
+//! the robot's description with the rest and nothing else, else the tool would mark its own homework.
 //! Adding an effect: a file in `effect/` and a line in [`effect::Physical`].
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
 
 pub mod arm;
 pub mod conceal;

@@ -1,7 +1,6 @@
 //! The robot as data, its import, its screws and its gravity torques.
 
 mod bound;
-pub mod description;
 pub mod import;
 mod instrument;
 mod joint_convention;

@@ -4,9 +4,9 @@
 
 use super::screws::unit;
 use super::{ChainJoint, FrameChain, RobotFileText};
+use crate::description::JointKind;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::robot::Bound;
-use crate::robot::description::JointKind;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, BTreeSet};

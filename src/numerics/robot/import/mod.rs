@@ -3,8 +3,8 @@
 //! Every format ends in one chain at the zero pose in the base frame. All faults of a file are reported at once, each with
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
+use crate::description::{JointKind, RobotDescription};
 use crate::error::Result;
-use crate::robot::description::{JointKind, RobotDescription};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 mod calib;

@@ -3,9 +3,9 @@
 use super::place::{DocumentNode, Faults};
 use super::screws::direction;
 use super::{Imported, RobotFileText};
+use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::error::Result;
 use crate::robot::Bound;
-use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::Unit;
 use nalgebra::{Point3, Vector3};
 

@@ -3,9 +3,9 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+use calib_foundation::{description, statistics, units};
+
 pub mod error;
-pub mod statistics;
-pub mod units;
 pub mod yaml;
 
 pub mod spatial;
@@ -21,5 +21,3 @@ pub mod estimate;
 pub mod compensate;
 
 pub mod diagnose;
-
-pub mod twin;

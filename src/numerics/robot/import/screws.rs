@@ -2,8 +2,8 @@
 
 use super::place::DocumentNode;
 use super::{ChainJoint, FrameChain};
+use crate::description::JointKind;
 use crate::robot::Bound;
-use crate::robot::description::JointKind;
 use crate::units::Unit;
 use nalgebra::{Isometry3, Point3, Vector3};
 

@@ -1,7 +1,7 @@
 //! Where the model was measured, and whether a command leaves that or the joint limits.
 
 use super::arm::Circumstance;
-use crate::robot::description::RobotDescription;
+use crate::description::RobotDescription;
 use crate::robot::{Measurements, Unmeasured, Visited};
 
 /// What was measured.

@@ -3,9 +3,9 @@
 use super::dh::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
 use super::{FrameChain, Imported, RobotFileText, screws, urdf};
+use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::error::Result;
 use crate::robot::Bound;
-use crate::robot::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::units::{Quantity, Unit};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
