@@ -4,12 +4,15 @@ use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::types::Located;
 use crate::effect::{Effect, Survey};
+use crate::estimate::ErrorScale;
 
 /// The last round, judged.
 pub(crate) struct LastRound<'a, 'b> {
     pub pool: &'b CachedHypotheses<'a>,
     pub survey: &'b Survey<'a>,
     pub judged: JudgedCauses,
+    /// What errors of rows are compared and told in.
+    pub scale: ErrorScale,
     /// Names of causes that are not to be given.
     pub without: &'b [String],
     /// The gate's probability at the start and at the end.
