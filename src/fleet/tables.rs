@@ -141,7 +141,7 @@ impl Read {
             after_mean_mm: last.map(|row| row.mean_mm).or(diagnosed.and_then(|v| v.after_mean_mm)),
             after_rms_mm: last.map(|row| row.rms_mm).or(diagnosed.and_then(|v| v.after_rms_mm)),
             after_max_mm: last.map(|row| row.max_mm).or(diagnosed.and_then(|v| v.after_max_mm)),
-            floor_mm: verdict.map(|v| v.noise_floor_mm).or(last.map(|row| row.noise_rms_mm)),
+            floor_mm: verdict.and_then(|v| v.noise_floor_mm).or(last.map(|row| row.noise_rms_mm)),
             noise_basis: verdict.map_or_else(|| last.and_then(|row| row.noise_basis.clone()), |v| v.noise_basis.clone()),
             course: (!course.is_empty()).then_some(course),
             verdict: verdict.map(|v| v.verdict.clone()),

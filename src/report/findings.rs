@@ -118,10 +118,14 @@ fn facts(verdict: &VerdictRow) -> Vec<(&'static str, String)> {
         Some(basis) => format!(" (by {basis})"),
         None => String::new(),
     };
-    let noise = format!("{} mm{basis}", mm(verdict.noise_floor_mm));
+    let size = |length: Option<f64>, angle: Option<f64>| {
+        let angle = || angle.map(|angle| format!("{} arcsec", significant(Unit::Arcsecond.from_si(angle), 2)));
+        length.map(|length| format!("{} mm", mm(length))).or_else(angle)
+    };
+    let noise = size(verdict.noise_floor_mm, verdict.noise_floor_rad).map(|noise| format!("{noise}{basis}"));
     let facts = [
-        ("noise of one point, rms", Some(noise)),
-        ("left over at fitted rows, rms", Some(format!("{} mm", mm(verdict.leftover_rms_mm)))),
+        ("noise of one point, rms", noise),
+        ("left over at fitted rows, rms", size(verdict.leftover_rms_mm, verdict.leftover_rms_rad)),
         ("chance of such a final residual from noise alone", verdict.p_after.map(|p| significant(p, 2))),
         ("chance of such a residual of the simulation from noise alone", verdict.p_before.map(|p| significant(p, 2))),
         ("repeatability of the joints", verdict.p_after.map(|_| format!("{} arcsec", significant(repeatability, 2)))),

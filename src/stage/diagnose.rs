@@ -4,6 +4,7 @@ use crate::diagnose::{Diagnosis, Question, VerdictKind as Said, against_simulati
 use crate::effect::{BaseFrame, CAUSES};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
+use crate::observation::values;
 use crate::robot::RobotModel;
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::own_effects::own_effects;
@@ -81,7 +82,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 19;
+    const IMPLEMENTATION: u32 = 20;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -133,13 +134,13 @@ impl Stage for Diagnose {
                 "rows stand in another order than their times (sorted by name?): approach, lag and drift follow the times";
             context.services.warn(message.into());
         }
-        // Causes are separated by whole points; other measurements take no part.
-        let fit: Vec<usize> = asked.iter().copied().filter(|row| data.whole(*row)).collect();
+        let measured = |row: &usize| values(&data, *row) > 0;
+        let fit: Vec<usize> = asked.iter().copied().filter(measured).collect();
         if fit.len() < FEWEST {
-            let message = format!("{} whole points to fit do not even place the robot: at least {FEWEST} are needed", fit.len());
+            let message = format!("{} measured rows to fit do not even place the robot: at least {FEWEST} are needed", fit.len());
             return Err(Error::data("table recording", message));
         }
-        let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && data.whole(*row)).collect();
+        let validate: Vec<usize> = (0..data.rows()).filter(|row| asked.binary_search(row).is_err() && measured(row)).collect();
         let (robot, _) = gauge(RobotModel::new(reads.robot.to_description()?), &data, &fit, &BTreeMap::new())
             .map_err(|message| Error::data("table recording", message))?;
         let set = screened::numbered(&reads.split);
@@ -159,7 +160,8 @@ impl Stage for Diagnose {
         let mut diagnosis = said(diagnosis, &question, context)?;
         blank_payload(&reads.recording).into_iter().for_each(|line| context.services.warn(line));
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
-            for line in rounded_logs(&diagnosis.model, &data, &diagnosis.kept) {
+            let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
+            for line in rounded_logs(&diagnosis.model, &data, &points) {
                 diagnosis.statement.push_str(&format!("; {line}"));
                 context.services.warn(line);
             }

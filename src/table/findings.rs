@@ -2,6 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Finding};
 use crate::effect::cause;
+use crate::observation::Dimension;
 
 crate::table::rows! { "findings",
     /// Findings, strongest first; key `rank`.
@@ -22,6 +23,9 @@ crate::table::rows! { "findings",
         heldout_gain_mm: Option<f64>,
         /// Rms of the whole effect over the fitted rows.
         effect_rms_mm: Option<f64>,
+        /// The same where the rows to fit measured angles and no length.
+        heldout_gain_rad: Option<f64>,
+        effect_rms_rad: Option<f64>,
         /// That it is this effect at this place; that it acts at this place; that it is none of the names, rivals among them.
         probability: Option<f64>,
         place_probability: Option<f64>,
@@ -97,6 +101,7 @@ fn ranked(diagnosis: &Diagnosis) -> impl Iterator<Item = (i64, &Finding)> {
 impl Findings {
     /// A row for each finding.
     pub fn of(diagnosis: &Diagnosis) -> Self {
+        let lengths = diagnosis.dimension == Dimension::Length;
         let turns = |joint: usize| diagnosis.model.robot.is_revolute(joint);
         let in_rad = |finding: &Finding| finding.valid.filter(|(joint, _)| turns(*joint)).map(|(_, range)| range);
         let in_mm =
@@ -109,8 +114,10 @@ impl Findings {
             f_statistic: finding.evidence.map(|e| e.f_statistic),
             p_value: finding.evidence.map(|e| e.p_value),
             delta_bic: finding.evidence.map(|e| e.delta_bic),
-            heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).map(|gain| gain * 1e3),
-            effect_rms_mm: finding.evidence.map(|e| e.effect_rms * 1e3),
+            heldout_gain_mm: finding.evidence.and_then(|e| e.heldout_gain).filter(|_| lengths).map(|gain| gain * 1e3),
+            effect_rms_mm: finding.evidence.filter(|_| lengths).map(|e| e.effect_rms * 1e3),
+            heldout_gain_rad: finding.evidence.and_then(|e| e.heldout_gain).filter(|_| !lengths),
+            effect_rms_rad: finding.evidence.filter(|_| !lengths).map(|e| e.effect_rms),
             probability: Some(finding.probabilities.name),
             place_probability: Some(finding.probabilities.place),
             none_probability: Some(finding.probabilities.none),

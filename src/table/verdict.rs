@@ -11,7 +11,7 @@ crate::table::rows! { "verdict",
         /// `repeats`, `instrument` or `inferred`.
         noise_basis: Option<String>,
         /// Rms length of the noise of these rows: instrument and joint repeatability.
-        noise_floor_mm: f64,
+        noise_floor_mm: Option<f64>,
         /// Whether the errors are of rows that no model has seen.
         held_out: bool,
         before_mean_mm: Option<f64>,
@@ -21,7 +21,12 @@ crate::table::rows! { "verdict",
         after_rms_mm: Option<f64>,
         after_max_mm: Option<f64>,
         /// Rms length of what is left at fitted rows.
-        leftover_rms_mm: f64,
+        leftover_rms_mm: Option<f64>,
+        /// The same figures where the rows to fit measured angles and no length.
+        noise_floor_rad: Option<f64>,
+        before_rms_rad: Option<f64>,
+        after_rms_rad: Option<f64>,
+        leftover_rms_rad: Option<f64>,
         /// Squared whitened residual per degree of freedom.
         chi_square: f64,
         /// Probability that what the base model leaves, and what is left in the end, is noise; null where it was not asked.
@@ -48,6 +53,7 @@ crate::table::rows! { "verdict",
 
 use super::Findings;
 use crate::diagnose::{Diagnosis, ErrorLengths, VerdictKind};
+use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
 
 impl VerdictRow {
@@ -77,13 +83,17 @@ impl Verdict {
 
     /// The verdict of the stage `step`.
     pub fn of(step: &str, diagnosis: &Diagnosis) -> Self {
-        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| errors.map(|errors| of(errors) * 1e3);
+        let lengths = diagnosis.dimension == Dimension::Length;
+        let in_mm = |size: f64| lengths.then_some(size * 1e3);
+        let in_rad = |size: f64| (!lengths).then_some(size);
+        let mm = |errors: Option<ErrorLengths>, of: fn(ErrorLengths) -> f64| errors.and_then(|errors| in_mm(of(errors)));
+        let rms_rad = |errors: Option<ErrorLengths>| errors.and_then(|errors| in_rad(errors.rms));
         Self(vec![VerdictRow {
             step: step.into(),
             verdict: diagnosis.verdict.name().into(),
             statement: Some(diagnosis.statement.clone()),
             noise_basis: Some(diagnosis.noise_basis.name().into()),
-            noise_floor_mm: diagnosis.noise_floor * 1e3,
+            noise_floor_mm: in_mm(diagnosis.noise_floor),
             held_out: diagnosis.held_out,
             before_mean_mm: mm(diagnosis.before, |e| e.mean),
             before_rms_mm: mm(diagnosis.before, |e| e.rms),
@@ -91,7 +101,11 @@ impl Verdict {
             after_mean_mm: mm(diagnosis.after, |e| e.mean),
             after_rms_mm: mm(diagnosis.after, |e| e.rms),
             after_max_mm: mm(diagnosis.after, |e| e.max),
-            leftover_rms_mm: diagnosis.leftover_rms * 1e3,
+            leftover_rms_mm: in_mm(diagnosis.leftover_rms),
+            noise_floor_rad: in_rad(diagnosis.noise_floor),
+            before_rms_rad: rms_rad(diagnosis.before),
+            after_rms_rad: rms_rad(diagnosis.after),
+            leftover_rms_rad: in_rad(diagnosis.leftover_rms),
             chi_square: diagnosis.chi_square,
             p_before: diagnosis.gate_first,
             p_after: diagnosis.gate_last,

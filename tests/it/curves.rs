@@ -27,6 +27,8 @@ fn finding(rank: i64, effect: &str, forms: &serde_json::Value) -> FindingRow {
         delta_bic: None,
         heldout_gain_mm: None,
         effect_rms_mm: None,
+        heldout_gain_rad: None,
+        effect_rms_rad: None,
         probability: None,
         place_probability: None,
         none_probability: None,

@@ -17,7 +17,7 @@ use std::path::Path;
 
 const ARCSEC: f64 = PI / 648_000.0;
 
-fn sr210d() -> RobotDescription {
+pub fn sr210d() -> RobotDescription {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/sr210d/robot.yaml");
     let text = std::fs::read_to_string(&path).expect("the pipeline's robot file");
     read_calib(RobotFileText { label: "robot.yaml", text: &text }, None).expect("a good robot file").robot

@@ -43,7 +43,7 @@ fn turns(robot: &RobotModel, data: &Measurements, form: &Form) -> DMatrix<f64> {
     let mut buffer = Deflection::new(robot.joints());
     for row in 0..ROWS {
         let motion = stack.point_motion(robot, data, row, &none, &mut scratch);
-        motion.derivatives(robot, data, form, &zeros, &mut buffer, |_, _| ());
+        motion.deflect(robot, data, form, &zeros, &mut buffer);
         for (k, direction) in &buffer.partials {
             let Direction::Joint(_, rate) = direction else { panic!("{direction:?}") };
             out[(row, *k)] += rate;

@@ -2,28 +2,33 @@
 
 use super::types::Question;
 use super::verdict_statement::Ground;
-use crate::estimate::{Screening, Weight};
+use crate::effect::PlacementBuffers;
+use crate::estimate::{Model, Screening, noise};
+use crate::observation::{Dimension, KINDS, Residual, dimension, kinds};
 use crate::robot::{Measurements, NoiseBasis};
-use nalgebra::Vector3;
+use rayon::prelude::*;
 
-/// Sizes of what is left.
+/// Sizes of what is left: lengths (m), or angles (rad) where no row to fit measured a length.
 pub(crate) struct Misfit {
+    pub dimension: Dimension,
+    /// Of every row, where it measured something of the dimension.
+    pub sizes: Vec<Option<f64>>,
     /// Held-out rows that belong; where there are none, those that were fitted.
     pub rows: Vec<usize>,
     pub held_out: bool,
-    /// Length of the noise of `rows`, and of the instrument's alone, rms, m.
+    /// Length of the noise of `rows`, and of the instrument's alone, rms.
     pub noise_floor: f64,
     pub instrument: f64,
-    /// Rms length of what is left at fitted rows, m, and reduced chi-square there.
+    /// Rms size of what is left at fitted rows, and reduced chi-square there.
     pub leftover_rms: f64,
     pub chi_square: f64,
     /// Reduced chi-square at fitted rows against the stated or recorded uncertainty alone.
     pub beyond_stated: f64,
     /// Rows of the figures, suspects among them: held-out ones, else those that were fitted.
     pub figures: Vec<usize>,
-    /// Rms length of what is left at `rows`, m.
+    /// Rms size of what is left at `rows`.
     left_here: f64,
-    /// Rms length of what is left at held-out rows that belong, m, where it is more than what was fitted and the noise allow.
+    /// Rms size of what is left at held-out rows that belong, where it is more than what was fitted and the noise allow.
     pub not_carried: Option<f64>,
 }
 
@@ -32,47 +37,72 @@ pub(crate) const LOUD: f64 = 1.25;
 /// ... and this much larger it is not whatever it looks like.
 pub(crate) const TOO_LOUD: f64 = 2.5;
 
+/// What is left of all that a row measured.
+struct RowMisfit {
+    size: Option<f64>,
+    /// Squared and summed, in standard deviations of all noise and of the instrument's alone.
+    whitened: f64,
+    stated: f64,
+    values: usize,
+}
+
+/// What a model leaves of every row.
+fn left(model: &Model, data: &Measurements, of: Dimension) -> Vec<RowMisfit> {
+    let kinds = kinds(data);
+    let one = |scratch: &mut PlacementBuffers, row: usize| {
+        let placed = model.stack.place(&model.robot, data, row, &model.x, scratch);
+        let mut left = RowMisfit { size: None, whitened: 0.0, stated: 0.0, values: 0 };
+        for residual in kinds.iter().filter_map(|kind| Residual::of(*kind, data, row, &placed)) {
+            if residual.dimension() == of {
+                left.size.get_or_insert(residual.error.norm());
+            }
+            left.whitened += residual.whitened(data, 0.0).norm_squared();
+            left.stated += residual.kind.stated(data, row, &residual.error);
+            left.values += residual.axes;
+        }
+        left
+    };
+    (0..data.rows()).into_par_iter().map_init(|| model.stack.scratch(&model.robot), one).collect()
+}
+
+fn rms(values: impl Iterator<Item = Option<f64>>) -> f64 {
+    let (sum, count) = values.flatten().fold((0.0, 0usize), |(sum, count), value| (sum + value.powi(2), count + 1));
+    (sum / count.max(1) as f64).sqrt()
+}
+
 impl Misfit {
-    /// Of a model that predicts these points, with so many parameters estimated.
-    pub fn of(
-        question: &Question,
-        data: &Measurements,
-        screening: &Screening,
-        predicted: &[Vector3<f64>],
-        parameters: usize,
-    ) -> Self {
+    /// Of a model, of which so many parameters were estimated.
+    pub fn of(question: &Question, data: &Measurements, screening: &Screening, model: &Model, parameters: usize) -> Self {
+        let dimension = dimension(data, question.fit);
+        let left = left(model, data, dimension);
         let aside: Vec<usize> = screening.suspects.iter().filter(|s| !s.used()).map(|s| s.row).collect();
         let judges: Vec<usize> = question.validate.iter().copied().filter(|row| !aside.contains(row)).collect();
         let held_out = !judges.is_empty();
         let kept = &screening.kept;
-        let rms = |rows: &[usize], length: &dyn Fn(usize) -> f64| {
-            (rows.iter().map(|row| length(*row).powi(2)).sum::<f64>() / rows.len().max(1) as f64).sqrt()
-        };
-        let whitened = |rows: &[usize]| -> f64 {
-            rows.iter()
-                .map(|row| Weight::of(data, *row, 0.0).apply(&(data.position[*row] - predicted[*row])).norm_squared())
-                .sum()
-        };
-        let freedom = (3 * kept.len()).saturating_sub(parameters).max(1) as f64;
-        // Points that were not fitted also see the errors of what was.
+        let size = |rows: &[usize]| rms(rows.iter().map(|row| left[*row].size));
+        let whitened = |rows: &[usize]| -> f64 { rows.iter().map(|row| left[*row].whitened).sum() };
+        let values = |rows: &[usize]| -> usize { rows.iter().map(|row| left[*row].values).sum() };
+        let freedom = values(kept).saturating_sub(parameters).max(1) as f64;
+        // Rows that were not fitted also see the errors of what was.
         let inflation = 1.0 + parameters as f64 / freedom;
-        let left = |row: usize| (data.position[row] - predicted[row]).norm();
-        let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * 3.0 * judges.len() as f64;
-        let not_carried = not_carried.then(|| rms(&judges, &left));
+        let not_carried = held_out && whitened(&judges) > TOO_LOUD * inflation * values(&judges) as f64;
+        let not_carried = not_carried.then(|| size(&judges));
         let rows = if held_out { judges } else { kept.clone() };
-        let stated: f64 =
-            kept.iter().map(|row| (data.position[*row] - predicted[*row]).component_div(&data.sigma[*row]).norm_squared()).sum();
+        let stated: f64 = kept.iter().map(|row| left[*row].stated).sum();
+        let of_dimension = || KINDS.iter().filter(|kind| kind.about().dimension == dimension);
         Self {
+            dimension,
             held_out,
-            noise_floor: rms(&rows, &|row| data.noise(row)),
-            instrument: rms(&rows, &|row| data.sigma[row].norm()),
-            leftover_rms: rms(kept, &left),
+            noise_floor: rms(rows.iter().map(|row| noise(data, *row, dimension))),
+            instrument: rms(rows.iter().map(|row| of_dimension().find_map(|kind| kind.instrument(data, *row)))),
+            leftover_rms: size(kept),
             chi_square: whitened(kept) / freedom,
             beyond_stated: stated / freedom,
             figures: if held_out { question.validate.to_vec() } else { rows.clone() },
-            left_here: rms(&rows, &left),
+            left_here: size(&rows),
             not_carried,
             rows,
+            sizes: left.iter().map(|row| row.size).collect(),
         }
     }
 
@@ -87,6 +117,7 @@ impl Misfit {
     /// What a verdict on it rests on; `nameless` where something was found that has no name.
     pub fn ground(&self, data: &Measurements, basis: NoiseBasis, repeats: usize, nameless: bool) -> Ground {
         Ground {
+            dimension: self.dimension,
             agrees: self.chi_square <= LOUD,
             not_carried: self.not_carried,
             nameless,

@@ -53,7 +53,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     if let Some(wrong) = setup::wrong_when_identified(question, &now) {
         return wrong;
     }
-    let before = now.model.predict(&fitter.data);
+    let before = now.model.error_sizes(&fitter.data, fitter.scale.dimension());
     tell(words::of_the_base(&now, &fitter));
     let (mut history, mut located, mut first) = (RoundHistory::default(), None, None);
     loop {
@@ -95,7 +95,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let without = question.without;
-        let round = LastRound { pool: search.pool, survey: &survey, judged, odds, without, first, last, located };
+        let round = LastRound { pool: search.pool, survey: &survey, judged, odds, scale: fitter.scale, without, first, last, located };
         return conclude(round, &fitter, &before);
     }
 }

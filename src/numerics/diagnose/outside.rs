@@ -26,6 +26,8 @@ pub fn against_simulation(
     // Both frames are nearly right, and what they lack is a motion of the base, which is fitted.
     let (base, frame) = (align(robot, data, &used), align_points(&model, &measured));
     let mut out = data.clone();
+    // What was measured beside points was not simulated.
+    out.readings.clear();
     for row in 0..data.rows() {
         if there(&row) {
             let seat = robot.seat(robot.setup().target(data.target(row)));

@@ -2,8 +2,8 @@
 
 use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, Place};
 use crate::estimate::{Fitted, Folds, Model, Screening};
+use crate::observation::Dimension;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
-use nalgebra::Vector3;
 
 /// What is to be diagnosed.
 pub struct Question<'a> {
@@ -208,21 +208,21 @@ impl VerdictKind {
     }
 }
 
-/// Lengths of position errors, m.
+/// Sizes of errors: m, or rad where no length was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorLengths {
-    /// m.
+    /// m or rad.
     pub mean: f64,
-    /// m.
+    /// m or rad.
     pub rms: f64,
-    /// m.
+    /// m or rad.
     pub max: f64,
 }
 
 impl ErrorLengths {
     /// Of some rows; `None` of no rows.
-    pub(crate) fn of(data: &Measurements, predicted: &[Vector3<f64>], rows: &[usize]) -> Option<Self> {
-        Self::of_lengths(&rows.iter().map(|row| (data.position[*row] - predicted[*row]).norm()).collect::<Vec<_>>())
+    pub(crate) fn of(sizes: &[Option<f64>], rows: &[usize]) -> Option<Self> {
+        Self::of_lengths(&rows.iter().filter_map(|row| sizes[*row]).collect::<Vec<_>>())
     }
 
     /// Of lengths, m; `None` of none.
@@ -238,6 +238,8 @@ impl ErrorLengths {
 
 /// The outcome of a diagnosis.
 pub struct Diagnosis {
+    /// What the sizes of its errors, noise and findings are: lengths (m), or angles (rad) where no row to fit measured a length.
+    pub dimension: Dimension,
     /// The answer in one word.
     pub verdict: VerdictKind,
     /// The verdict in a sentence, with what its noise rests on.

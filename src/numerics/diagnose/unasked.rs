@@ -23,14 +23,14 @@ pub(super) fn unasked(
     (model, fitted, screening): (Model, Fitted, Screening),
 ) -> Diagnosis {
     let data = question.data;
-    let predicted = model.predict(data);
-    let misfit = Misfit::of(question, data, &screening, &predicted, fitted.singular.len());
+    let misfit = Misfit::of(question, data, &screening, &model, fitted.singular.len());
     Diagnosis {
+        dimension: misfit.dimension,
         verdict,
         statement: statement(verdict, &misfit.ground(data, data.noise_basis, 0, false)),
         noise_basis: data.noise_basis,
         noise_floor: misfit.noise_floor,
-        before: ErrorLengths::of(data, &predicted, &misfit.rows),
+        before: ErrorLengths::of(&misfit.sizes, &misfit.rows),
         after: None,
         held_out: misfit.held_out,
         folds: None,

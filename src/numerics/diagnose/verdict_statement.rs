@@ -2,11 +2,13 @@
 
 use crate::diagnose::types::VerdictKind;
 use crate::error::counted;
+use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
 
-/// What a verdict rests on; lengths of a point's error, rms, m.
+/// What a verdict rests on; rms sizes of a row's error, m or rad.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground {
+    pub dimension: Dimension,
     pub basis: NoiseBasis,
     /// Repeats that the noise was learnt from.
     pub repeats: usize,
@@ -30,8 +32,8 @@ impl Ground {
     /// Names the noise with its size and where that is from.
     fn of_noise(&self) -> String {
         match self.basis {
-            NoiseBasis::Repeats => format!("the noise that {} show, {} um", counted(self.repeats, "repeat"), um(self.noise)),
-            NoiseBasis::Instrument => format!("the noise that the instrument states, {} um", um(self.noise)),
+            NoiseBasis::Repeats => format!("the noise that {} show, {}", counted(self.repeats, "repeat"), self.small(self.noise)),
+            NoiseBasis::Instrument => format!("the noise that the instrument states, {}", self.small(self.noise)),
             NoiseBasis::Inferred => format!("{}: {}", self.at_random(), self.advice()),
         }
     }
@@ -40,35 +42,48 @@ impl Ground {
     fn of_the_rest(&self) -> String {
         match self.agrees {
             true => format!("the residual agrees with {}", self.of_noise()),
-            false => format!("{} um remain, against {}", um(self.left), self.of_noise()),
+            false => format!("{} remain, against {}", self.small(self.left), self.of_noise()),
         }
     }
 
     /// Why the error is not explained.
     fn of_what_is_missing(&self) -> String {
-        let left = um(self.left);
+        let left = self.small(self.left);
+        let points = if self.dimension == Dimension::Length { "points" } else { "rows" };
         match self.not_carried {
             Some(held_out) => format!(
-                "the findings do not explain everything: {} um remain of held-out points, {left} um of fitted ones",
-                um(held_out)
+                "the findings do not explain everything: {} remain of held-out {points}, {left} of fitted ones",
+                self.small(held_out)
             ),
-            None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} um remain"),
-            None => format!("the findings do not explain everything: {left} um remain"),
+            None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} remain"),
+            None => format!("the findings do not explain everything: {left} remain"),
         }
     }
 
     /// What scatters without a reason that was measured or stated.
     fn at_random(&self) -> String {
-        let scatter = um(self.scatter());
+        let scatter = self.small(self.scatter());
         match self.instrument {
-            Some(instrument) => format!("{scatter} um scatter at random, of which the instrument explains {}", um(instrument)),
-            None => format!("{scatter} um scatter at random, and no instrument is stated that explains any of it"),
+            Some(instrument) => {
+                format!("{scatter} scatter at random, of which the instrument explains {}", self.number(instrument))
+            }
+            None => format!("{scatter} scatter at random, and no instrument is stated that explains any of it"),
         }
     }
 
     /// Without a stated instrument the noise is but a weight: what is left is what scatters.
     fn scatter(&self) -> f64 {
         if self.instrument.is_some() { self.noise } else { self.left }
+    }
+
+    /// In the small unit of its dimension, with a decimal where there are few.
+    fn number(&self, size: f64) -> String {
+        let count = self.dimension.small().from_si(size);
+        if count < 9.95 { format!("{count:.1}") } else { format!("{count:.0}") }
+    }
+
+    fn small(&self, size: f64) -> String {
+        format!("{} {}", self.number(size), self.dimension.small().symbol())
     }
 
     fn advice(&self) -> &'static str {
@@ -98,18 +113,13 @@ pub(crate) fn statement(verdict: VerdictKind, ground: &Ground) -> String {
     }
 }
 
-/// Micrometres, with a decimal where there are few.
-fn um(metres: f64) -> String {
-    let um = metres * 1e6;
-    if um < 9.95 { format!("{um:.1}") } else { format!("{um:.0}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn ground(basis: NoiseBasis, instrument: Option<f64>) -> Ground {
         Ground {
+            dimension: Dimension::Length,
             basis,
             repeats: 24,
             noise: 31e-6,

@@ -95,7 +95,9 @@ impl PlacedRow<'_> {
     pub fn from_anchor(&self, anchor: &str) -> Option<Vector3<f64>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(setup.anchor(anchor)?)?;
-        Some(self.point - anchor.place - self.scratch.deflection.anchor)
+        let Deflection { anchor: shift, reading, .. } = &self.scratch.deflection;
+        // What the tracker misreads lengthens no wire.
+        Some(self.point - reading - anchor.place - shift)
     }
 
     /// The tool frame, and the velocity (v; w) of its origin by each joint.
@@ -119,18 +121,12 @@ impl PlacedRow<'_> {
 
     /// Derivatives of the orientation as small rotations about the tracker's axes, rad.
     pub fn rotations(&self, mut emit: impl FnMut(usize, Vector3<f64>)) {
-        let PlacementBuffers { deflection, posture, stations, before, .. } = &*self.scratch;
-        let joint = |joint: usize| {
-            if self.robot.is_revolute(joint) { posture.behind[joint].rotation * self.robot.axis(joint) } else { Vector3::zeros() }
-        };
+        let deflection = &self.scratch.deflection;
+        let turns = self.scratch.turns(self.robot);
         for (parameter, direction) in &deflection.partials {
-            let rotation = match direction {
-                Direction::Joint(k, rate) => joint(*k) * *rate,
-                Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
-                Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
-                Direction::Anchor(_) | Direction::Instrument(_) => continue,
-            };
-            emit(*parameter, rotation);
+            if let Some(rotation) = turns.along(direction, &deflection.compliance) {
+                emit(*parameter, rotation);
+            }
         }
     }
 
@@ -139,11 +135,7 @@ impl PlacedRow<'_> {
         self.scratch.velocities(self.robot, &self.point);
         let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
-            let velocity = match direction {
-                Direction::Anchor(rate) => -rate,
-                other => along(other, by_joint, by_station, &deflection.compliance),
-            };
-            emit(*parameter, velocity);
+            emit(*parameter, from_anchor(direction, by_joint, by_station, &deflection.compliance));
         }
     }
 }
@@ -164,6 +156,55 @@ impl PlacementBuffers {
             *velocity =
                 if robot.is_revolute(joint) { axis.cross(&(point - behind[joint].point(robot.point(joint)))) } else { axis };
         }
+    }
+}
+
+/// How the target turns with every joint and station, rad per rad of each, tracker frame.
+#[derive(Clone)]
+pub(super) struct Turns {
+    by_joint: Vec<Vector3<f64>>,
+    /// Of a station its frame, and the rotation in it by the station's twist.
+    by_station: Vec<(Matrix3<f64>, Matrix3x6<f64>)>,
+}
+
+impl PlacementBuffers {
+    /// How the target turns, of the row that was placed last.
+    pub(super) fn turns(&self, robot: &RobotModel) -> Turns {
+        let joint = |joint: usize| {
+            if robot.is_revolute(joint) { self.posture.behind[joint].rotation * robot.axis(joint) } else { Vector3::zeros() }
+        };
+        let stations = self.before.iter().zip(&self.stations);
+        let by_station = stations.map(|(frame, station)| (frame.rotation, station.jacobian.fixed_rows::<3>(3).into_owned()));
+        Turns { by_joint: (0..robot.joints()).map(joint).collect(), by_station: by_station.collect() }
+    }
+}
+
+impl Turns {
+    /// rad per unit of a parameter; none of what turns nothing.
+    pub(super) fn along(&self, direction: &Direction, yielding: &[f64]) -> Option<Vector3<f64>> {
+        match direction {
+            Direction::Joint(joint, rate) => Some(self.by_joint[*joint] * *rate),
+            Direction::Station(station, rate) => {
+                let (frame, twist) = &self.by_station[*station];
+                Some(frame * (twist * rate))
+            }
+            Direction::Torque(joint, rate) => Some(self.by_joint[*joint] * (yielding[*joint] * *rate)),
+            Direction::Anchor(_) | Direction::Instrument(_) => None,
+        }
+    }
+}
+
+/// Derivative of the vector from the row's anchor to the point.
+pub(super) fn from_anchor(
+    direction: &Direction,
+    by_joint: &[Vector3<f64>],
+    by_station: &[Matrix3x6<f64>],
+    yielding: &[f64],
+) -> Vector3<f64> {
+    match direction {
+        Direction::Anchor(rate) => -rate,
+        Direction::Instrument(_) => Vector3::zeros(),
+        other => along(other, by_joint, by_station, yielding),
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
-use super::placed_row::{PlacedRow, PlacementBuffers, Station, along};
-use super::{ArmState, Deflection, Effect, ParameterSpec, Variable};
+use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, from_anchor};
+use super::{ArmState, Deflection, Direction, Effect, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3x6, Vector3};
@@ -212,7 +212,21 @@ impl EffectStack {
             compliance: scratch.deflection.compliance.clone(),
             by_station: scratch.by_station.clone(),
             by_joint: scratch.by_joint.clone(),
+            turns: None,
         }
+    }
+
+    /// The same with how the target turns.
+    pub fn target_motion(
+        &self,
+        robot: &RobotModel,
+        data: &Measurements,
+        row: usize,
+        x: &[f64],
+        scratch: &mut PlacementBuffers,
+    ) -> PointMotion {
+        let motion = self.point_motion(robot, data, row, x, scratch);
+        PointMotion { turns: Some(scratch.turns(robot)), ..motion }
     }
 
     /// Adds the motions of the effects with the given need.
@@ -259,7 +273,7 @@ impl EffectStack {
     }
 }
 
-/// How a row's point moves with everything that an effect can do.
+/// How a row's target moves with everything that an effect can do.
 pub struct PointMotion {
     row: usize,
     /// Predicted point, tracker frame, m.
@@ -271,6 +285,8 @@ pub struct PointMotion {
     by_station: Vec<Matrix3x6<f64>>,
     /// m/rad (m/m).
     pub by_joint: Vec<Vector3<f64>>,
+    /// Where orientations are asked for.
+    turns: Option<Turns>,
 }
 
 impl PointMotion {
@@ -279,23 +295,27 @@ impl PointMotion {
         of.value(0, robot, &ArmState::new(data, row, &self.posture, self.point))
     }
 
-    /// Derivative of the point by each parameter of an effect at zero, through `emit(parameter, derivative)`, as
-    /// [`EffectStack::derivatives`].
-    pub fn derivatives(
-        &self,
-        robot: &RobotModel,
-        data: &Measurements,
-        effect: &dyn Effect,
-        zeros: &[f64],
-        buffer: &mut Deflection,
-        mut emit: impl FnMut(usize, Vector3<f64>),
-    ) {
+    /// Puts into `buffer` where each parameter of an effect acts at zero.
+    pub fn deflect(&self, robot: &RobotModel, data: &Measurements, effect: &dyn Effect, zeros: &[f64], buffer: &mut Deflection) {
         buffer.clear();
         buffer.start(0);
         effect.deflect(robot, &ArmState::new(data, self.row, &self.posture, self.point), zeros, buffer);
-        for (parameter, direction) in &buffer.partials {
-            emit(*parameter, along(direction, &self.by_joint, &self.by_station, &self.compliance));
-        }
+    }
+
+    /// Derivative of the point as the tracker reads it, m per unit of a parameter that acts there.
+    pub fn point_along(&self, direction: &Direction) -> Vector3<f64> {
+        along(direction, &self.by_joint, &self.by_station, &self.compliance)
+    }
+
+    /// Derivative of the vector from the row's anchor to the point, m per unit.
+    pub fn from_anchor_along(&self, direction: &Direction) -> Vector3<f64> {
+        from_anchor(direction, &self.by_joint, &self.by_station, &self.compliance)
+    }
+
+    /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.
+    pub fn turn_along(&self, direction: &Direction) -> Vector3<f64> {
+        let turns = self.turns.as_ref();
+        turns.and_then(|turns| turns.along(direction, &self.compliance)).unwrap_or_else(Vector3::zeros)
     }
 }
 

@@ -4,11 +4,10 @@
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
 //! instead.
 
+use super::error_scale::ErrorScale;
 use super::fit::{FitOptions, ParameterStatus, fit};
-use super::model::Model;
 use super::nearby::NearbyFits;
 use super::repeats::Poses;
-use super::row_error::row_error;
 use super::session::Session;
 use crate::robot::Measurements;
 use rand::SeedableRng;
@@ -39,7 +38,7 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     let order = whole.divisible(&parts, count)?;
     let blocks = deal(&order, rows.len(), count);
     let random = at_random(order, rows.len(), count, seed);
-    let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds));
+    let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds, ErrorScale::Lengths));
     Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
 }
 
@@ -51,7 +50,7 @@ pub fn leave_one_out(whole: &Session) -> Option<Folds> {
     if folds.len() < 2 || 3 * (rows.len() - longest) <= whole.candidates().len() {
         return None;
     }
-    let errors = gather(data, rows, &folds, &whole.without_each(&folds));
+    let errors = gather(data, rows, &folds, &whole.without_each(&folds, ErrorScale::Lengths));
     Some(Folds { count: folds.len(), random: errors.clone(), blocks: errors })
 }
 
@@ -99,15 +98,14 @@ impl Session<'_> {
         enough.then(|| parts.iter().collect())
     }
 
-    /// Errors (m) of the rows of each fold under a fit to the others.
-    pub(crate) fn without_each(&self, folds: &[Vec<usize>]) -> Vec<Vec<f64>> {
-        let Self { model, data, rows, fitted } = *self;
+    /// Errors of the rows of each fold under a fit to the others.
+    pub(crate) fn without_each(&self, folds: &[Vec<usize>], scale: ErrorScale) -> Vec<Vec<f64>> {
+        let fitted = self.fitted;
         let candidates = self.candidates();
-        let nearby = NearbyFits::of(self, folds, &fitted.free());
+        let nearby = NearbyFits::of(self, folds, &fitted.free(), scale);
         let close = nearby.as_ref().and_then(NearbyFits::alone).unwrap_or_else(|| vec![None; folds.len()]);
-        let repeated = |(fold, close): (&Vec<usize>, Option<Vec<f64>>)| {
-            close.unwrap_or_else(|| without(model, data, rows, &candidates, fold))
-        };
+        let repeated =
+            |(fold, close): (&Vec<usize>, Option<Vec<f64>>)| close.unwrap_or_else(|| without(self, &candidates, fold, scale));
         folds.par_iter().zip(close).map(repeated).collect()
     }
 }
@@ -139,11 +137,12 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
 }
 
 /// Errors of the rows `part` under a fit to the others.
-fn without(model: &Model, data: &Measurements, rows: &[usize], candidates: &[usize], part: &[usize]) -> Vec<f64> {
+fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorScale) -> Vec<f64> {
+    let Session { model, data, rows, .. } = *whole;
     let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
     let (other, _) = fit(model, data, &FitOptions { rows: &kept, candidates });
     let mut scratch = other.stack.scratch(&other.robot);
-    part.iter().map(|row| row_error(&other, data, *row, &mut scratch).length).collect()
+    part.iter().map(|row| scale.error(&other, data, *row, &mut scratch)).collect()
 }
 
 pub(crate) fn gather(data: &Measurements, rows: &[usize], parts: &[Vec<usize>], errors: &[Vec<f64>]) -> Vec<f64> {

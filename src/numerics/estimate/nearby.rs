@@ -3,10 +3,10 @@
 //! Without the rows of a part it is, of G = J R^-1 of these rows (R'R = J'J of all) and their errors e, the step R^-1 (1 - G'G)^-1
 //! (Q'r - G'e). Of a part only its own triangular factor is kept, which has the same G'G and G'e.
 
+use super::error_scale::ErrorScale;
 use super::factor::TriangularFactor;
 use super::model::Model;
 use super::problem::Problem;
-use super::row_error::row_error;
 use super::session::Session;
 use super::term::{ObservationTerm, share};
 use crate::observation::{ExcessSigma, KINDS};
@@ -25,6 +25,8 @@ pub(crate) struct NearbyFits<'a> {
     data: &'a Measurements,
     model: &'a Model,
     excess: ExcessSigma,
+    /// What errors are told in.
+    scale: ErrorScale,
     /// Parameters that are estimated or moved.
     columns: Vec<usize>,
     /// Of all parts and the priors.
@@ -41,7 +43,7 @@ struct LeftOutRows<'a> {
 
 impl<'a> NearbyFits<'a> {
     /// Around the model of a session. `None` where bounds are in the way.
-    pub fn of(session: &Session<'a>, parts: &'a [Vec<usize>], columns: &[usize]) -> Option<Self> {
+    pub fn of(session: &Session<'a>, parts: &'a [Vec<usize>], columns: &[usize], scale: ErrorScale) -> Option<Self> {
         let Session { data, model, fitted, .. } = *session;
         if model.known.values().any(|known| known.bounds.is_some()) {
             return None;
@@ -56,10 +58,10 @@ impl<'a> NearbyFits<'a> {
         let parts: Vec<LeftOutRows> = parts.par_iter().map(part).collect();
         let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
         let (whole, _) = model.with_priors(columns, all);
-        Some(Self { data, model, excess, columns: columns.to_vec(), whole, parts })
+        Some(Self { data, model, excess, scale, columns: columns.to_vec(), whole, parts })
     }
 
-    /// Errors (m) of the rows of each part under a fit to the others; none where that is farther than a small step.
+    /// Errors of the rows of each part under a fit to the others; none where that is farther than a small step.
     pub fn alone(&self) -> Option<Vec<Option<Vec<f64>>>> {
         self.with(&vec![None; self.columns.len()])
     }
@@ -102,7 +104,7 @@ impl<'a> NearbyFits<'a> {
         ((arrived - straight).abs() <= STRAIGHT * straight).then_some(lengths)
     }
 
-    /// Errors (m) of a part's rows under a model, and the root of their whitened square.
+    /// Errors of a part's rows under a model, and the root of their whitened square.
     fn arrive(&self, part: &LeftOutRows, model: &Model) -> (Vec<f64>, f64) {
         let mut scratch = model.stack.scratch(&model.robot);
         let (mut lengths, mut square) = (Vec::with_capacity(part.rows.len()), 0.0);
@@ -113,7 +115,7 @@ impl<'a> NearbyFits<'a> {
             for ((term, _), share) in terms.zip(&mut shares) {
                 square += (term.error * *share).norm_squared();
             }
-            lengths.push(row_error(model, self.data, *row, &mut scratch).length);
+            lengths.push(self.scale.error(model, self.data, *row, &mut scratch));
         }
         (lengths, square.sqrt())
     }

@@ -19,9 +19,10 @@ pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual};
 pub use weight::Weight;
 
-use crate::effect::PlacedRow;
+use crate::effect::{Direction, PlacedRow, PointMotion};
 use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel};
 use crate::spatial::Pose;
+use crate::units::Unit;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
@@ -35,6 +36,16 @@ pub enum Dimension {
     Length,
     /// rad
     Angle,
+}
+
+impl Dimension {
+    /// The unit in which small sizes are told.
+    pub fn small(self) -> Unit {
+        match self {
+            Self::Length => Unit::Micrometre,
+            Self::Angle => Unit::Arcsecond,
+        }
+    }
 }
 
 /// What a kind says of itself.
@@ -70,6 +81,7 @@ pub struct Rank {
 }
 
 /// What of a target's motion a kind sees, in standard deviations: of the point, the orientation, the vector from the anchor.
+#[derive(Debug, Clone, Copy)]
 pub enum Sensitivity {
     /// Derivatives are those of the point.
     Point(Weight),
@@ -80,6 +92,15 @@ pub enum Sensitivity {
 }
 
 impl Sensitivity {
+    /// Derivative of what was measured by a parameter that acts along a direction, in standard deviations.
+    pub fn along(&self, motion: &PointMotion, direction: &Direction) -> Vector3<f64> {
+        match self {
+            Self::Point(weight) => weight.apply(&motion.point_along(direction)),
+            Self::Rotation(weight) => weight.apply(&motion.turn_along(direction)),
+            Self::FromAnchor(weight) => weight.apply(&motion.from_anchor_along(direction)),
+        }
+    }
+
     /// Derivatives of what was measured by every parameter, in standard deviations, through `emit(parameter, derivative)`.
     pub fn derivatives(&self, placed: &mut PlacedRow, mut emit: impl FnMut(usize, Vector3<f64>)) {
         match self {
@@ -112,9 +133,24 @@ pub trait MeasurementKind: Sync {
         Weight::uniform((variance + excess * excess).sqrt())
     }
 
+    /// Lines of its residual that hold what a row measured, ascending.
+    fn lines(&self, data: &Measurements, row: usize) -> &'static [usize] {
+        &[0, 1, 2][..self.axes(data, row)]
+    }
+
     /// Length of one sigma of what a row measured, m or rad.
     fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
-        self.reading(data, row).map(|reading| reading.sigma)
+        self.instrument(data, row)
+    }
+
+    /// Length of one sigma of the instrument alone, m or rad.
+    fn instrument(&self, data: &Measurements, row: usize) -> Option<f64> {
+        self.reading(data, row).map(|reading| reading.sigma * (self.about().axes as f64).sqrt())
+    }
+
+    /// The error (m or rad) in standard deviations of the instrument alone, squared and summed.
+    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
+        self.reading(data, row).map_or(0.0, |reading| error.norm_squared() / (reading.sigma * reading.sigma))
     }
 
     /// Whether the rows may measure it at all.
@@ -180,6 +216,18 @@ impl dyn MeasurementKind + '_ {
 /// Kinds that the rows may measure.
 pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
     KINDS.iter().copied().filter(|kind| kind.is_in(data)).collect()
+}
+
+/// Numbers that a row measured, of all kinds.
+pub fn values(data: &Measurements, row: usize) -> usize {
+    KINDS.iter().map(|kind| kind.axes(data, row)).sum()
+}
+
+/// What the errors of a recording are sizes of: lengths wherever one of the rows measured one.
+pub fn dimension(data: &Measurements, rows: &[usize]) -> Dimension {
+    let lengths = || kinds(data).into_iter().filter(|kind| kind.about().dimension == Dimension::Length);
+    let measured = |row: &usize| lengths().any(|kind| kind.axes(data, *row) > 0);
+    if rows.is_empty() || rows.iter().any(measured) { Dimension::Length } else { Dimension::Angle }
 }
 
 /// Length (m) of one sigma of what a row measured: of its point, or else of another length; zero where it measured none.

@@ -89,6 +89,29 @@ impl MeasurementKind for PointKind {
         (data.axes(row) > 0).then(|| data.noise(row))
     }
 
+    fn lines(&self, data: &Measurements, row: usize) -> &'static [usize] {
+        let measured = |axis: usize| data.sigma[row][axis].is_finite();
+        match [0, 1, 2].map(measured) {
+            [true, true, true] => &[0, 1, 2],
+            [true, true, false] => &[0, 1],
+            [true, false, true] => &[0, 2],
+            [false, true, true] => &[1, 2],
+            [true, false, false] => &[0],
+            [false, true, false] => &[1],
+            [false, false, true] => &[2],
+            [false, false, false] => &[],
+        }
+    }
+
+    fn instrument(&self, data: &Measurements, row: usize) -> Option<f64> {
+        let finite = |sigma: f64| if sigma.is_finite() { sigma } else { 0.0 };
+        (data.axes(row) > 0).then(|| data.sigma[row].map(finite).norm())
+    }
+
+    fn stated(&self, data: &Measurements, row: usize, error: &Vector3<f64>) -> f64 {
+        error.component_div(&data.sigma[row]).norm_squared()
+    }
+
     /// Every recording has its columns.
     fn is_in(&self, _data: &Measurements) -> bool {
         true

@@ -4,6 +4,7 @@ use super::{DiagnosisSummary, rival_words};
 use crate::error::counted;
 use crate::summary::labelled;
 use crate::table::{FindingRow, RivalRow, is_separable_by_poses};
+use crate::units::Unit;
 
 /// Findings that a run names in its one line.
 const NAMED: usize = 3;
@@ -21,10 +22,15 @@ impl DiagnosisSummary {
     /// The largest findings by name, place and size; nothing where nothing was found.
     pub fn largest(&self) -> Option<String> {
         let mut all: Vec<&FindingRow> = self.findings.0.iter().collect();
-        all.sort_by(|a, b| b.effect_rms_mm.unwrap_or(0.0).total_cmp(&a.effect_rms_mm.unwrap_or(0.0)));
-        let size = |mm: f64| format!(" ({:.0} um rms)", 1000.0 * mm);
-        let named =
-            |row: &&FindingRow| format!("{} at {}{}", row.effect, row.place, row.effect_rms_mm.map_or_else(String::new, size));
+        // One recording tells lengths or angles.
+        let size = |row: &FindingRow| row.effect_rms_mm.or(row.effect_rms_rad).unwrap_or(0.0);
+        all.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        let told = |row: &FindingRow| match (row.effect_rms_mm, row.effect_rms_rad) {
+            (Some(mm), _) => format!(" ({:.0} um rms)", 1000.0 * mm),
+            (None, Some(angle)) => format!(" ({:.0} arcsec rms)", Unit::Arcsecond.from_si(angle)),
+            (None, None) => String::new(),
+        };
+        let named = |row: &&FindingRow| format!("{} at {}{}", row.effect, row.place, told(row));
         let named: Vec<String> = all.iter().take(NAMED).map(named).collect();
         let more = all.len().saturating_sub(NAMED);
         let more = if more > 0 { format!(", and {more} more") } else { String::new() };
@@ -39,8 +45,16 @@ impl DiagnosisSummary {
         if let (Some(mean), Some(max)) = (change(v.before_mean_mm, v.after_mean_mm), change(v.before_max_mm, v.after_max_mm)) {
             let rows = if v.held_out { "held-out points" } else { "fitted points (none are held out: flattered)" };
             let assumed = if v.is_noise_assumed() { "assumed " } else { "" };
-            let noise = format!("{assumed}noise {:.3} mm rms", v.noise_floor_mm);
+            let noise = format!("{assumed}noise {:.3} mm rms", v.noise_floor_mm.unwrap_or_default());
             text.push_str(&labelled("error", &format!("mean {mean}, max {max}, {rows}; {noise}")));
+        }
+        if let (Some(before), Some(after), Some(noise)) = (v.before_rms_rad, v.after_rms_rad, v.noise_floor_rad) {
+            let [before, after, noise] = [before, after, noise].map(|angle| Unit::Arcsecond.from_si(angle));
+            let rows = if v.held_out { "held-out rows" } else { "fitted rows (none are held out: flattered)" };
+            text.push_str(&labelled(
+                "error",
+                &format!("rms {before:.1} -> {after:.1} arcsec, {rows}; noise {noise:.1} arcsec rms"),
+            ));
         }
         for finding in &self.findings.0 {
             text.push_str(&labelled(&format!("{:>3}.", finding.rank), &self.finding_in_a_line(finding)));

@@ -226,7 +226,7 @@ impl DiagnosisSummary {
             text.push_str(&format!("  {name:6}  {:>8}  {:>8}  {:>8}\n", mm(mean), mm(rms), mm(max)));
         }
         let assumed = if v.is_noise_assumed() { "  assumed: none is recorded, and no `instrument` is stated" } else { "" };
-        text.push_str(&format!("  noise   {:>8}  {:>8.3}{assumed}\n\n", "", v.noise_floor_mm));
+        text.push_str(&format!("  noise   {:>8}  {:>8}{assumed}\n\n", "", mm(v.noise_floor_mm)));
         for (by, what) in [("place", "where"), ("variable", "depends on")] {
             let all = self.located(by);
             let all: Vec<String> = all.iter().map(|row| format!("{} {:.0} %", row.name, row.share * 100.0)).collect();

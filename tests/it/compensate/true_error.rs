@@ -128,7 +128,7 @@ impl Cell {
         let verdict: Verdict = table(&tables).remove(0);
         let findings: Findings = table(&tables).remove(0);
         let model = parameters.model(RobotModel::new(self.robot.clone()), &[], Load::GravityTorque).expect("a model");
-        (model, findings, verdict.0[0].noise_floor_mm)
+        (model, findings, verdict.0[0].noise_floor_mm.expect("lengths"))
     }
 
     /// The rigid model, and the joint curves that are learned on top of it.

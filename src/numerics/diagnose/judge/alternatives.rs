@@ -35,14 +35,14 @@ impl<'a> Alternatives<'a> {
         let causes = state.causes.len();
         let mut columns = state.fitted.free();
         columns.extend(ranges[causes..].iter().cloned().flatten());
-        let nearby = NearbyFits::of(&session, folds, &columns)?;
+        let nearby = NearbyFits::of(&session, folds, &columns, fitter.scale)?;
         Some(move |out: &[usize], rival: Option<usize>| {
             let left_out = |k: &usize| out.iter().any(|i| ranges[*i].contains(k));
             let other = |k: &usize| (causes..ranges.len()).any(|i| ranges[i].contains(k) && rival != Some(i - causes));
             let step = |k: &usize| (left_out(k) || other(k)).then_some(-model.x[*k]);
             let steps: Vec<Option<f64>> = columns.iter().map(step).collect();
             let errors: Option<Vec<Vec<f64>>> = nearby.with(&steps)?.into_iter().collect();
-            Some(FoldErrors::gathered(&session, folds, &errors?))
+            Some(FoldErrors::gathered(&session, folds, &errors?, fitter.scale))
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::diagnose::round::{FitState, Fitter};
 use crate::effect::Place;
-use crate::estimate::{FoldKind, Session, autocorrelation_time, dealt, gather};
+use crate::estimate::{ErrorScale, FoldKind, Session, autocorrelation_time, dealt, gather};
 use std::collections::BTreeMap;
 
 /// Parts of the rows that were fitted, the same for every model that is compared.
@@ -30,8 +30,10 @@ const CLEARLY: f64 = 2.0;
 
 /// Errors of the rows that were fitted.
 pub(crate) struct FoldErrors {
-    /// Squared errors, m2, by row.
+    /// Squared errors, m2 or rad2, by row.
     squares: BTreeMap<usize, f64>,
+    /// What they are told in.
+    scale: ErrorScale,
     /// Whether they lie along a path.
     moving: bool,
 }
@@ -41,21 +43,21 @@ impl FoldErrors {
     pub fn of(now: &FitState, fitter: &Fitter) -> Option<Self> {
         let session = now.session(fitter);
         let folds = folds(now, fitter)?;
-        Some(Self::gathered(&session, &folds, &session.without_each(&folds)))
+        Some(Self::gathered(&session, &folds, &session.without_each(&folds, fitter.scale), fitter.scale))
     }
 
     /// From the errors of each fold's rows.
-    pub fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>]) -> Self {
+    pub fn gathered(session: &Session, folds: &[Vec<usize>], errors: &[Vec<f64>], scale: ErrorScale) -> Self {
         let errors = gather(session.data, session.rows, folds, errors);
         let squares = session.rows.iter().zip(errors).map(|(row, error)| (*row, error * error)).collect();
-        Self { squares, moving: session.data.in_motion(session.rows) }
+        Self { squares, scale, moving: session.data.in_motion(session.rows) }
     }
 
     pub fn rms(&self) -> f64 {
         (self.squares.values().sum::<f64>() / self.squares.len() as f64).sqrt()
     }
 
-    /// By how much the rms (m) of this is smaller than that of `other`, at the rows that both were fitted to.
+    /// By how much the rms of this is smaller than that of `other`, at the rows that both were fitted to.
     pub fn gain_over(&self, other: &Self) -> f64 {
         let [own, theirs] = self.rms_beside(other);
         theirs - own
@@ -64,7 +66,7 @@ impl FoldErrors {
     /// -2 ln of the odds of `other` against this, by these rows.
     pub fn evidence_against(&self, other: &Self) -> f64 {
         let [own, theirs] = self.rms_beside(other);
-        2.0 * 3.0 * self.squares.len() as f64 * (theirs / own).ln()
+        2.0 * self.scale.values() * self.squares.len() as f64 * (theirs / own).ln()
     }
 
     /// Whether this is better than `other` by a share that matters, and by more than the rows' scatter would have it.
@@ -73,7 +75,7 @@ impl FoldErrors {
         own < theirs * (1.0 - WORSE) && self.fall_from(other) > CLEARLY
     }
 
-    /// The rms (m) of both at the rows that both were fitted to.
+    /// The rms of both at the rows that both were fitted to.
     fn rms_beside(&self, other: &Self) -> [f64; 2] {
         let both = self.squares.iter().filter_map(|(row, own)| Some((own, other.squares.get(row)?)));
         let (own, theirs, count) = both.fold((0.0, 0.0, 0), |(a, b, n), (own, theirs)| (a + own, b + theirs, n + 1));

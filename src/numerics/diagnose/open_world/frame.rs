@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 pub(super) struct Block {
     /// Residual rows x columns.
     pub columns: Mat<f64>,
-    /// Mean squared motion (m2) of the tool by a unit of each column's coefficient.
+    /// Mean squared change (m2 or rad2) of what was measured by a unit of each column's coefficient.
     pub square: Vec<f64>,
     pub products: Products,
 }
@@ -29,7 +29,7 @@ pub(super) struct Frame<'a> {
     base: Mat<f64>,
     /// Without the causes of the model.
     residual: Vec<f64>,
-    /// Variance of one row's axis, m2, by which columns become lengths.
+    /// Variance of one number of a row, m2 or rad2, by which columns become sizes.
     variance: Vec<f64>,
 }
 
@@ -37,7 +37,10 @@ impl<'a> Frame<'a> {
     pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter) -> Self {
         let problem = &view.problem;
         let base = orthonormal(&problem.jacobian(fitter.free()));
-        let variance = problem.rows.iter().map(|row| problem.data.noise(*row).powi(2) / 3.0).collect();
+        let variance = |(i, row): (usize, &usize)| {
+            fitter.scale.noise(problem.data, *row).powi(2) / problem.readings_of(i).len().max(1) as f64
+        };
+        let variance = problem.rows.iter().enumerate().map(variance).collect();
         let mut residual = problem.residual.clone();
         for (cause, range) in now.causes.iter().zip(&now.ranges) {
             let columns = problem.columns(&cause.form);
@@ -75,13 +78,14 @@ impl<'a> Frame<'a> {
 
     /// A motion along the functions of a row in `values`, one after another: all products of a direction and a function.
     pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> Block {
-        let (rows, points) = (self.residual.len(), 3 * self.view.problem.rows.len());
+        let rows = self.residual.len();
         let mut raw = vec![0.0; rows * directions.len() * values.len()];
         for ((direction, value), column) in
             directions.iter().flat_map(|direction| values.iter().map(move |value| (direction, value))).zip(raw.chunks_mut(rows))
         {
-            let of_points = column[..points].chunks_exact_mut(3).zip(direction.chunks_exact(3)).zip(value);
-            of_points.for_each(|((own, along), value)| (0..3).for_each(|axis| own[axis] = along[axis] * value));
+            for (i, value) in value.iter().enumerate() {
+                self.view.problem.readings_of(i).for_each(|line| column[line] = direction[line] * value);
+            }
         }
         self.of_columns(raw)
     }
@@ -108,9 +112,11 @@ impl<'a> Frame<'a> {
     }
 
     fn mean_square(&self, column: &[f64]) -> f64 {
-        let squares = column.chunks_exact(3).zip(&self.variance);
-        squares.map(|(row, variance)| row.iter().map(|value| value * value).sum::<f64>() * variance).sum::<f64>()
-            / self.variance.len().max(1) as f64
+        let of_row = |(i, variance): (usize, &f64)| {
+            let lines = self.view.problem.readings_of(i);
+            column[lines].iter().map(|value| value * value).sum::<f64>() * variance
+        };
+        self.variance.iter().enumerate().map(of_row).sum::<f64>() / self.variance.len().max(1) as f64
     }
 }
 

@@ -1,6 +1,6 @@
 //! The model that the user's simulation has: the nominal robot, aligned, with the corrections that every calibration makes.
 
-use crate::effect::{Effect, EffectContext, EffectStack, Load, identified};
+use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, Load, identified};
 use crate::estimate::{Model, align};
 use crate::robot::{Measurements, RobotModel};
 
@@ -11,7 +11,8 @@ pub const BASE: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_
 pub(super) fn base_model(robot: &RobotModel, data: &Measurements, rows: &[usize], without: &[String]) -> Model {
     let setting = EffectContext { base: align(robot, data, rows), load: Load::GravityTorque };
     let effects: Vec<Box<dyn Effect>> = identified()
-        .filter(|cause| BASE.contains(&cause.name()) && !without.iter().any(|name| name == cause.name()))
+        .filter(|cause| BASE.contains(&cause.name()) || (cause.name() == AnchorShift::NAME && !robot.setup().anchors.is_empty()))
+        .filter(|cause| !without.iter().any(|name| name == cause.name()))
         .filter_map(|cause| cause.whole(&setting))
         .filter(|effect| effect.missing(robot, data).is_none())
         .collect();

@@ -29,23 +29,25 @@ pub(crate) fn correlation_left_by(settled: &FitState, fitter: &Fitter) -> Option
     }
     let rows = thinned(&fitter.data, &settled.screening.kept);
     let problem = WhitenedProblem::new(&settled.model, &fitter.data, rows);
+    // Rows that measured different numbers have no one correlation from each to the next.
+    let width = problem.width()?;
     let slow: Vec<bool> = settled.causes.iter().map(|cause| follows_time(&cause.form)).collect();
     let numbers = |(cause, slow): (&_, &bool)| if *slow { numbers(cause) } else { 0 };
     let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().zip(&slow).map(numbers).sum::<usize>() as f64;
-    let with_all = Regression::of(&problem, settled, fitter, &vec![true; slow.len()]);
+    let with_all = Regression::of((&problem, width), settled, fitter, &vec![true; slow.len()]);
     let believed = with_all.cost(fitter.correlated) + price;
     let (best, noise) = with_all.likeliest();
     if fitter.causes_of_the_arm_first() {
         // What noise alone explains as well has no other name.
         let price = (problem.residual_rows() as f64).ln() * settled.causes.iter().map(self::numbers).sum::<usize>() as f64;
-        let (alone, of_noise) = Regression::of(&problem, settled, fitter, &vec![false; slow.len()]).likeliest();
+        let (alone, of_noise) = Regression::of((&problem, width), settled, fitter, &vec![false; slow.len()]).likeliest();
         let keeps_causes = best + price < alone - PLAIN;
         return Some(CorrelationChange { noise: if keeps_causes { noise } else { of_noise }, keeps_causes });
     }
     let best = best + price;
     if slow.contains(&true) {
         let kept: Vec<bool> = slow.iter().map(|slow| !slow).collect();
-        let (cost, other) = Regression::of(&problem, settled, fitter, &kept).likeliest();
+        let (cost, other) = Regression::of((&problem, width), settled, fitter, &kept).likeliest();
         if cost < best.min(believed) + CLEARER && other.is_some() {
             return (other != fitter.correlated).then(|| change(other));
         }
@@ -65,6 +67,8 @@ fn numbers(cause: &super::fit_state::EstimatedCause) -> usize {
 /// Points by the base model and some causes, in a linear picture.
 struct Regression<'a> {
     rows: &'a [usize],
+    /// Numbers of a row.
+    width: usize,
     /// Columns one after another, and how many.
     columns: Vec<f64>,
     count: usize,
@@ -75,9 +79,9 @@ struct Regression<'a> {
 
 impl<'a> Regression<'a> {
     /// On the base model and the `kept` causes.
-    fn of(problem: &'a WhitenedProblem, settled: &FitState, fitter: &Fitter, kept: &[bool]) -> Self {
+    fn of((problem, width): (&'a WhitenedProblem, usize), settled: &FitState, fitter: &Fitter, kept: &[bool]) -> Self {
         let rows = problem.residual_rows();
-        let mut points = problem.of_points().to_vec();
+        let mut points = problem.of_readings().to_vec();
         let base = problem.jacobian(fitter.free());
         let mut columns: Vec<f64> = (0..base.ncols()).flat_map(|j| base.col_as_slice(j).to_vec()).collect();
         for (cause, kept) in settled.causes.iter().zip(kept) {
@@ -96,7 +100,7 @@ impl<'a> Regression<'a> {
         let gross = left.clone();
         AutocorrelatedNoise::without_gross(&mut left);
         points.iter_mut().zip(gross.iter().zip(&left)).for_each(|(value, (gross, left))| *value += left - gross);
-        let mut own = Self { rows: &problem.rows, columns, count, points, white: 0.0 };
+        let mut own = Self { rows: &problem.rows, width, columns, count, points, white: 0.0 };
         own.white = logarithms(&pivots(&matrix(&own.columns, rows)));
         own
     }
@@ -105,7 +109,7 @@ impl<'a> Regression<'a> {
     fn cost(&self, noise: Option<AutocorrelatedNoise>) -> f64 {
         let believed = noise.unwrap_or(AutocorrelatedNoise::NONE);
         let rows = self.points.len();
-        let innovations = believed.filter(self.rows);
+        let innovations = believed.filter(self.rows, self.width);
         let (mut columns, mut left) = (self.columns.clone(), self.points.clone());
         columns.chunks_mut(rows).for_each(|column| innovations.apply(column));
         innovations.apply(&mut left);

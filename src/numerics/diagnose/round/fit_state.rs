@@ -6,7 +6,7 @@ use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
-use crate::estimate::{FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
+use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
 use nalgebra::Matrix3;
 use std::ops::Range;
@@ -86,6 +86,8 @@ pub(crate) struct Fitter<'a> {
     pub question: &'a Question<'a>,
     /// The recording; its spread is what the joints' repeatability makes of each row.
     pub data: Measurements,
+    /// What errors of rows are compared and told in.
+    pub scale: ErrorScale,
     /// Base parameters to estimate, all of them if `None`.
     free: Option<Vec<usize>>,
     pub repeatability: JointRepeatability,
@@ -115,6 +117,7 @@ impl<'a> Fitter<'a> {
         let mut fitter = Self {
             question,
             data: question.data.clone(),
+            scale: ErrorScale::of(question.data, question.fit),
             free: None,
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
             spread: Vec::new(),

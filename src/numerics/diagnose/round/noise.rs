@@ -3,6 +3,7 @@
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model, Poses};
+use crate::observation::values;
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -79,16 +80,16 @@ impl RepeatPairs {
     }
 }
 
-/// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
+/// The joints' repeatability (rad) by what a fit leaves of the whole points of `rows` that holds no structure any more; 0 without any.
 pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: &Measurements, spread: &[Matrix3<f64>]) -> f64 {
     let predicted = model.predict(data);
-    let values = 3 * rows.len();
-    let freedom = (values as f64 / values.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
+    let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
+    let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
         let residual = data.position[*row] - predicted[*row];
         (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread[*row])
     };
-    likeliest(&rows.iter().map(one).collect::<Vec<_>>(), 6.0)
+    likeliest(&rows.iter().filter(|row| data.whole(**row)).map(one).collect::<Vec<_>>(), 6.0)
 }
 
 /// The likeliest deviation; none unless it is better than none by `evidence`.

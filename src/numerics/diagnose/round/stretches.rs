@@ -26,7 +26,8 @@ pub(super) fn thinned(data: &Measurements, rows: &[usize]) -> Vec<usize> {
 /// How many rows of a moving arm count as one, by what is left; of standing points each is one.
 pub(super) fn bounded_autocorrelation_time(problem: &WhitenedProblem) -> f64 {
     let rows = &problem.rows;
-    let time = if problem.data.in_motion(rows) { autocorrelation_time(problem.of_points(), 3) } else { 1.0 };
+    let moving = problem.width().filter(|_| problem.data.in_motion(rows));
+    let time = moving.map_or(1.0, |width| autocorrelation_time(problem.of_readings(), width));
     if time < ALONE { 1.0 } else { time.min(rows.len() as f64 / STRETCHES as f64).max(1.0) }
 }
 

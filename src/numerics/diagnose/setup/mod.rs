@@ -23,11 +23,29 @@ use compare::AsStated;
 /// Fewer rows than this do not tell one error from another: base and tool alone take nine numbers.
 const FEWEST: usize = 10;
 
+/// Rows with whole points: nothing else says where the arm is without its geometry.
+struct WholePoints {
+    fit: Vec<usize>,
+    validate: Vec<usize>,
+}
+
+impl WholePoints {
+    fn of(question: &Question) -> Self {
+        let whole = |rows: &[usize]| rows.iter().copied().filter(|row| question.data.whole(*row)).collect();
+        Self { fit: whole(question.fit), validate: whole(question.validate) }
+    }
+
+    /// The question of these rows; none where they are too few, or stand beside an outside simulation.
+    fn question<'a>(&'a self, question: &Question<'a>) -> Option<Question<'a>> {
+        let asked = self.fit.len() >= FEWEST && !question.beside_simulation;
+        asked.then_some(Question { fit: &self.fit, validate: &self.validate, ..*question })
+    }
+}
+
 /// What is wrong with the set-up, if the nominal robot is far off its points; without findings where nothing of the list explains it.
 pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
-    if question.fit.len() < FEWEST || question.beside_simulation {
-        return None;
-    }
+    let points = WholePoints::of(question);
+    let question = &points.question(question)?;
     let stated = AsStated::of(question);
     if !stated.is_far_off() {
         let parted = if stated.is_in_parts() { stated.two_setups() } else { None };
@@ -44,9 +62,8 @@ pub fn wrong_setup(question: &Question) -> Option<Diagnosis> {
 
 /// What is wrong with the set-up, if the identified base model leaves the robot file by more than manufacture errs.
 pub(crate) fn wrong_when_identified(question: &Question, now: &FitState) -> Option<Diagnosis> {
-    if question.beside_simulation {
-        return None;
-    }
+    let points = WholePoints::of(question);
+    let question = &points.question(question)?;
     let stated = AsStated::of(question);
     let beyond = manufacture::beyond(now, question.robot, stated.reach);
     if beyond.is_empty() {

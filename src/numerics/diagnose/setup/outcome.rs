@@ -8,6 +8,7 @@ use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, Probabilities, Qu
 use crate::diagnose::unasked::{on_its_base, unasked};
 use crate::effect::{ParameterEstimate, Place};
 use crate::estimate::{FitOptions, Screening, fit};
+use crate::observation::Dimension;
 
 /// That it is what it is called: nothing else of the list explains it, or others share it alike.
 const NAMED: f64 = 0.98;
@@ -99,7 +100,7 @@ fn wrong(question: &Question, findings: Vec<Finding>) -> Diagnosis {
     let Question { data, fit: rows, .. } = *question;
     let (start, candidates) = on_its_base(question);
     let (model, fitted) = fit(&start, data, &FitOptions { rows, candidates: &candidates });
-    let before = ErrorLengths::of(data, &model.predict(data), rows);
+    let before = ErrorLengths::of(&model.error_sizes(data, Dimension::Length), rows);
     let screening = Screening { kept: rows.to_vec(), ..Screening::default() };
     let not_observable = vec!["what the simulation lacks: it is tested once the set-up is right".into()];
     let diagnosis = unasked(question, VerdictKind::WrongSetup, (model, fitted, screening));

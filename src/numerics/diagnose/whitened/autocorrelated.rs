@@ -1,8 +1,6 @@
 //! Noise that correlation from point to point, as of moving air or a tripod: first-order autoregressive beside white noise, in standard deviations
 //! of each axis. Its innovations (Kalman, 1960) are white, so that causes which change slowly compete against it on equal terms.
 
-use nalgebra::Vector3;
-
 /// Noise of which a part is correlated along the rows of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AutocorrelatedNoise {
@@ -40,8 +38,8 @@ impl AutocorrelatedNoise {
         self.share * (1.0 + self.correlation) / (1.0 - self.correlation)
     }
 
-    /// Rows of the recording, ascending.
-    pub fn filter(&self, rows: &[usize]) -> Innovations {
+    /// Of columns with `width` numbers for each of these rows of the recording, ascending.
+    pub fn filter(&self, rows: &[usize], width: usize) -> Innovations {
         let mut variance = self.share;
         let mut steps = Vec::with_capacity(rows.len());
         for (i, row) in rows.iter().enumerate() {
@@ -53,7 +51,7 @@ impl AutocorrelatedNoise {
             steps.push(FilterStep { decay, gain, whole });
             variance *= 1.0 - gain;
         }
-        Innovations(steps)
+        Innovations { steps, width }
     }
 }
 
@@ -65,23 +63,30 @@ struct FilterStep {
 }
 
 /// What each row says beyond the rows before it.
-pub(crate) struct Innovations(Vec<FilterStep>);
+pub(crate) struct Innovations {
+    steps: Vec<FilterStep>,
+    /// Numbers of a row.
+    width: usize,
+}
 
 impl Innovations {
-    /// Takes a column, three numbers a row, to its innovations in standard deviations.
+    /// Takes a column to its innovations in standard deviations.
     pub fn apply(&self, column: &mut [f64]) {
-        let mut drift = Vector3::<f64>::zeros();
-        for (step, row) in self.0.iter().zip(column.chunks_exact_mut(3)) {
-            drift *= step.decay;
-            let new = Vector3::new(row[0], row[1], row[2]) - drift;
-            drift += new * step.gain;
-            row.copy_from_slice((new / step.whole.sqrt()).as_slice());
+        let mut drift = vec![0.0; self.width];
+        for (step, row) in self.steps.iter().zip(column.chunks_exact_mut(self.width)) {
+            let sigma = step.whole.sqrt();
+            for (drift, value) in drift.iter_mut().zip(row) {
+                *drift *= step.decay;
+                let new = *value - *drift;
+                *drift += new * step.gain;
+                *value = new / sigma;
+            }
         }
     }
 
-    /// ln of the determinant of the points' covariance, three a row.
+    /// ln of the determinant of the readings' covariance.
     pub fn determinant(&self) -> f64 {
-        3.0 * self.0.iter().map(|step| step.whole.ln()).sum::<f64>()
+        self.width as f64 * self.steps.iter().map(|step| step.whole.ln()).sum::<f64>()
     }
 }
 
@@ -107,7 +112,7 @@ mod tests {
     fn innovations_of_correlated_noise_are_white_and_of_unit_size() {
         let mut column = noise(4000, 0.9, 0.7);
         let rows: Vec<usize> = (0..4000).collect();
-        AutocorrelatedNoise { correlation: 0.9, share: 0.7 }.filter(&rows).apply(&mut column);
+        AutocorrelatedNoise { correlation: 0.9, share: 0.7 }.filter(&rows, 3).apply(&mut column);
         let product = |lag: usize| column.iter().zip(&column[3 * lag..]).map(|(a, b)| a * b).sum::<f64>() / column.len() as f64;
         assert!((product(0) - 1.0).abs() < 0.05, "{}", product(0));
         for lag in [1, 2, 5] {
@@ -122,8 +127,8 @@ mod tests {
         let all = noise(1200, 0.9, 1.0);
         let mut column: Vec<f64> = rows.iter().flat_map(|row| all[3 * row..3 * row + 3].to_vec()).collect();
         let mut other = column.clone();
-        AutocorrelatedNoise { correlation: 0.9, share: 1.0 }.filter(&rows).apply(&mut column);
-        AutocorrelatedNoise { correlation: 0.729, share: 1.0 }.filter(&(0..400).collect::<Vec<_>>()).apply(&mut other);
+        AutocorrelatedNoise { correlation: 0.9, share: 1.0 }.filter(&rows, 3).apply(&mut column);
+        AutocorrelatedNoise { correlation: 0.729, share: 1.0 }.filter(&(0..400).collect::<Vec<_>>(), 3).apply(&mut other);
         assert!(column.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-12));
     }
 
@@ -131,7 +136,7 @@ mod tests {
     fn innovations_have_the_likelihood_of_the_noise() {
         let rows: Vec<usize> = (0..80).collect();
         let cost = |model: AutocorrelatedNoise, noise: &[f64]| {
-            let (mut column, innovations) = (noise.to_vec(), model.filter(&rows));
+            let (mut column, innovations) = (noise.to_vec(), model.filter(&rows, 3));
             innovations.apply(&mut column);
             column.iter().map(|value| value * value).sum::<f64>() + innovations.determinant()
         };

@@ -1,12 +1,17 @@
 //! The recording as the present model sees it: whitened residuals, and how any form of an effect would move them.
 //!
-//! Residual rows are in standard deviations: three a row of the recording for the measured point, then one for each usable motor current.
+//! Residual rows are in standard deviations: of every row of the recording as many as it has measured numbers, of whatever kinds, then one for
+//! each usable motor current.
 
 mod autocorrelated;
 mod currents;
+mod reading_lines;
 
-use crate::effect::{Basis, Deflection, Effect, Form, Law, Motion, PointMotion, Term, Unknown, Variable};
-use crate::estimate::{Model, Prior, Weight};
+use crate::effect::{
+    Basis, Deflection, Effect, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
+};
+use crate::estimate::{Model, Prior};
+use crate::observation::{MeasurementKind, Residual, kinds};
 use crate::robot::{Measurements, RobotModel};
 pub(crate) use autocorrelated::AutocorrelatedNoise;
 use autocorrelated::Innovations;
@@ -14,6 +19,8 @@ use currents::Currents;
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use reading_lines::{ReadingLines, SeenReading};
+use std::ops::Range;
 
 /// Fitted rows through the present model.
 pub(crate) struct WhitenedProblem<'a> {
@@ -22,7 +29,7 @@ pub(crate) struct WhitenedProblem<'a> {
     /// Rows of the recording, ascending.
     pub rows: Vec<usize>,
     motions: Vec<PointMotion>,
-    weights: Vec<Weight>,
+    readings: ReadingLines,
     currents: Option<Currents>,
     /// What a standard deviation of a current counts: that of the points as they are left by the model.
     current_weight: f64,
@@ -34,19 +41,30 @@ pub(crate) struct WhitenedProblem<'a> {
 }
 
 impl<'a> WhitenedProblem<'a> {
-    /// Of measured points alone.
+    /// Of what rows measured, without the motor currents.
     pub fn new(model: &'a Model, data: &'a Measurements, rows: Vec<usize>) -> Self {
-        let motions: Vec<PointMotion> = rows
-            .par_iter()
-            .map_init(
-                || model.stack.scratch(&model.robot),
-                |scratch, row| model.stack.point_motion(&model.robot, data, *row, &model.x, scratch),
-            )
-            .collect();
-        let weights: Vec<Weight> = rows.iter().map(|row| Weight::of(data, *row, 0.0)).collect();
-        let mut residual = Vec::with_capacity(3 * rows.len());
-        for ((motion, weight), row) in motions.iter().zip(&weights).zip(&rows) {
-            residual.extend(weight.apply(&(data.position[*row] - motion.point)).iter());
+        let kinds = kinds(data);
+        let turns = kinds.iter().any(|kind| kind.about().rank.rotations);
+        let look = |scratch: &mut PlacementBuffers, row: &usize| {
+            let placed = model.stack.place(&model.robot, data, *row, &model.x, scratch);
+            let seen = |kind: &&'static dyn MeasurementKind| {
+                let residual = Residual::of(*kind, data, *row, &placed)?;
+                let weight = residual.weight(data, 0.0);
+                let (error, lines) = (weight.apply(&residual.error), kind.lines(data, *row));
+                Some((SeenReading { lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
+            };
+            let seen: Vec<(SeenReading, Vector3<f64>)> = kinds.iter().filter_map(seen).collect();
+            let motion = if turns { EffectStack::target_motion } else { EffectStack::point_motion };
+            (motion(&model.stack, &model.robot, data, *row, &model.x, scratch), seen)
+        };
+        let scratch = || model.stack.scratch(&model.robot);
+        let looked: Vec<(PointMotion, Vec<(SeenReading, Vector3<f64>)>)> = rows.par_iter().map_init(scratch, look).collect();
+        let (mut motions, mut residual) = (Vec::with_capacity(rows.len()), Vec::with_capacity(3 * rows.len()));
+        let mut readings = ReadingLines::default();
+        for (motion, seen) in looked {
+            motions.push(motion);
+            residual.extend(seen.iter().flat_map(|(reading, error)| reading.lines.iter().map(|line| error[*line])));
+            readings.push(seen.into_iter().map(|(reading, _)| reading).collect());
         }
         let current_weight = (residual.iter().map(|value| value * value).sum::<f64>() / residual.len().max(1) as f64).sqrt();
         Self {
@@ -55,7 +73,7 @@ impl<'a> WhitenedProblem<'a> {
             rows,
             residual,
             motions,
-            weights,
+            readings,
             currents: None,
             current_weight,
             innovations: None,
@@ -70,28 +88,43 @@ impl<'a> WhitenedProblem<'a> {
         self
     }
 
-    /// With autocorrelated noise: all columns become innovations.
+    /// With autocorrelated noise: all columns become innovations. Of rows that measured different numbers noise stays white.
     pub fn with_autocorrelation(mut self, noise: AutocorrelatedNoise) -> Self {
-        let (innovations, points) = (noise.filter(&self.rows), self.points());
-        innovations.apply(&mut self.residual[..points]);
-        self.innovations = Some(innovations);
+        let (filter, measured) = (self.width().map(|width| noise.filter(&self.rows, width)), self.measured());
+        if let Some(innovations) = filter {
+            innovations.apply(&mut self.residual[..measured]);
+            self.innovations = Some(innovations);
+        }
         self
     }
 
-    /// Takes a column's points to their innovations.
+    /// Takes what a column says of readings to their innovations.
     pub fn innovate(&self, column: &mut [f64]) {
         if let Some(innovations) = &self.innovations {
-            innovations.apply(&mut column[..3 * self.rows.len()]);
+            innovations.apply(&mut column[..self.measured()]);
         }
     }
 
-    fn points(&self) -> usize {
-        3 * self.rows.len()
+    /// Residual rows of readings.
+    fn measured(&self) -> usize {
+        self.readings.row_of.len()
     }
 
-    /// Residuals of the points, three a row.
-    pub fn of_points(&self) -> &[f64] {
-        &self.residual[..self.points()]
+    /// Numbers that each row measured, where all measured as many.
+    pub fn width(&self) -> Option<usize> {
+        let of_row = |i: usize| self.readings.of_row(i).len();
+        let width = of_row(0);
+        (!self.rows.is_empty() && width > 0 && (0..self.rows.len()).all(|i| of_row(i) == width)).then_some(width)
+    }
+
+    /// Residuals of what was measured, row by row.
+    pub fn of_readings(&self) -> &[f64] {
+        &self.residual[..self.measured()]
+    }
+
+    /// Residual rows of the readings of a row, by its place in `rows`.
+    pub fn readings_of(&self, place: usize) -> Range<usize> {
+        self.readings.of_row(place)
     }
 
     pub fn residual_rows(&self) -> usize {
@@ -101,8 +134,8 @@ impl<'a> WhitenedProblem<'a> {
     /// The place in `rows` of a residual row.
     pub fn row_of(&self, residual_row: usize) -> usize {
         match &self.currents {
-            Some(currents) if residual_row >= self.points() => (residual_row - self.points()) / currents.joints.len(),
-            _ => residual_row / 3,
+            Some(currents) if residual_row >= self.measured() => (residual_row - self.measured()) / currents.joints.len(),
+            _ => self.readings.row_of[residual_row],
         }
     }
 
@@ -136,18 +169,21 @@ impl<'a> WhitenedProblem<'a> {
         let rows = self.residual_rows();
         let mut out = vec![0.0; count * rows];
         let mut buffer = Deflection::new(self.robot.joints());
-        for (i, (motion, weight)) in self.motions.iter().zip(&self.weights).enumerate() {
-            motion.derivatives(self.robot, self.data, form, &zeros, &mut buffer, |parameter, derivative| {
-                let derivative = weight.apply(&derivative);
-                for axis in 0..3 {
-                    out[parameter * rows + 3 * i + axis] += derivative[axis];
+        for (i, motion) in self.motions.iter().enumerate() {
+            motion.deflect(self.robot, self.data, form, &zeros, &mut buffer);
+            for (first, reading) in self.readings.seen(i) {
+                for (parameter, direction) in &buffer.partials {
+                    let derivative = reading.sensitivity.along(motion, direction);
+                    for (k, line) in reading.lines.iter().enumerate() {
+                        out[parameter * rows + first + k] += derivative[*line];
+                    }
                 }
-            });
+            }
             let Some(currents) = &self.currents else { continue };
             for (parameter, joint, rate) in buffer.loads() {
                 if let Some(k) = currents.joints.iter().position(|usable| *usable == joint) {
                     let row = i * currents.joints.len() + k;
-                    out[parameter * rows + self.points() + row] += rate * self.current_weight / currents.sigma_of(row);
+                    out[parameter * rows + self.measured() + row] += rate * self.current_weight / currents.sigma_of(row);
                 }
             }
         }
@@ -178,15 +214,17 @@ impl<'a> WhitenedProblem<'a> {
         let nuisances = self.currents.as_ref().map_or(0, Currents::nuisances);
         let mut out = Mat::zeros(self.residual_rows(), free.len() + nuisances);
         let mut scratch = model.stack.scratch(&model.robot);
-        for (i, (row, weight)) in self.rows.iter().zip(&self.weights).enumerate() {
-            model.stack.derivatives(&model.robot, self.data, *row, &model.x, &mut scratch, |parameter, derivative| {
-                if let Some(j) = column[parameter] {
-                    let derivative = weight.apply(&derivative);
-                    for axis in 0..3 {
-                        out[(3 * i + axis, j)] += derivative[axis];
+        for (i, row) in self.rows.iter().enumerate() {
+            let mut placed = model.stack.place(&model.robot, self.data, *row, &model.x, &mut scratch);
+            for (first, reading) in self.readings.seen(i) {
+                reading.sensitivity.derivatives(&mut placed, |parameter, derivative| {
+                    if let Some(j) = column[parameter] {
+                        for (k, line) in reading.lines.iter().enumerate() {
+                            out[(first + k, j)] += derivative[*line];
+                        }
                     }
-                }
-            });
+                });
+            }
         }
         for j in 0..free.len() {
             self.innovate(out.col_as_slice_mut(j));
@@ -194,7 +232,7 @@ impl<'a> WhitenedProblem<'a> {
         if let Some(currents) = &self.currents {
             for row in 0..currents.residual_rows() {
                 for k in 0..nuisances {
-                    out[(self.points() + row, free.len() + k)] = currents.nuisance(row, k) * self.current_weight;
+                    out[(self.measured() + row, free.len() + k)] = currents.nuisance(row, k) * self.current_weight;
                 }
             }
         }
@@ -217,7 +255,7 @@ impl<'a> WhitenedProblem<'a> {
         let rows = self.residual_rows();
         let all: Vec<f64> = forms.iter().flat_map(|form| self.columns(form)).collect();
         let columns: Vec<Vec<f64>> =
-            all.chunks(rows).map(|c| c[self.points()..].iter().map(|value| value / self.current_weight).collect()).collect();
+            all.chunks(rows).map(|c| c[self.measured()..].iter().map(|value| value / self.current_weight).collect()).collect();
         // The residual is that of the present model; what is asked is the whole parameter, hence at zero where it is new.
         currents.priors(&columns, &self.present(forms)).unwrap_or_default()
     }

@@ -14,8 +14,8 @@ use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatabilit
 use crate::diagnose::verdict_statement::statement;
 use crate::effect::Unknown;
 use crate::estimate::{Model, cross_validate};
+use crate::observation::Dimension;
 use crate::robot::NoiseBasis;
-use nalgebra::Vector3;
 
 /// Without repeats a residual is not called noise where it is this many times the instrument's.
 const NOT_NOISE: f64 = 4.0;
@@ -25,13 +25,12 @@ const REST: f64 = 0.03;
 /// A criterion that is worse by more than this without it makes it a finding all the same.
 const WEAK: f64 = 60.0;
 
-/// Draws the conclusions of the last round; `before` is what the base model predicts.
-pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]) -> Diagnosis {
+/// Draws the conclusions of the last round; `before` is what the base model leaves of every row.
+pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>]) -> Diagnosis {
     let (data, state) = (&fitter.data, &last.judged.state);
     // What is predicted outside of the fitted rows is what everyone is told, and what programs are corrected with.
     let model = state.model.held_within(data, &state.screening.kept);
-    let predicted = model.predict(data);
-    let misfit = Misfit::of(fitter.question, data, &state.screening, &predicted, state.fitted.singular.len());
+    let misfit = Misfit::of(fitter.question, data, &state.screening, &model, state.fitted.singular.len());
     let (rest, findings) = without_small_rests(findings(&last));
     let basis = basis(fitter);
     // Repeats know the noise: what poses leave beyond it is no noise, even without structure.
@@ -58,15 +57,18 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Vector3<f64>]
     let search = FormulaSearch { state: &last.judged.state, set: &last.judged.set, pool: last.pool, survey: last.survey, fitter };
     let formulas = search.of_all(&findings);
     let state = last.judged.state;
-    let folds = cross_validate(&state.session(fitter), FOLDS, fitter.question.seed);
+    // The folds' errors are told as lengths.
+    let lengths = misfit.dimension == Dimension::Length;
+    let folds = if lengths { cross_validate(&state.session(fitter), FOLDS, fitter.question.seed) } else { None };
     let ground = misfit.ground(data, basis, fitter.repeatability.repeats, nameless);
     Diagnosis {
+        dimension: misfit.dimension,
         statement: statement(verdict, &ground),
         noise_basis: basis,
         verdict,
         noise_floor: misfit.noise(basis),
-        before: ErrorLengths::of(data, before, &misfit.figures),
-        after: ErrorLengths::of(data, &predicted, &misfit.figures),
+        before: ErrorLengths::of(before, &misfit.figures),
+        after: ErrorLengths::of(&misfit.sizes, &misfit.figures),
         held_out: misfit.held_out,
         folds,
         next_measurements: next(&findings, fitter.question.own),

@@ -6,16 +6,17 @@ use super::holder::HolderTurn;
 use super::last_round::LastRound;
 use super::rivals::{FIRM, exact, rivals};
 use super::probability::weigh;
-use super::statement::{left_out, none_of_the_list, not_so, sentence};
+use super::statement::{left_out, none_of_the_list, not_so, sentence, small};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::{CachedHypotheses, HypothesisSet, Solution};
 use crate::diagnose::round::FitState;
 use crate::diagnose::types::{Evidence, Finding, Probabilities, RivalCause};
 use crate::effect::{
-    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, figure, follows, people,
+    Basis, Clock, Effect, Form, Hypothesis, ParameterEstimate, Place, Summary, Unknown, Variable, follows, people,
 };
-use crate::estimate::{ParameterStatus, tail};
+use crate::estimate::{ErrorScale, ParameterStatus, tail};
+use crate::observation::Dimension;
 
 /// The causes of the last round as findings, strongest first.
 pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
@@ -85,7 +86,8 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let turn = HolderTurn::of(state, last.survey.data, &forms).filter(|turn| !last.excludes(turn.rival(effect).effect));
     let other = turn.as_ref().map(|turn| turn.rival(effect));
     rivals.extend(other.filter(|other| !rivals.iter().any(|rival| (rival.effect, rival.place) == (other.effect, other.place))));
-    let effect_rms = size(pool, members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
+    let scale = last.scale;
+    let effect_rms = size((pool, scale), members.iter().map(|i| (last.judged.set[*i], &state.model.x[state.ranges[*i].clone()])));
     let without = pool.solve(&rest);
     let gain = whole.solution.gain - without.gain;
     let rank = whole.solution.rank.saturating_sub(without.rank).max(1);
@@ -104,18 +106,19 @@ fn finding(last: &LastRound, whole: &Whole, (effect, place): FindingKey, members
     let clock = Clock::of(last.survey.data);
     let summary = Summary { place, forms: &forms, parameters: &parameters, clock };
     let varies = varying(&own, pool, whole, gain, clock);
-    let impossible = impossible(last, members, effect).or_else(|| more_than_it_does(effect, &evidence));
+    let impossible = impossible(last, members, effect).or_else(|| more_than_it_does(effect, &evidence, scale.dimension()));
     if let (None, Some((_, loss))) = (&impossible, &varies) {
         rivals.push(RivalCause { effect, place, delta_bic: *loss, probability: 0.0 });
     }
     rivals.retain(|rival| !last.excludes(rival.effect));
     rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic).then(a.effect.cmp(b.effect)));
     let why = impossible.or_else(|| varies.map(|(why, _)| why));
+    let rms = small(effect_rms, scale.dimension());
     let (effect, statement) = match (why, turn) {
-        _ if last.excludes(effect) => (Unknown::NAME, left_out(&summary, effect_rms)),
-        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, effect_rms)),
-        (None, Some(turn)) => (effect, turn.sentence(clock, effect_rms)),
-        (None, None) => (effect, sentence(effect, &summary, effect_rms)),
+        _ if last.excludes(effect) => (Unknown::NAME, left_out(&summary, &rms)),
+        (Some(why), _) => (Unknown::NAME, not_so(effect, &summary, &why, &rms)),
+        (None, Some(turn)) => (effect, turn.sentence(clock, &rms)),
+        (None, None) => (effect, sentence(effect, &summary, &rms)),
     };
     // What has lost its name is no rival of itself.
     rivals.retain(|rival| (rival.effect, rival.place) != (effect, place));
@@ -170,10 +173,10 @@ fn impossible(last: &LastRound, members: &[usize], effect: &str) -> Option<Strin
 const ASTRAY: f64 = 2.0;
 
 /// Why what the folds say is nothing of a cause: its absence costs more than all that it does.
-fn more_than_it_does(effect: &str, evidence: &Evidence) -> Option<String> {
+fn more_than_it_does(effect: &str, evidence: &Evidence, of: Dimension) -> Option<String> {
     let gain = evidence.heldout_gain.filter(|gain| effect != Unknown::NAME && *gain > ASTRAY * evidence.effect_rms)?;
-    let [gain, all] = [gain, evidence.effect_rms].map(|length| figure(1e6 * length, 0));
-    Some(format!("other poses would gain {gain} um by it, which is more than all that it does, {all} um rms"))
+    let [gain, all] = [gain, evidence.effect_rms].map(|size| small(size, of));
+    Some(format!("other poses would gain {gain} by it, which is more than all that it does, {all} rms"))
 }
 
 /// The other causes of a set that make sense alone: a product only beside the law that it is made of, the torque model only beside a
@@ -239,9 +242,9 @@ fn heldout_gain(forms: &[Form], place: Place, gains: &[FoldGain]) -> Option<f64>
     own.filter(|_| forms.iter().all(|form| form.name() == name)).map(|own| own.gain)
 }
 
-/// Rms length (m) of the whole effect over the fitted rows, the absorbed part included, of hypotheses with their fitted coefficients.
-fn size<'a>(pool: &HypothesisSet, own: impl Iterator<Item = (usize, &'a [f64])>) -> f64 {
-    // In standard deviations of the rows; the mean noise turns it into a length.
+/// Rms size (m or rad) of the whole effect over the fitted rows, the absorbed part included, of hypotheses with their fitted coefficients.
+fn size<'a>((pool, scale): (&HypothesisSet, ErrorScale), own: impl Iterator<Item = (usize, &'a [f64])>) -> f64 {
+    // In standard deviations of the rows; the mean noise turns it into a size.
     let mut sum = vec![0.0; pool.residual_rows];
     for (k, coefficients) in own {
         let columns = pool.problem.motions_by(&pool.hypotheses[k].form);
@@ -251,8 +254,9 @@ fn size<'a>(pool: &HypothesisSet, own: impl Iterator<Item = (usize, &'a [f64])>)
     }
     let rows = &pool.problem.rows;
     let squares = rows.iter().enumerate().map(|(i, row)| {
-        let whitened: f64 = (0..3).map(|axis| sum[3 * i + axis].powi(2)).sum();
-        whitened * pool.problem.data.noise(*row).powi(2) / 3.0
+        let lines = pool.problem.readings_of(i);
+        let (values, whitened) = (lines.len().max(1) as f64, lines.map(|line| sum[line].powi(2)).sum::<f64>());
+        whitened * scale.noise(pool.problem.data, *row).powi(2) / values
     });
     (squares.sum::<f64>() / rows.len().max(1) as f64).sqrt()
 }
@@ -264,10 +268,10 @@ mod tests {
     #[test]
     fn what_gains_more_than_all_that_it_does_is_not_what_it_is_called() {
         let evidence = |gain| Evidence { heldout_gain: gain, effect_rms: 220e-6, ..Evidence::default() };
-        let said = more_than_it_does("gear_cyclic", &evidence(Some(8.3e-3))).expect("more");
+        let said = more_than_it_does("gear_cyclic", &evidence(Some(8.3e-3)), Dimension::Length).expect("more");
         assert_eq!(said, "other poses would gain 8300 um by it, which is more than all that it does, 220 um rms");
-        assert_eq!(more_than_it_does("gear_cyclic", &evidence(Some(430e-6))), None);
-        assert_eq!(more_than_it_does("gear_cyclic", &evidence(None)), None);
-        assert_eq!(more_than_it_does(Unknown::NAME, &evidence(Some(8.3e-3))), None);
+        assert_eq!(more_than_it_does("gear_cyclic", &evidence(Some(430e-6)), Dimension::Length), None);
+        assert_eq!(more_than_it_does("gear_cyclic", &evidence(None), Dimension::Length), None);
+        assert_eq!(more_than_it_does(Unknown::NAME, &evidence(Some(8.3e-3)), Dimension::Length), None);
     }
 }

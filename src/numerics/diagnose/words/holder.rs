@@ -52,14 +52,13 @@ impl HolderTurn {
         constant.then_some(Self { angle, at: first, joint: joints - 1 })
     }
 
-    pub fn sentence(&self, clock: Clock, rms: f64) -> String {
+    pub fn sentence(&self, clock: Clock, rms: &str) -> String {
         let joint = Place::Joint(self.joint);
         format!(
             "the holder has turned by {} deg about the flange{}, its target at constant radius; a step in the zero of {joint} would look the \
-             same ({} um rms at the tool).",
+             same ({rms} rms at the tool).",
             figure(self.angle.to_degrees().abs(), 2),
-            clock.since(self.at),
-            figure(rms * 1e6, 0)
+            clock.since(self.at)
         )
     }
 

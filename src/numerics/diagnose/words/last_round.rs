@@ -6,6 +6,7 @@ use crate::diagnose::open_world::NameOdds;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::types::Located;
 use crate::effect::{Effect, Survey};
+use crate::estimate::ErrorScale;
 use std::collections::BTreeMap;
 
 /// The last round, judged.
@@ -15,6 +16,8 @@ pub(crate) struct LastRound<'a, 'b> {
     pub judged: JudgedCauses,
     /// Of every finding, that it is none of the list.
     pub odds: BTreeMap<FindingKey, NameOdds>,
+    /// What errors of rows are compared and told in.
+    pub scale: ErrorScale,
     /// Names of causes that are not to be given.
     pub without: &'b [String],
     /// The gate's probability at the start and at the end.

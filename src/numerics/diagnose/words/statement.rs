@@ -2,22 +2,24 @@
 
 use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
-use crate::effect::{Place, Cause, Clock, DeclaredCause, DeclaredForm, Measure, Summary, Survey, cause, figure};
+use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Place, Summary, Survey, cause, figure};
+use crate::observation::Dimension;
 
-/// The sentence of a finding; `rms` is the size of the whole effect at the measured points, m.
-pub(super) fn sentence(effect: &str, summary: &Summary, rms: f64) -> String {
+/// A size in the small unit of its dimension, e.g. `31 um`.
+pub(super) fn small(size: f64, of: Dimension) -> String {
+    format!("{} {}", figure(of.small().from_si(size), 0), of.small().symbol())
+}
+
+/// The sentence of a finding; `rms` is the size of the whole effect in what was measured.
+pub(super) fn sentence(effect: &str, summary: &Summary, rms: &str) -> String {
     let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
-    format!("{text} ({} um rms at the tool).", figure(rms * 1e6, 0))
+    format!("{text} ({rms} rms at the tool).")
 }
 
 /// The sentence of a finding whose numbers no such effect can have.
-pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: f64) -> String {
+pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> String {
     let text = summary.cause(effect).map_or_else(String::new, |cause| cause.sentence(summary));
-    format!(
-        "something unknown acts at {}: {effect} fits best ({text}), but {why} ({} um rms at the tool).",
-        summary.place,
-        figure(rms * 1e6, 0)
-    )
+    format!("something unknown acts at {}: {effect} fits best ({text}), but {why} ({rms} rms at the tool).", summary.place)
 }
 
 /// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
@@ -27,7 +29,7 @@ pub(super) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f6
 }
 
 /// The sentence of a finding whose name the user has excluded.
-pub(super) fn left_out(summary: &Summary, rms: f64) -> String {
+pub(super) fn left_out(summary: &Summary, rms: &str) -> String {
     let mut by: Vec<String> = Vec::new();
     for variable in summary.forms.iter().flat_map(|form| form.variables()) {
         let name = summary.clock.named(variable);
@@ -37,9 +39,8 @@ pub(super) fn left_out(summary: &Summary, rms: f64) -> String {
     }
     let by = if by.is_empty() { String::new() } else { format!(" and depends on {}", by.join(" and ")) };
     format!(
-        "something unknown acts at {}{by}; the name that it would have is left out by `without` ({} um rms at the tool).",
-        summary.place,
-        figure(rms * 1e6, 0)
+        "something unknown acts at {}{by}; the name that it would have is left out by `without` ({rms} rms at the tool).",
+        summary.place
     )
 }
 

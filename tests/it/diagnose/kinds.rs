@@ -1,0 +1,230 @@
+//! Causes are named from whatever was measured: a level's inclinations, distances from anchors, points beside distances. The twin conceals them.
+
+use super::Named;
+use crate::identify::normal;
+use crate::twin::sr210d;
+use calib::description::RobotDescription;
+use calib::diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
+use calib::estimate::gauge;
+use calib::observation::Dimension;
+use calib::robot::{Measurements, Named as Names, NoiseBasis, Readings, RobotModel};
+use calib::twin::effect::{Backlash, GearCyclic, JointCompliance, Physical};
+use calib::twin::given::GivenPose;
+use calib::twin::plan::{Block, Climate, Poses};
+use calib::twin::recorder::{Experiment, Motors, Shot};
+use calib::twin::tracker::Tracker;
+use calib::twin::truth::{LinkError, TrueRobot};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// rad
+const SIGMA_TILT: f64 = 1.5e-5;
+/// m
+const SIGMA_WIRE: f64 = 1.5e-5;
+const SIGMA_POINT: f64 = 4e-5;
+/// m: how far points stand apart that show how the last body is turned.
+const APART: f64 = 0.5;
+
+fn gear(joint: usize, order: f64, amplitude_arcsec: f64, phase_deg: f64) -> Physical {
+    Physical::GearCyclic(GearCyclic { joint, order, amplitude_arcsec, arcsec_per_nm: 0.0, phase_deg })
+}
+
+fn spring(joint: usize, rad_per_nm: f64) -> Physical {
+    Physical::JointCompliance(JointCompliance { joint, rad_per_nm })
+}
+
+fn play(joint: usize, gap_arcsec: f64) -> Physical {
+    Physical::Backlash(Backlash { joint, gap_arcsec, arcsec_per_nm: 0.0, closing_nm: 0.0, soft_nm: 0.0 })
+}
+
+fn named(causes: &[(&str, &str)]) -> Named {
+    causes.iter().map(|(effect, place)| ((*effect).into(), (*place).into())).collect()
+}
+
+/// What the twin's arm did, without noise.
+struct Recorded {
+    robot: RobotDescription,
+    /// Rows without anything measured.
+    rows: Measurements,
+    /// m, tracker frame.
+    point: Vec<Vector3<f64>>,
+    /// Of the last body.
+    turn: Vec<Matrix3<f64>>,
+}
+
+/// Poses under two payloads, with the arm off nominal as it is made.
+fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]]) -> Recorded {
+    let robot = sr210d();
+    let joints = robot.joints.len();
+    let link = |link: usize| LinkError {
+        link,
+        shift_mm: [0, 1, 2].map(|axis| 0.3 * normal(71 * link + axis)),
+        tilt_arcsec: [0, 1, 2].map(|axis| if link == joints { 0.0 } else { 60.0 * normal(71 * link + 3 + axis) }),
+    };
+    let truth = TrueRobot {
+        links: (1..=joints).map(link).collect(),
+        offset_deg: (0..joints).map(|joint| 0.02 * normal(977 + joint)).collect(),
+        ..TrueRobot::default()
+    };
+    let seen = |robot: &RobotDescription, blocks: &[Block]| -> Vec<Shot> {
+        let (tracker, motors, climate) =
+            (Tracker { noise_um: 0.0, noise_um_per_m: 0.0, ..Tracker::default() }, Motors::default(), Climate::default());
+        let poses = Poses { range_deg: range_deg.to_vec(), ..Poses::default() };
+        let experiment = Experiment {
+            robot,
+            truth: &truth,
+            effects,
+            tracker: &tracker,
+            motors: &motors,
+            repeatability_arcsec: &[],
+            poses: &poses,
+            blocks,
+            climate: &climate,
+            seed: 11,
+        };
+        experiment.record(|| ()).expect("poses")
+    };
+    let drawn = [0.0, 120.0].map(|payload_kg| Block { points: points / 2, payload_kg, ..Block::default() });
+    let shots = seen(&robot, &drawn);
+    let given = |shot: &Shot| GivenPose {
+        joints_deg: shot.q.iter().map(|q| q.to_degrees()).collect(),
+        direction: Vec::new(),
+        payload_kg: None,
+    };
+    let again: Vec<Block> = drawn
+        .iter()
+        .enumerate()
+        .map(|(block, drawn)| Block {
+            points: 0,
+            given: shots.iter().filter(|shot| shot.block == block).map(given).collect(),
+            ..drawn.clone()
+        })
+        .collect();
+    let [own, x, y, z] = [None, Some(0), Some(1), Some(2)].map(|axis: Option<usize>| {
+        let mut moved = robot.clone();
+        axis.iter().for_each(|axis| moved.tool[*axis] += APART);
+        seen(&moved, &again)
+    });
+    let at = |shots: &[Shot], row: usize| Vector3::from(shots[row].position);
+    let turn = |row: usize| Matrix3::from_columns(&[&x, &y, &z].map(|moved| (at(moved, row) - at(&own, row)) / APART));
+    let rows = own.len();
+    Recorded {
+        rows: Measurements {
+            joints,
+            q: own.iter().flat_map(|shot| shot.q.clone()).collect(),
+            position: vec![Vector3::zeros(); rows],
+            sigma: vec![Vector3::repeat(f64::INFINITY); rows],
+            payload: own.iter().map(|shot| shot.payload_kg).collect(),
+            time: Some(own.iter().map(|shot| shot.time_s).collect()),
+            direction: Some(own.iter().flat_map(|shot| shot.direction.clone()).collect()),
+            noise_basis: NoiseBasis::Instrument,
+            ..Measurements::default()
+        },
+        point: (0..rows).map(|row| at(&own, row)).collect(),
+        turn: (0..rows).map(turn).collect(),
+        robot,
+    }
+}
+
+impl Recorded {
+    /// Adds what a level on the tool reads where it stands upright.
+    fn with_a_level(self) -> Self {
+        let tilt = |turn: &Matrix3<f64>, row: usize, axis: usize| {
+            if turn[(2, 2)] > 0.3 { turn[(2, axis)].asin() + SIGMA_TILT * normal(2 * row + axis) } else { f64::NAN }
+        };
+        let values = self.turn.iter().enumerate().flat_map(|(row, turn)| [0, 1].map(|axis| tilt(turn, row, axis)));
+        let (values, sigma) = (values.collect(), vec![SIGMA_TILT; self.point.len()]);
+        self.read(Readings { kind: "inclination", width: 2, values, sigma, anchor: None })
+    }
+
+    /// Adds distances from four draw-wires in turn.
+    fn with_wires(self) -> Self {
+        let anchors: Vec<Vector3<f64>> =
+            [[3.0, 1.0, 0.0], [5.5, -2.5, 0.1], [3.0, -3.0, 2.0], [6.0, 0.5, 2.5]].map(Vector3::from).to_vec();
+        let names = ["A", "B", "C", "D"];
+        let rows = 0..self.point.len();
+        let length = |row: usize| (self.point[row] - anchors[row % 4]).norm() + SIGMA_WIRE * normal(50_000 + row);
+        let readings = Readings {
+            kind: "distance",
+            width: 1,
+            values: rows.clone().map(length).collect(),
+            sigma: vec![SIGMA_WIRE; rows.len()],
+            anchor: Some(Names::of(rows.map(|row| names[row % 4]))),
+        };
+        self.read(readings)
+    }
+
+    /// Adds points of every other row, by a coarse tracker.
+    fn with_some_points(mut self) -> Self {
+        for row in (0..self.point.len()).step_by(2) {
+            self.rows.position[row] = self.point[row] + Vector3::from_fn(|axis, _| SIGMA_POINT * normal(90_000 + 3 * row + axis));
+            self.rows.sigma[row] = Vector3::repeat(SIGMA_POINT);
+        }
+        self
+    }
+
+    fn read(mut self, readings: Readings) -> Self {
+        self.rows.readings.push(readings);
+        self
+    }
+
+    /// Diagnosed on four of five measured rows; what is said, and whether a wrong set-up is.
+    fn diagnosed(&self) -> Diagnosis {
+        let data = &self.rows;
+        let measured: Vec<usize> = (0..data.rows()).filter(|row| calib::observation::values(data, *row) > 0).collect();
+        let (validate, fit): (Vec<usize>, Vec<usize>) = measured.iter().partition(|row| *row % 5 == 4);
+        let (robot, _) = gauge(RobotModel::new(self.robot.clone()), data, &fit, &BTreeMap::new()).expect("anchors");
+        let question = Question {
+            robot: &robot,
+            data,
+            fit: &fit,
+            validate: &validate,
+            set: &vec![0; data.rows()],
+            prior_weight: 1.0,
+            without: &[],
+            own: &[],
+            beside_simulation: false,
+            seed: 7,
+        };
+        assert!(wrong_setup(&question).is_none());
+        diagnose(&question, |_| ())
+    }
+}
+
+/// Names and places found are those concealed, and what is left is noise.
+fn explains(said: &Diagnosis, concealed: &Named) {
+    let found: Named = said.findings.iter().map(|finding| (finding.effect.to_string(), finding.place.to_string())).collect();
+    assert_eq!(&found, concealed, "{}: {:#?}", said.statement, said.findings.iter().map(|f| &f.statement).collect::<Vec<_>>());
+    assert_eq!(said.verdict, VerdictKind::Explained, "{}", said.statement);
+    let (before, after) = (said.before.expect("rows").rms, said.after.expect("rows").rms);
+    assert!(
+        after < 0.5 * before && (0.7..1.3).contains(&(after / said.noise_floor)),
+        "{before:e} {after:e} {:e}",
+        said.noise_floor
+    );
+}
+
+#[test]
+fn causes_are_named_from_inclinations_alone() {
+    let upright = [[-90.0, 90.0], [-60.0, 40.0], [-50.0, 60.0], [-90.0, 90.0], [-90.0, 90.0], [-120.0, 120.0]];
+    let concealed = [gear(2, 3.0, 60.0, 25.0), spring(3, 2.5e-7), play(5, 70.0)];
+    let said = recorded(&concealed, 700, &upright).with_a_level().diagnosed();
+    explains(&said, &named(&[("gear_cyclic", "joint 2"), ("joint_compliance", "joint 3"), ("backlash", "joint 5")]));
+    assert_eq!(said.dimension, Dimension::Angle);
+    assert!(said.statement.contains("arcsec") && !said.statement.contains(" um"), "{}", said.statement);
+}
+
+#[test]
+fn causes_are_named_from_distances_alone() {
+    let concealed = [gear(1, 2.0, 40.0, 70.0), spring(2, 2e-7), play(3, 60.0)];
+    let said = recorded(&concealed, 480, &[]).with_wires().diagnosed();
+    explains(&said, &named(&[("gear_cyclic", "joint 1"), ("joint_compliance", "joint 2"), ("backlash", "joint 3")]));
+    assert_eq!(said.dimension, Dimension::Length);
+}
+
+#[test]
+fn causes_are_named_from_points_and_distances() {
+    let concealed = [gear(4, 2.0, 60.0, 10.0), spring(2, 2e-7), play(1, 50.0)];
+    let said = recorded(&concealed, 240, &[]).with_wires().with_some_points().diagnosed();
+    explains(&said, &named(&[("gear_cyclic", "joint 4"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
+}
