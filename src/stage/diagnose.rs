@@ -29,6 +29,9 @@ pub struct Diagnose {
     /// By what the penalties of rare causes are multiplied: 0.5 or 2 shows how much a diagnosis rests on them.
     #[serde(default = "as_believed")]
     pub prior_weight: f64,
+    /// Prior probability that what acts somewhere is no cause of the list: 0.1 for an arm like many, 0.5 where little is known of it.
+    #[serde(default = "open_world")]
+    pub open_world: f64,
     /// Causes that are not tried and never named: what a cell cannot have, or what a test of the library leaves out. What looks like one
     /// all the same is `unknown`; of geometry and ratios the numbers of the robot file stay.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -42,12 +45,20 @@ fn as_believed() -> f64 {
     1.0
 }
 
+fn open_world() -> f64 {
+    0.3
+}
+
 fn fit_set() -> Vec<String> {
     vec!["fit".into()]
 }
 
 /// No prior is worth more times its own weight.
 const HEAVIEST: f64 = 10.0;
+
+/// Priors between which evidence still decides.
+const MOST_CLOSED: f64 = 0.001;
+const MOST_OPEN: f64 = 0.999;
 
 /// Fewest rows that place a robot before the tracker; what is missing takes more of them.
 const FEWEST: usize = 3;
@@ -82,7 +93,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 20;
+    const IMPLEMENTATION: u32 = 21;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -90,6 +101,9 @@ impl Stage for Diagnose {
         let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
         if !(0.0..=HEAVIEST).contains(&self.prior_weight) {
             faults.push(Fault::new("prior_weight", format!("expected a number from 0 to {HEAVIEST}")));
+        }
+        if !(MOST_CLOSED..=MOST_OPEN).contains(&self.open_world) {
+            faults.push(Fault::new("open_world", format!("expected a probability from {MOST_CLOSED} to {MOST_OPEN}")));
         }
         let tried = || CAUSES.iter().filter(|cause| !cause.is_nameless()).map(|cause| cause.name());
         for (k, name) in self.without.iter().enumerate().filter(|(_, name)| !tried().any(|other| other == name.as_str())) {
@@ -151,6 +165,7 @@ impl Stage for Diagnose {
             validate: &validate,
             set: &set,
             prior_weight: self.prior_weight,
+            open_world: self.open_world,
             without: &self.without,
             own: &own,
             beside_simulation: corrected == Corrected::OutsideSimulation,

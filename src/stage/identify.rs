@@ -150,6 +150,7 @@ impl Identify {
             validate: &[],
             set: &numbered(&reads.split),
             prior_weight: 1.0,
+            open_world: 0.3,
             without: &[],
             own: &[],
             beside_simulation: reads.recording.simulated.is_some(),

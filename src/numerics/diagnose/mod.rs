@@ -95,7 +95,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let without = question.without;
-        let round = LastRound { pool: search.pool, survey: &survey, judged, odds, scale: fitter.scale, without, first, last, located };
+        let round =
+            LastRound { pool: search.pool, survey: &survey, judged, odds, scale: fitter.scale, without, first, last, located };
         return conclude(round, &fitter, &before);
     }
 }

@@ -19,6 +19,8 @@ pub struct Question<'a> {
     pub set: &'a [usize],
     /// By what the penalties of rare causes (-2 ln of their odds) are multiplied: 1 as the library believes.
     pub prior_weight: f64,
+    /// Prior probability that what acts somewhere is no cause of the list, above 0 and below 1.
+    pub open_world: f64,
     /// Names of causes that are not tried, and not given to what looks like them.
     pub without: &'a [String],
     /// Effects that the user declares: they are tried beside the library's.

@@ -191,12 +191,14 @@ impl Cause for Unknown {
             }
             Motion::Links { .. } => counted.map(|k| (format!("c{k}"), Unit::One, WIDE)).collect(),
             Motion::Slide { along: true, .. } => counted.map(|k| (format!("s{k}"), Unit::Millimetre, WIDE)).collect(),
-            Motion::Slide { .. } => {
-                ["u", "v"].iter().flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Millimetre, WIDE))).collect()
-            }
-            Motion::Bend { .. } => {
-                ["a", "b"].iter().flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Radian, WIDE))).collect()
-            }
+            Motion::Slide { .. } => ["u", "v"]
+                .iter()
+                .flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Millimetre, WIDE)))
+                .collect(),
+            Motion::Bend { .. } => ["a", "b"]
+                .iter()
+                .flat_map(|axis| counted.clone().map(move |k| (format!("{axis}{k}"), Unit::Radian, WIDE)))
+                .collect(),
             motion => {
                 let numbers = counted.flat_map(|k| motion.frame_numbers(move |axis| format!("{axis}{k}")));
                 numbers.map(|(name, unit, _)| (name, unit, WIDE)).collect()

@@ -181,6 +181,7 @@ impl Recorded {
             validate: &validate,
             set: &vec![0; data.rows()],
             prior_weight: 1.0,
+            open_world: 0.3,
             without: &[],
             own: &[],
             beside_simulation: false,

@@ -28,6 +28,7 @@ fn said(cell: &Cell, mut data: Measurements) -> Diagnosis {
         validate: &[],
         set: &[0; ROWS],
         prior_weight: 1.0,
+        open_world: 0.3,
         without: &[],
         own: &[],
         beside_simulation: false,

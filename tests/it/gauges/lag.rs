@@ -43,6 +43,7 @@ fn said(cell: &Cell, data: &Measurements) -> Diagnosis {
         validate: &[],
         set: &vec![0; all.len()],
         prior_weight: 1.0,
+        open_world: 0.3,
         without: &[],
         own: &[],
         beside_simulation: false,

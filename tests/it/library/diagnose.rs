@@ -12,6 +12,7 @@ pub fn missing_physics(robot: &RobotModel, data: &Measurements) -> Diagnosis {
         validate: &validate,
         set: &set,
         prior_weight: 1.0,
+        open_world: 0.3,
         without: &[],
         own: &[],
         beside_simulation: false,

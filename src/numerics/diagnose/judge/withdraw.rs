@@ -197,6 +197,7 @@ joints: [{name: A1}, {name: A2}, {name: A3}, {name: A4}, {name: A5}, {name: A6}]
             validate,
             set: &[0; ROWS],
             prior_weight: 1.0,
+            open_world: 0.3,
             without: &[],
             own: &[],
             beside_simulation: false,

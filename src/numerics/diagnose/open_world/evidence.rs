@@ -116,7 +116,8 @@ mod tests {
 
     #[test]
     fn columns_without_a_signal_cost_evidence_and_more_of_them_cost_more() {
-        let none = |count: usize| evidence(&DMatrix::identity(count, count).scale(1e8), &DVector::zeros(count), &vec![1.0; count]).log;
+        let none =
+            |count: usize| evidence(&DMatrix::identity(count, count).scale(1e8), &DVector::zeros(count), &vec![1.0; count]).log;
         assert!(none(1) < 0.0 && none(8) < none(2) && none(2) < none(1));
     }
 }

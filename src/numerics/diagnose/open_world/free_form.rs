@@ -104,8 +104,7 @@ impl PlaceGroups {
 
     /// The best group alone, and the evidence of them all as alternatives.
     pub fn first(&self, state: &State) -> f64 {
-        let logs: Vec<f64> =
-            self.scan(state).iter().enumerate().map(|(g, (found, _))| found.log - self.price(g)).collect();
+        let logs: Vec<f64> = self.scan(state).iter().enumerate().map(|(g, (found, _))| found.log - self.price(g)).collect();
         if logs.is_empty() { f64::NEG_INFINITY } else { super::evidence::log_sum(&logs) }
     }
 

@@ -154,7 +154,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             }
             if steps(motion) {
                 let all: Vec<f64> = survey.changes(STEPS).collect();
-                let step = |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
+                let step =
+                    |at: &f64| FreeGroup { motion, law: Law::new(Variable::Time, Basis::After { at: *at }), of: all.len() };
                 out.extend(all.iter().map(step));
             }
         }
@@ -199,9 +200,7 @@ fn length(survey: &Survey, link: usize) -> f64 {
 /// The motions of a place, and what each may follow with how many cosines.
 fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>)> {
     let joints = survey.joints();
-    let angles = |own: usize| {
-        (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { FINE } else { COARSE }))
-    };
+    let angles = |own: usize| (0..joints).map(move |joint| (Variable::Angle { joint }, if joint == own { FINE } else { COARSE }));
     let passing = || [(Variable::Time, FINE), (Variable::Temperature, COARSE), (Variable::Payload, COARSE)].into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, COARSE));
@@ -219,8 +218,7 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
             out
         }
         Place::Links(link, _) => {
-            let own: Vec<_> =
-                angles(joints).chain(passing()).chain(sides()).chain(load(link)).chain(load(link + 1)).collect();
+            let own: Vec<_> = angles(joints).chain(passing()).chain(sides()).chain(load(link)).chain(load(link + 1)).collect();
             vec![(Motion::Links { first: link, last: link }, own.clone()), (Motion::Bend { link }, own)]
         }
         Place::Tracker => {

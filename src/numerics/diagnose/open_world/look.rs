@@ -90,7 +90,12 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
     }
 
     fn case(&self) -> Case<'_, 'l, 'v, 'a> {
-        Case { around: &self.around, pool: self.pool, judged: self.sight.judged }
+        Case {
+            around: &self.around,
+            pool: self.pool,
+            judged: self.sight.judged,
+            open_world: self.sight.fitter.question.open_world,
+        }
     }
 
     fn change<'c>(&'c self, without: &'c [usize], worse: f64) -> Change<'c, 'a> {
@@ -141,8 +146,7 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
     /// The odds of every finding.
     pub fn contested(&self) -> BTreeMap<FindingKey, Contested> {
         let blocks = &self.sight.blocks;
-        let size =
-            |i: usize, of: usize| 1.0 / (of as f64 * blocks[i].square.iter().sum::<f64>()).max(f64::MIN_POSITIVE);
+        let size = |i: usize, of: usize| 1.0 / (of as f64 * blocks[i].square.iter().sum::<f64>()).max(f64::MIN_POSITIVE);
         let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| {
             let own = members.iter().flat_map(|i| self.sight.ranges[*i].clone().map(|k| (k, size(*i, members.len()))));
             Named { key: *key, members: members.clone(), own: own.collect() }

@@ -11,8 +11,6 @@ use crate::diagnose::words::FindingKey;
 use crate::effect::{Effect, Place, Unknown};
 use rayon::prelude::*;
 
-/// Prior of a cause that is in no list.
-const OPEN: f64 = 0.3;
 /// Prior odds that nothing is there.
 const NOTHING: f64 = 0.5;
 /// Rivals whose evidence is asked.
@@ -97,6 +95,8 @@ pub(super) struct Case<'c, 'f, 'a, 'p> {
     pub around: &'c Surroundings<'f, 'a>,
     pub pool: &'c CachedHypotheses<'p>,
     pub judged: &'c JudgedCauses,
+    /// Prior probability of a cause that is in no list.
+    pub open_world: f64,
 }
 
 impl Case<'_, '_, '_, '_> {
@@ -138,7 +138,8 @@ impl Case<'_, '_, '_, '_> {
             free.push((place, open + mine + form.log));
         }
         let logs = |of: &[(Place, f64)]| log_sum(&of.iter().map(|(_, log)| *log).collect::<Vec<_>>());
-        let here = |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
+        let here =
+            |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
         let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
         let odds = NameOdds {
             none: (logs(&free) - all).exp(),
@@ -166,7 +167,7 @@ impl Case<'_, '_, '_, '_> {
 
     /// ln of the prior odds of a free form at a place, and of a law of the list by its price, over each other's share.
     pub fn priors(&self, places: usize) -> [f64; 2] {
-        [OPEN.ln() - (places.max(1) as f64).ln(), (1.0 - OPEN).ln() - self.all_prices()]
+        [self.open_world.ln() - (places.max(1) as f64).ln(), (1.0 - self.open_world).ln() - self.all_prices()]
     }
 
     /// ln of the sum of the prior odds of all laws of the list.

@@ -71,7 +71,8 @@ impl State {
 
     /// ln of the evidence over that of noise alone.
     pub fn log(&self) -> f64 {
-        let determinant = self.factor.as_ref().map_or(0.0, |factor| factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum());
+        let determinant =
+            self.factor.as_ref().map_or(0.0, |factor| factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum());
         0.5 * self.gain() - determinant
     }
 

@@ -128,7 +128,12 @@ const NAMELESS: f64 = 0.1;
 /// The share of findings without a name in what all findings gain.
 fn nameless_share(findings: &[Finding]) -> f64 {
     let gains = |of: &dyn Fn(&Finding) -> bool| -> f64 {
-        findings.iter().filter(|finding| finding.is_physics() && of(finding)).filter_map(|finding| finding.evidence).map(|e| e.gain).sum()
+        findings
+            .iter()
+            .filter(|finding| finding.is_physics() && of(finding))
+            .filter_map(|finding| finding.evidence)
+            .map(|e| e.gain)
+            .sum()
     };
     gains(&|finding| finding.effect == Unknown::NAME) / gains(&|_| true).max(f64::MIN_POSITIVE)
 }

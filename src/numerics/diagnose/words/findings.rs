@@ -4,8 +4,8 @@ use super::faults::{faults, rows_apart};
 use super::groups::{FindingKey, REFINEMENT, groups};
 use super::holder::HolderTurn;
 use super::last_round::LastRound;
+use super::probability::{weigh, weigh_fault};
 use super::rivals::{FIRM, exact, rivals};
-use super::probability::weigh;
 use super::statement::{left_out, none_of_the_list, not_so, sentence, small};
 use crate::diagnose::judge::FoldGain;
 use crate::diagnose::open_world::NameOdds;
@@ -22,15 +22,19 @@ use crate::observation::Dimension;
 pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let state = &last.judged.state;
     if let Some(offset) = state.screening.apart {
-        return vec![rows_apart(offset, last)];
+        let mut apart = rows_apart(offset, last);
+        weigh_fault(&mut apart);
+        return vec![apart];
     }
     let set = last.set();
     let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
     let groups = groups(state, &last.judged.set, last.pool, last.survey);
     let judged = |(key, members): (FindingKey, Vec<usize>)| {
-        let (mut own, odds) = (finding(last, &whole, key, &members), last.odds.get(&key));
-        weigh(&mut own, odds);
-        odds.into_iter().for_each(|odds| unnamed(&mut own, odds));
+        let mut own = finding(last, &whole, key, &members);
+        if let Some(odds) = last.odds.get(&key) {
+            weigh(&mut own, odds);
+            unnamed(&mut own, odds);
+        }
         own
     };
     let mut out: Vec<Finding> = groups.into_iter().map(judged).collect();
@@ -43,7 +47,7 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     // Nobody knows from where the arm came to the first row.
     let unknown = state.causes.iter().any(|cause| by_the_way_there(&cause.form)).then_some(0);
     let mut faults = faults(last, unknown);
-    faults.iter_mut().for_each(|fault| weigh(fault, None));
+    faults.iter_mut().for_each(weigh_fault);
     out.extend(faults);
     let strength = |finding: &Finding| finding.evidence.map_or(0.0, |evidence| evidence.gain);
     out.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
