@@ -4,6 +4,7 @@
 
 mod autocorrelated;
 mod currents;
+mod travel;
 
 use crate::effect::{Deflection, Effect, Form, PointMotion};
 use crate::estimate::{Model, Prior, Weight};
@@ -14,6 +15,7 @@ use currents::Currents;
 use faer::Mat;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Fitted rows through the present model.
 pub(crate) struct WhitenedProblem<'a> {
@@ -29,6 +31,8 @@ pub(crate) struct WhitenedProblem<'a> {
     /// What each row says beyond those before it, where noise is correlated.
     innovations: Option<Innovations>,
     model: &'a Model,
+    /// Columns of a unit travel of each joint.
+    travels: OnceLock<Vec<Vec<f64>>>,
     /// Whitened measured - predicted.
     pub residual: Vec<f64>,
 }
@@ -60,6 +64,7 @@ impl<'a> WhitenedProblem<'a> {
             current_weight,
             innovations: None,
             model,
+            travels: OnceLock::new(),
         }
     }
 
@@ -131,6 +136,14 @@ impl<'a> WhitenedProblem<'a> {
 
     /// The same whether noise is correlated or not: whitened motions of the points per unit of each parameter.
     pub fn motions_by(&self, form: &Form) -> Vec<f64> {
+        match self.travel(form) {
+            Some((joint, values)) => self.travelled(joint, &values),
+            None => self.motions_by_partials(form),
+        }
+    }
+
+    /// Of any form, from its own partial derivatives.
+    fn motions_by_partials(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];
         let rows = self.residual_rows();
