@@ -2,7 +2,7 @@
 //! quantity that reveals it. A joint's effect is shown as an angle about the joint (residual along its motion over its lever), all
 //! others as millimetres along their own displacement.
 
-use crate::effect::{Effect, Form, Place, Variable};
+use crate::effect::{Effect, Form, Place, PointMotion, Variable};
 use crate::error::{Error, Result};
 use crate::estimate::Model;
 use crate::robot::{Measurements, RobotModel};
@@ -30,7 +30,7 @@ pub(super) fn curves(
     let sigma = sigmas(parameters);
     let shown: Vec<usize> = (0..data.rows().min(prediction.0.len())).filter(|row| !prediction.0[*row].suspect).collect();
     let whole = model.predict(data);
-    let mut out = Vec::new();
+    let mut traced = Vec::new();
     for finding in &findings.0 {
         let forms = forms(finding)?;
         // A finding's forms are its identity: what it is called need not be any of theirs. A cause of the whole arm has none.
@@ -40,52 +40,35 @@ pub(super) fn curves(
         };
         let own: Vec<usize> =
             model.stack.effects().flat_map(|(effect, range)| range.filter(move |k| is_own(effect, *k))).collect();
-        if own.is_empty() {
-            continue;
+        if !own.is_empty() {
+            traced.push(TracedFinding::of(finding, forms, own, model, data, &whole));
         }
-        let mut without = model.clone();
-        own.iter().for_each(|k| without.x[*k] = 0.0);
-        let bare = without.predict(data);
-        let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
-        let place = forms.first().map_or(specs[own[0]].place, |form| form.place());
-        let joint = match place {
-            Place::Joint(joint) if joint < data.joints => Some(joint),
-            _ => None,
-        };
-        let principal = principal(&shift);
-        let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
-        let mut scratch = model.stack.scratch(&model.robot);
-        for &row in &shown {
-            let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
-            let turn = joint.filter(|j| model.robot.is_revolute(*j));
-            // To the column's unit: rad about the joint, or mm.
-            let (direction, scale) = match turn {
-                Some(joint) if motion.by_joint[joint].norm() > LEVER => {
-                    (motion.by_joint[joint] / motion.by_joint[joint].norm_squared(), 1.0)
-                }
-                Some(_) => continue,
-                None if shift[row].norm() > SMALL * largest => (shift[row].normalize(), 1e3),
-                None => (principal, 1e3),
-            };
+    }
+    // All derivatives of a row come at once: each row is placed once for all findings.
+    let mut rows: Vec<Vec<CurveRow>> = traced.iter().map(|_| Vec::with_capacity(shown.len())).collect();
+    let mut scratch = model.stack.scratch(&model.robot);
+    let mut derivatives = vec![Vector3::zeros(); specs.len()];
+    for &row in &shown {
+        derivatives.fill(Vector3::zeros());
+        model.stack.derivatives(&model.robot, data, row, &model.x, &mut scratch, |k, derivative| derivatives[k] += derivative);
+        let motion = model.stack.point_motion(&model.robot, data, row, &model.x, &mut scratch);
+        let residual = data.position[row] - whole[row];
+        for (finding, out) in traced.iter().zip(&mut rows) {
+            let Some((direction, scale)) = finding.direction(row, &motion, model) else { continue };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;
-            let mut by: BTreeMap<usize, f64> = BTreeMap::new();
-            model.stack.derivatives(&model.robot, data, row, &model.x, &mut scratch, |k, derivative| {
-                if own.contains(&k) {
-                    *by.entry(k).or_default() += along(&derivative);
-                }
-            });
-            let variance: Option<f64> =
-                own.iter().map(|k| Some((sigma.get(specs[*k].name.as_str())? * by.get(k).copied().unwrap_or(0.0)).powi(2))).sum();
-            let residual = data.position[row] - whole[row];
-            let (over, x_unit, x) = abscissa((&forms, joint), data, row, &motion.posture.torque, &model.robot);
-            let fitted = along(&shift[row]);
+            let variance: Option<f64> = (finding.own.iter())
+                .map(|k| Some((sigma.get(specs[*k].name.as_str())? * along(&derivatives[*k])).powi(2)))
+                .sum();
+            let (over, x_unit, x) =
+                abscissa((&finding.forms, finding.joint), data, row, &motion.posture.torque, &model.robot);
+            let fitted = along(&finding.shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,
                 sequence: recording.sequence[row],
                 over,
                 x_unit: x_unit.map_or(ROW, Unit::symbol).into(),
                 x: x_unit.map_or(x, |unit| unit.from_si(x)),
-                unit: if turn.is_some() { "rad".into() } else { "mm".into() },
+                unit: if finding.turns(model) { "rad".into() } else { "mm".into() },
                 without: along(&residual) + fitted,
                 with: along(&residual),
                 fitted,
@@ -94,7 +77,63 @@ pub(super) fn curves(
             });
         }
     }
-    Ok(Curves(out))
+    Ok(Curves(rows.into_iter().flatten().collect()))
+}
+
+/// A finding that the model has, and what it does to every row.
+struct TracedFinding {
+    rank: i64,
+    forms: Vec<Form>,
+    /// Positions of its parameters in the stack.
+    own: Vec<usize>,
+    /// The joint at which it acts.
+    joint: Option<usize>,
+    /// What it moves the point of every row by, m.
+    shift: Vec<Vector3<f64>>,
+    /// The direction of most of that, and the largest, m.
+    principal: Vector3<f64>,
+    largest: f64,
+}
+
+impl TracedFinding {
+    fn of(
+        finding: &FindingRow,
+        forms: Vec<Form>,
+        own: Vec<usize>,
+        model: &Model,
+        data: &Measurements,
+        whole: &[Vector3<f64>],
+    ) -> Self {
+        let mut without = model.clone();
+        own.iter().for_each(|k| without.x[*k] = 0.0);
+        let bare = without.predict(data);
+        let shift: Vec<Vector3<f64>> = whole.iter().zip(&bare).map(|(a, b)| a - b).collect();
+        let place = forms.first().map_or(model.stack.specs()[own[0]].place, |form| form.place());
+        let joint = match place {
+            Place::Joint(joint) if joint < data.joints => Some(joint),
+            _ => None,
+        };
+        let largest = shift.iter().map(Vector3::norm).fold(0.0, f64::max);
+        Self { rank: finding.rank, principal: principal(&shift), forms, own, joint, shift, largest }
+    }
+
+    /// Whether it is shown as an angle about its joint.
+    fn turns(&self, model: &Model) -> bool {
+        self.joint.is_some_and(|joint| model.robot.is_revolute(joint))
+    }
+
+    /// The direction along which a row shows it, and the factor to the column's unit: rad about the joint, or mm. None where the joint
+    /// turns the point too little to be seen.
+    fn direction(&self, row: usize, motion: &PointMotion, model: &Model) -> Option<(Vector3<f64>, f64)> {
+        match self.joint.filter(|_| self.turns(model)) {
+            Some(joint) if motion.by_joint[joint].norm() > LEVER => {
+                Some((motion.by_joint[joint] / motion.by_joint[joint].norm_squared(), 1.0))
+            }
+            Some(_) => None,
+            None if self.shift[row].norm() > SMALL * self.largest => Some((self.shift[row].normalize(), 1e3)),
+            None => Some((self.principal, 1e3)),
+        }
+    }
 }
 
 /// One standard deviation (SI) of the parameters that have one, by name.

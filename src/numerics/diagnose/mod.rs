@@ -38,6 +38,7 @@ pub use types::{
 pub use words::other_means;
 
 use judge::{ModelComparison, judge};
+use crate::effect::Form;
 use locate::locate;
 use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
@@ -56,10 +57,11 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
     let before = now.model.error_sizes(&fitter.data, fitter.scale.dimension());
     tell(words::of_the_base(&now, &fitter));
     let (mut history, mut located, mut first) = (RoundHistory::default(), None, None);
+    let mut earlier = None;
     loop {
         let view = RoundView::of(&now, &fitter);
         let survey = view.survey();
-        let mut pool = view.pool(&now, &fitter, &survey);
+        let mut pool = view.pool(&now, &fitter, &survey, earlier.take());
         located.get_or_insert_with(|| locate(&pool, &pool.given(&[]), &survey));
         let options = SearchOptions { seed: question.seed, ..SearchOptions::default() };
         let mut search = CauseSearch::new(&mut pool, &survey, &view.pose, options);
@@ -70,6 +72,8 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         let next = fitter.fit(&now.model, causes);
         let outcome = history.after(&now, &next);
         if outcome == RoundOutcome::Again {
+            let forms: Vec<Form> = next.causes.iter().map(|cause| cause.form.clone()).collect();
+            earlier = Some(pool.keep(&forms, view.compliance.clone()));
             now = next;
             continue;
         }

@@ -125,6 +125,14 @@ impl Motion {
         }
     }
 
+    /// The joint that travels, where that is all of the motion.
+    pub(crate) fn travels(&self) -> Option<usize> {
+        match *self {
+            Self::Joint { joint } | Self::Coupled { moved: joint, .. } => Some(joint),
+            _ => None,
+        }
+    }
+
     /// The unit of a travel of the joint that moves; of a frame, of its displacement.
     pub(super) fn unit(&self, robot: &RobotModel) -> Unit {
         match *self {

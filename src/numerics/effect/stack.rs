@@ -3,7 +3,7 @@
 //! P = base E_0 exp(x1 (q1 + d1)) E_1 ... exp(xn (qn + dn)) E_n tool, with E_k = exp of the summed twists at station k.
 
 use super::placed_row::{PlacedRow, PlacementBuffers, Station, Turns, along, from_anchor};
-use super::{ArmState, Deflection, Direction, Effect, ParameterSpec, Variable};
+use super::{ArmState, Deflection, Direction, Effect, Law, ParameterSpec, Variable};
 use crate::robot::{Measurements, Posture, RobotModel, Travel};
 use crate::spatial::Pose;
 use nalgebra::{Matrix3x6, Vector3};
@@ -316,6 +316,11 @@ impl PointMotion {
     pub fn turn_along(&self, direction: &Direction) -> Vector3<f64> {
         let turns = self.turns.as_ref();
         turns.and_then(|turns| turns.along(direction, &self.compliance)).unwrap_or_else(Vector3::zeros)
+    }
+
+    /// The values of a law's functions in this row, numbered; none of those that the row does not tell.
+    pub(crate) fn law(&self, robot: &RobotModel, data: &Measurements, law: &Law, mut each: impl FnMut(usize, f64)) {
+        law.values(robot, &ArmState::new(data, self.row, &self.posture, self.point), &mut each);
     }
 }
 

@@ -1,7 +1,8 @@
 //! Least squares by a pivoted Cholesky factor of a small Gram matrix: what the data do not see is left out.
 
 use super::linear::INVISIBLE;
-use faer::Mat;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Mat, Par};
 
 /// A pivoted Cholesky factor of a small Gram matrix: what is below [`INVISIBLE`] is left out.
 pub(super) struct PivotedCholesky {
@@ -47,6 +48,13 @@ impl PivotedCholesky {
     /// The whole factor, lower triangular.
     pub fn lower(&self) -> Mat<f64> {
         Mat::from_fn(self.rank(), self.rank(), |i, j| if j <= i { self.row(i)[j] } else { 0.0 })
+    }
+
+    /// The inverse of the factor, lower triangular.
+    pub fn inverse(&self) -> Mat<f64> {
+        let mut inverse = Mat::identity(self.rank(), self.rank());
+        solve_lower_triangular_in_place(self.lower().as_ref(), inverse.as_mut(), Par::Seq);
+        inverse
     }
 
     pub fn rank(&self) -> usize {

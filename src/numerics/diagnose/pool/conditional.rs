@@ -3,9 +3,9 @@
 use super::cholesky::PivotedCholesky;
 use super::criterion::fall;
 use super::hypotheses::HypothesisSet;
-use super::linear::dot;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{MatMut, MatRef, Par};
+use super::linear::{INVISIBLE, dot};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Mat, MatMut, MatRef, Par, Side};
 use rayon::prelude::*;
 
 /// Columns whose shares one thread computes at once.
@@ -38,16 +38,29 @@ pub(crate) struct Conditional {
     pub square: f64,
     /// Product of every column with the residual.
     gradient: Vec<f64>,
-    /// What the set takes off every column: rank x columns, column by column.
-    share: Vec<f64>,
+    /// What the set leaves of the Gram matrix of every hypothesis, one after another, row by row; the upper triangles are not kept.
+    gram: Vec<f64>,
+    /// Where in `gram` each begins.
+    begin: Vec<usize>,
     /// The fall of the criterion by every hypothesis that can join, largest first.
     pub falls: Vec<(f64, usize)>,
 }
 
-impl Conditional {
-    /// From the factor of the set's Gram matrix and the products of the set's columns with all columns of the pool: the share of column
-    /// c is L^-1 of its products.
-    pub(super) fn of(pool: &HypothesisSet, set: &[usize], factor: &PivotedCholesky, products: &[SetProducts]) -> Self {
+/// What a set takes off every column of a pool, from which follows what parts of the set take.
+pub(super) struct SetShares {
+    set: Vec<usize>,
+    factor: PivotedCholesky,
+    /// Columns of the set in the pool.
+    own: Vec<usize>,
+    /// L^-1 of the set's products with every column: rank x columns, column by column.
+    share: Vec<f64>,
+    /// L^-1 of their products with the residual.
+    along: Vec<f64>,
+}
+
+impl SetShares {
+    /// From the factor of the set's Gram matrix and the products of the set's columns with all columns of the pool.
+    pub fn of(pool: &HypothesisSet, set: &[usize], factor: PivotedCholesky, products: &[SetProducts]) -> Self {
         let (rank, own) = (factor.rank(), pool.columns_of(set));
         let mut share = vec![0.0; rank * pool.scale.len()];
         if rank > 0 {
@@ -63,15 +76,121 @@ impl Conditional {
             });
         }
         let along = factor.forward(|k| pool.gradient[own[k]]);
-        let square = pool.square - dot(&along, &along);
-        let of = |column: usize| &share[column * rank..(column + 1) * rank];
-        let gradient = pool.gradient.iter().enumerate().map(|(column, g)| g - dot(of(column), &along)).collect();
-        let mut out = Self { set: set.to_vec(), rank, square, gradient, share, falls: Vec::new() };
+        Self { set: set.to_vec(), factor, own, share, along }
+    }
+
+    /// The problem with the whole set estimated.
+    pub fn whole(&self, pool: &HypothesisSet) -> Conditional {
+        let changed = Changed { share: &self.share, along: &self.along, sign: -1.0 };
+        let gradient = changed.gradients(&pool.gradient);
+        let square = pool.square - dot(&self.along, &self.along);
+        let gram = changed.grams(pool, |h| &pool.gram[h]);
+        Conditional::of(pool, self.set.clone(), self.factor.rank(), (square, gradient, gram))
+    }
+
+    /// L^-T of the shares: what every column would take of each kept column of the set.
+    pub fn coefficients(&self) -> Vec<f64> {
+        let (rank, mut out) = (self.factor.rank(), self.share.clone());
+        let lower = self.factor.lower();
+        out.par_chunks_mut((rank * COLUMNS).max(1)).for_each(|some| {
+            let count = some.len() / rank;
+            let some = MatMut::from_column_major_slice_mut(some, rank, count);
+            solve_upper_triangular_in_place(lower.as_ref().transpose(), some, Par::Seq);
+        });
+        out
+    }
+
+    /// The problem without some members of the set, from that with all of them (`whole`) and their `coefficients`: what the members had
+    /// taken comes back. `None` where columns that the set hid would be seen again, so that it has to be asked anew.
+    ///
+    /// With A the inverse of the set's Gram matrix and W the coefficients, without the columns G the Gram matrix of what is left grows by
+    /// W_G' A_GG^-1 W_G (block elimination).
+    pub fn without(&self, pool: &HypothesisSet, whole: &Conditional, coefficients: &[f64], gone: &[usize]) -> Option<Conditional> {
+        let rank = self.factor.rank();
+        let of_gone = |column: usize| gone.iter().any(|h| (pool.first[*h]..pool.first[h + 1]).contains(&column));
+        let out: Vec<usize> = (0..rank).filter(|a| of_gone(self.own[self.factor.order[*a]])).collect();
+        if out.is_empty() {
+            return None;
+        }
+        let inverse = self.factor.inverse();
+        let among = Mat::from_fn(out.len(), out.len(), |i, j| dot(inverse.col_as_slice(out[i]), inverse.col_as_slice(out[j])));
+        let lower = among.llt(Side::Lower).ok()?.L().to_owned();
+        let (count, own) = (out.len(), self.factor.backward(&self.along));
+        let mut back = vec![0.0; count * pool.scale.len()];
+        back.par_chunks_mut(count * COLUMNS).enumerate().for_each(|(chunk, back)| {
+            for (n, column) in back.chunks_mut(count).enumerate() {
+                let from = &coefficients[(chunk * COLUMNS + n) * rank..][..rank];
+                column.iter_mut().zip(&out).for_each(|(value, a)| *value = from[*a]);
+            }
+            let some = back.len() / count;
+            let back = MatMut::from_column_major_slice_mut(back, count, some);
+            solve_lower_triangular_in_place(lower.as_ref(), back, Par::Seq);
+        });
+        let mut along = Mat::from_fn(count, 1, |i, _| own[out[i]]);
+        solve_lower_triangular_in_place(lower.as_ref(), along.as_mut(), Par::Seq);
+        let along = along.col_as_slice(0);
+        let changed = Changed { share: &back, along, sign: 1.0 };
+        let hidden = (0..self.own.len()).filter(|k| !self.factor.order.contains(k)).map(|k| self.own[k]);
+        if hidden.filter(|column| !of_gone(*column)).any(|column| dot(changed.of(column), changed.of(column)) > 0.5 * INVISIBLE) {
+            return None;
+        }
+        let gradient = changed.gradients(&whole.gradient);
+        let gram = changed.grams(pool, |h| whole.gram_of(h));
+        let rest = self.set.iter().copied().filter(|h| !gone.contains(h)).collect();
+        Some(Conditional::of(pool, rest, rank - count, (whole.square + dot(along, along), gradient, gram)))
+    }
+}
+
+/// What is taken off every column, or comes back.
+struct Changed<'a> {
+    /// A few numbers for each column, column by column.
+    share: &'a [f64],
+    /// The same of the residual.
+    along: &'a [f64],
+    sign: f64,
+}
+
+impl Changed<'_> {
+    fn of(&self, column: usize) -> &[f64] {
+        &self.share[column * self.along.len()..(column + 1) * self.along.len()]
+    }
+
+    fn gradients(&self, from: &[f64]) -> Vec<f64> {
+        from.iter().enumerate().map(|(column, g)| g + self.sign * dot(self.of(column), self.along)).collect()
+    }
+
+    /// The Gram matrices of all hypotheses, one after another.
+    fn grams<'g>(&self, pool: &HypothesisSet, from: impl Fn(usize) -> &'g [f64] + Sync) -> Vec<f64> {
+        let one = |h: usize| {
+            let (first, q) = (pool.first[h], pool.first[h + 1] - pool.first[h]);
+            let mut gram = from(h).to_vec();
+            for i in (0..q).filter(|_| !self.along.is_empty()) {
+                for j in 0..=i {
+                    gram[i * q + j] += self.sign * dot(self.of(first + i), self.of(first + j));
+                }
+            }
+            gram
+        };
+        (0..pool.hypotheses.len()).into_par_iter().with_min_len(64).flat_map_iter(one).collect()
+    }
+}
+
+impl Conditional {
+    fn of(pool: &HypothesisSet, set: Vec<usize>, rank: usize, (square, gradient, gram): (f64, Vec<f64>, Vec<f64>)) -> Self {
+        let mut begin = vec![0];
+        for h in 0..pool.hypotheses.len() {
+            begin.push(begin[h] + (pool.first[h + 1] - pool.first[h]).pow(2));
+        }
+        let mut out = Self { set, rank, square, gradient, gram, begin, falls: Vec::new() };
         let all = (0..pool.hypotheses.len()).into_par_iter().with_min_len(64).map(|h| (out.fall(pool, h), h));
         let mut falls: Vec<(f64, usize)> = all.filter(|(fall, _)| fall.is_finite()).collect();
         falls.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         out.falls = falls;
         out
+    }
+
+    fn gram_of(&self, h: usize) -> &[f64] {
+        &self.gram[self.begin[h]..self.begin[h + 1]]
     }
 
     pub fn set(&self) -> &[usize] {
@@ -112,21 +231,8 @@ impl Conditional {
         }
     }
 
-    fn share_of(&self, column: usize) -> &[f64] {
-        &self.share[column * self.rank..(column + 1) * self.rank]
-    }
-
     fn factor(&self, pool: &HypothesisSet, h: usize) -> PivotedCholesky {
-        let (first, q) = (pool.first[h], pool.first[h + 1] - pool.first[h]);
-        let mut gram = pool.gram[h].clone();
-        if self.rank > 0 {
-            for i in 0..q {
-                for j in 0..=i {
-                    gram[i * q + j] -= dot(self.share_of(first + i), self.share_of(first + j));
-                }
-            }
-        }
-        PivotedCholesky::of(gram, q)
+        PivotedCholesky::of(self.gram_of(h).to_vec(), pool.first[h + 1] - pool.first[h])
     }
 
     /// Whether a hypothesis could join this set.

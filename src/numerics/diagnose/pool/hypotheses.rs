@@ -3,18 +3,21 @@
 //! A coefficient estimated on the projected residual is the one that a joint fit with all geometry would give, so that the part
 //! of an effect that geometry had absorbed comes back in full.
 
+use super::earlier::ListedColumns;
 use super::linear::{dot, gram, orthonormal, project, span};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::Hypothesis;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 /// Hypotheses over one residual.
 pub(crate) struct HypothesisSet<'a> {
     pub problem: &'a WhitenedProblem<'a>,
     pub hypotheses: Vec<Hypothesis>,
+    /// How many of them are of the list; the others came while it was searched.
+    pub listed: usize,
     /// Key of each form: only one of a key is in a set.
     pub keys: Vec<String>,
     pub residual_rows: usize,
@@ -54,14 +57,38 @@ impl<'a> HypothesisSet<'a> {
         autocorrelation_time: f64,
         hypotheses: Vec<Hypothesis>,
     ) -> Self {
+        let mut pool = Self::empty(problem, orthonormal(jacobian), residual, autocorrelation_time);
+        pool.add(hypotheses);
+        pool.listed = pool.hypotheses.len();
+        pool
+    }
+
+    /// The list of an earlier round, which has the same rows, on another residual.
+    pub(super) fn again(
+        problem: &'a WhitenedProblem<'a>,
+        listed: ListedColumns,
+        residual: &[f64],
+        autocorrelation_time: f64,
+    ) -> Self {
+        let ListedColumns { hypotheses, base, columns, scale, first, gram } = listed;
+        let mut pool = Self::empty(problem, base, residual, autocorrelation_time);
+        (pool.columns, pool.scale, pool.first) = (columns, scale, first);
+        for (hypothesis, gram) in hypotheses.into_iter().zip(gram) {
+            pool.register(hypothesis, Some(gram));
+        }
+        pool.listed = pool.hypotheses.len();
+        pool
+    }
+
+    fn empty(problem: &'a WhitenedProblem<'a>, base: Mat<f64>, residual: &[f64], autocorrelation_time: f64) -> Self {
         let residual_rows = residual.len();
-        let base = orthonormal(jacobian);
         let mut residual = residual.to_vec();
         project(base.as_ref(), &mut residual);
         let square = dot(&residual, &residual);
-        let mut pool = Self {
+        Self {
             problem,
             hypotheses: Vec::new(),
+            listed: 0,
             keys: Vec::new(),
             residual_rows,
             effective_rows: residual_rows as f64 / autocorrelation_time,
@@ -75,9 +102,34 @@ impl<'a> HypothesisSet<'a> {
             gram: Vec::new(),
             prior_penalty: Vec::new(),
             of_torque_model: Vec::new(),
-        };
-        pool.add(hypotheses);
-        pool
+        }
+    }
+
+    /// Takes a hypothesis whose projected columns, with their raw lengths, are known; returns its position.
+    pub(super) fn add_known(&mut self, hypothesis: Hypothesis, (columns, scale): (Vec<f64>, Vec<f64>)) -> usize {
+        self.columns.extend(columns);
+        self.scale.extend(scale);
+        self.first.push(self.scale.len());
+        self.register(hypothesis, None);
+        self.hypotheses.len() - 1
+    }
+
+    /// Columns with their raw lengths.
+    pub(super) fn take_columns(&self, own: Range<usize>) -> (Vec<f64>, Vec<f64>) {
+        let rows = self.residual_rows;
+        (self.columns[own.start * rows..own.end * rows].to_vec(), self.scale[own].to_vec())
+    }
+
+    /// The list with its columns.
+    pub(super) fn into_columns(mut self) -> ListedColumns {
+        let columns = self.first[self.listed];
+        self.columns.truncate(columns * self.residual_rows);
+        self.scale.truncate(columns);
+        self.first.truncate(self.listed + 1);
+        self.hypotheses.truncate(self.listed);
+        self.gram.truncate(self.listed);
+        let Self { hypotheses, base, columns, scale, first, gram, .. } = self;
+        ListedColumns { hypotheses, base, columns, scale, first, gram }
     }
 
     /// Takes more hypotheses; returns the position of the first.
@@ -106,19 +158,21 @@ impl<'a> HypothesisSet<'a> {
             })
             .collect();
         self.scale.extend(norms.into_iter().flatten());
-        let joints = self.problem.robot.joints();
-        for hypothesis in hypotheses {
-            let k = self.hypotheses.len();
-            let own: Vec<&[f64]> = (self.first[k]..self.first[k + 1]).map(|c| &self.columns[c * rows..(c + 1) * rows]).collect();
-            self.gradient.extend(own.iter().map(|column| dot(column, &self.residual)));
-            self.gram.push(gram(&own));
-            let places = hypothesis.form.place().count(joints) as f64;
-            self.prior_penalty.push(2.0 * hypothesis.tried.ln() + hypothesis.prior_penalty + 2.0 * places.ln());
-            self.of_torque_model.push(hypothesis.form.is_of_torque_model());
-            self.keys.push(hypothesis.form.key());
-            self.hypotheses.push(hypothesis);
-        }
+        hypotheses.into_iter().for_each(|hypothesis| self.register(hypothesis, None));
         begin
+    }
+
+    /// Takes the next hypothesis, whose columns are there.
+    fn register(&mut self, hypothesis: Hypothesis, known: Option<Vec<f64>>) {
+        let (k, rows) = (self.hypotheses.len(), self.residual_rows);
+        let own: Vec<&[f64]> = (self.first[k]..self.first[k + 1]).map(|c| &self.columns[c * rows..(c + 1) * rows]).collect();
+        self.gradient.extend(own.iter().map(|column| dot(column, &self.residual)));
+        self.gram.push(known.unwrap_or_else(|| gram(&own)));
+        let places = hypothesis.form.place().count(self.problem.robot.joints()) as f64;
+        self.prior_penalty.push(2.0 * hypothesis.tried.ln() + hypothesis.prior_penalty + 2.0 * places.ln());
+        self.of_torque_model.push(hypothesis.form.is_of_torque_model());
+        self.keys.push(hypothesis.form.key());
+        self.hypotheses.push(hypothesis);
     }
 
     /// How many parameters the base model estimates.

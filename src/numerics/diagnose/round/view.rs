@@ -2,7 +2,7 @@
 
 use super::fit_state::{EstimatedCause, FitState, Fitter};
 use super::stretches::{bounded_autocorrelation_time, poses, thinned};
-use crate::diagnose::pool::{CachedHypotheses, HypothesisSet};
+use crate::diagnose::pool::{CachedHypotheses, EarlierPool, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{DeclaredForm, Hypothesis, Survey, Variable, hypotheses};
 use crate::estimate::Model;
@@ -15,7 +15,8 @@ pub(crate) struct RoundView<'a> {
     pub pose: Vec<usize>,
     autocorrelation_time: f64,
     torque: Vec<f64>,
-    compliance: Vec<f64>,
+    /// How far each joint yields, rad/Nm.
+    pub compliance: Vec<f64>,
 }
 
 impl<'a> RoundView<'a> {
@@ -48,10 +49,15 @@ impl<'a> RoundView<'a> {
         Survey::new(robot, data, rows, &self.torque, &self.compliance)
     }
 
-    /// The pool of all causes around the present model: the residual is that without them.
-    pub fn pool(&self, now: &FitState, fitter: &Fitter, survey: &Survey) -> CachedHypotheses<'_> {
+    /// The pool of all causes around the present model, or around that of an `earlier` round: the residual is that without them.
+    pub fn pool(
+        &self,
+        now: &FitState,
+        fitter: &Fitter,
+        survey: &Survey,
+        earlier: Option<EarlierPool>,
+    ) -> CachedHypotheses<'_> {
         let problem = &self.problem;
-        let jacobian = problem.jacobian(fitter.free());
         let mut residual = problem.residual.clone();
         for EstimatedCause { form, coefficients, .. } in &now.causes {
             let columns = problem.columns(form);
@@ -59,6 +65,10 @@ impl<'a> RoundView<'a> {
                 residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
+        if let Some(earlier) = earlier.filter(|earlier| earlier.serves(self)) {
+            return CachedHypotheses::again(earlier, problem, &residual, self.autocorrelation_time);
+        }
+        let jacobian = problem.jacobian(fitter.free());
         let tried = |hypothesis: &Hypothesis| !fitter.question.without.iter().any(|name| name == hypothesis.form.cause().name());
         let mut hypotheses: Vec<Hypothesis> = hypotheses(survey).into_iter().filter(tried).collect();
         hypotheses.extend(fitter.question.own.iter().flat_map(|cause| DeclaredForm::hypotheses(cause, survey)));

@@ -26,6 +26,7 @@ impl CauseSearch<'_, '_> {
                     gone.extend(set[a + 1..].iter().map(|other| vec![*h, *other]));
                 }
             }
+            self.pool.leave_out(&set, &gone);
             for gone in gone {
                 let rest: Vec<usize> = set.iter().copied().filter(|k| !gone.contains(k)).collect();
                 let given = self.pool.given(&rest);

@@ -6,6 +6,7 @@
 mod autocorrelated;
 mod currents;
 mod reading_lines;
+mod travel;
 
 use crate::effect::{
     Basis, Deflection, Effect, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
@@ -21,6 +22,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use reading_lines::{ReadingLines, SeenReading};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Fitted rows through the present model.
 pub(crate) struct WhitenedProblem<'a> {
@@ -36,6 +38,8 @@ pub(crate) struct WhitenedProblem<'a> {
     /// What each row says beyond those before it, where noise is correlated.
     innovations: Option<Innovations>,
     model: &'a Model,
+    /// Columns of a unit travel of each joint.
+    travels: OnceLock<Vec<Vec<f64>>>,
     /// Whitened measured - predicted.
     pub residual: Vec<f64>,
 }
@@ -78,6 +82,7 @@ impl<'a> WhitenedProblem<'a> {
             current_weight,
             innovations: None,
             model,
+            travels: OnceLock::new(),
         }
     }
 
@@ -164,6 +169,14 @@ impl<'a> WhitenedProblem<'a> {
 
     /// The same whether noise is correlated or not: whitened motions of the points per unit of each parameter.
     pub fn motions_by(&self, form: &Form) -> Vec<f64> {
+        match self.travel(form) {
+            Some((joint, values)) => self.travelled(joint, &values),
+            None => self.motions_by_partials(form),
+        }
+    }
+
+    /// Of any form, from its own partial derivatives.
+    fn motions_by_partials(&self, form: &Form) -> Vec<f64> {
         let count = form.parameters(self.robot).len();
         let zeros = vec![0.0; count];
         let rows = self.residual_rows();

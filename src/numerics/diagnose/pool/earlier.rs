@@ -1,0 +1,50 @@
+//! What one round hands to the next: columns are derivatives around a model, and a model that was fitted anew has nearly the same.
+//!
+//! Effects are small, so that the directions in which they move a point change by thousandths from round to round; what is left changes
+//! much, and is looked at anew. What is chosen is fitted in the whole model.
+
+use crate::diagnose::round::RoundView;
+use crate::effect::{Form, Hypothesis};
+use faer::Mat;
+use std::collections::HashMap;
+
+/// A compliance that changed by more than this share changes what loads do.
+const SAME: f64 = 0.01;
+
+/// The list of a round with its columns.
+pub(crate) struct EarlierPool {
+    pub(super) rows: Vec<usize>,
+    /// Of each joint, rad/Nm.
+    pub(super) compliance: Vec<f64>,
+    pub(super) columns: ListedColumns,
+    /// As [`super::CachedHypotheses`] has them.
+    pub(super) across: HashMap<usize, Vec<f64>>,
+    pub(super) known: Vec<KnownForm>,
+}
+
+/// Hypotheses of a list, and their columns beside the base model.
+pub(super) struct ListedColumns {
+    pub hypotheses: Vec<Hypothesis>,
+    pub base: Mat<f64>,
+    pub columns: Vec<f64>,
+    pub scale: Vec<f64>,
+    pub first: Vec<usize>,
+    pub gram: Vec<Vec<f64>>,
+}
+
+/// A form beyond the list: its columns with their raw lengths, and their products with the columns of the list.
+pub(super) struct KnownForm {
+    pub form: Form,
+    pub columns: (Vec<f64>, Vec<f64>),
+    pub products: Vec<f64>,
+}
+
+impl EarlierPool {
+    /// Whether it may stand for the pool of another round: the same rows, no currents, whose weight is that of a residual, and joints that
+    /// yield as before.
+    pub fn serves(&self, view: &RoundView) -> bool {
+        let same = |(now, before): (&f64, &f64)| (now - before).abs() <= SAME * before.abs();
+        let points_alone = view.problem.residual_rows() == view.problem.of_points().len();
+        points_alone && self.rows == view.problem.rows && view.compliance.iter().zip(&self.compliance).all(same)
+    }
+}
