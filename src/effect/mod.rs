@@ -63,6 +63,7 @@ mod unknown;
 mod unweighed_windup;
 mod variable;
 mod viscous_windup;
+mod volume;
 mod warmth;
 mod words;
 mod wrong_point;
@@ -102,6 +103,7 @@ pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
 pub use words::{Clock, figure};
+pub use volume::Closing;
 pub use zero_shift::ZeroShift;
 
 use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel};

@@ -3,7 +3,7 @@
 //! The buffers of an evaluation are in [`PlacementBuffers`]; what follows from them is asked of [`PlacedRow`], which holds them.
 
 use super::{Deflection, Direction};
-use crate::robot::{LoadCorrection, Posture, RobotModel, Travel};
+use crate::robot::{LoadCorrection, Posture, RobotModel, Shape, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 
@@ -65,7 +65,7 @@ pub(super) struct Station {
     /// Whether nothing moves here: most stations of most models.
     pub still: bool,
     pub motion: Pose,
-    jacobian: Matrix6<f64>,
+    pub jacobian: Matrix6<f64>,
 }
 
 impl Station {
@@ -98,6 +98,17 @@ impl PlacedRow<'_> {
         Some(self.point - anchor.place - self.scratch.deflection.anchor)
     }
 
+    /// What an anchor is, corrections included. `None` where the robot knows no such anchor.
+    pub fn anchor_shape(&self, anchor: &str) -> Option<Shape> {
+        let setup = self.robot.setup();
+        let deflection = &self.scratch.deflection;
+        Some(match setup.anchors.get(setup.anchor(anchor)?)?.shape {
+            Shape::Point => Shape::Point,
+            Shape::Plane(normal) => Shape::Plane((normal + deflection.anchor_tilt).normalize()),
+            Shape::Sphere(radius) => Shape::Sphere(radius + deflection.anchor_growth),
+        })
+    }
+
     /// The tool frame, and the velocity (v; w) of its origin by each joint.
     pub(crate) fn tool(&self, velocities: &mut [Twist]) -> Pose {
         let behind = &self.scratch.posture.behind;
@@ -128,19 +139,22 @@ impl PlacedRow<'_> {
                 Direction::Joint(k, rate) => joint(*k) * *rate,
                 Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
                 Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
-                Direction::Anchor(_) | Direction::Instrument(_) => continue,
+                Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) | Direction::Instrument(_) => continue,
             };
             emit(*parameter, rotation);
         }
     }
 
-    /// Derivatives of the vector from the row's anchor to the point, m.
-    pub fn partials_from_anchor(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    /// Derivatives of the vector from the row's anchor to the point (m), which is `reach`: as seen from a plane that tilts, from the
+    /// surface of a sphere that grows.
+    pub fn partials_from_anchor(&mut self, reach: &Vector3<f64>, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
         let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
             let velocity = match direction {
                 Direction::Anchor(rate) => -rate,
+                Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),
+                Direction::AnchorGrowth(rate) => reach.try_normalize(0.0).map_or_else(Vector3::zeros, |along| along * -*rate),
                 other => along(other, by_joint, by_station, &deflection.compliance),
             };
             emit(*parameter, velocity);
@@ -177,7 +191,7 @@ pub(super) fn along(
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
         Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
-        Direction::Anchor(_) => Vector3::zeros(),
+        Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => Vector3::zeros(),
         Direction::Instrument(rate) => *rate,
     }
 }

@@ -198,7 +198,7 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    let expected = observation::rank(&model.robot, data, rows)?;
+    let expected = observation::rank(&model.robot, data, rows, !model.lengths.is_empty())?;
     (asked && !held && !told).then_some((found, expected))
 }
 

@@ -238,7 +238,7 @@ impl Parameters {
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
         let anchors =
-            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
+            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor::point(&name, stand.translation));
         let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));

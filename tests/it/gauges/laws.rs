@@ -24,7 +24,7 @@ impl Truth {
         let offset = Vector3::from(THREE[0].1) * 1e-3;
         let rotation = home.rotation * Pose::from_rotation_vector(askew, Vector3::zeros()).rotation;
         let target = Target { name: String::new(), seat: Pose::new(rotation, home.point(&offset)), oriented: true };
-        let anchor = Anchor { name: String::new(), place: Vector3::new(4.6, -2.5, 0.8) };
+        let anchor = Anchor::point("", Vector3::new(4.6, -2.5, 0.8));
         let robot = robot.measured_by(MeasurementSetup { targets: vec![target], anchors: vec![anchor] });
         let base = Pose::exp(&Twist::new(3.0, -1.5, 0.4, 0.0, 0.0, 0.0));
         let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY].concat());
@@ -180,7 +180,7 @@ fn the_rank_of_every_kind_is_that_of_theory() {
             let (model, fitted) = truth.fit(&data, |_| true);
             let free = fitted.statuses.iter().filter(|fate| matches!(fate, ParameterStatus::Free(_))).count();
             let name = format!("{}, {}", truth.description.name, kind.about().name);
-            assert_eq!(Some(free), rank(&model.robot, &data, &rows), "{name}");
+            assert_eq!(Some(free), rank(&model.robot, &data, &rows, false), "{name}");
         }
     }
 }
