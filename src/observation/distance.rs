@@ -25,7 +25,7 @@ static ABOUT: KindDescription = KindDescription {
             "distance",
             &["distance"],
             Length,
-            [0.0, 200.0],
+            [1e-6, 200.0],
             "Distance of the target from an anchor: a draw-wire or ballbar.",
         )
         .as_part(Part::Value),

@@ -83,8 +83,9 @@ impl Fixture {
     /// What is wrong with it: the place below it, and the message.
     pub fn faults(&self) -> Vec<(&'static str, &'static str)> {
         let mut faults = Vec::new();
-        if self.name.trim().is_empty() {
-            faults.push(("name", "expected a name, e.g. front/0"));
+        let plain = |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_');
+        if !self.name.split('/').all(plain) {
+            faults.push(("name", "expected letters, digits, - and _, in parts with / between, e.g. front/0"));
         }
         if self.points == 0 {
             faults.push(("points", "expected 1 or more"));
@@ -175,8 +176,9 @@ impl Experiment<'_> {
             };
             settle(arm, &row, effects).posture.tool
         };
+        let anywhere = Poses { floor_mm: f64::NEG_INFINITY, clearance_mm: 0.0, ..self.poses.clone() };
         for _ in 0..TRIES {
-            let (mut q, _) = plan::allowed(arm, &Poses { floor_mm: f64::NEG_INFINITY, clearance_mm: 0.0, ..self.poses.clone() }, ranges, draw).ok()?;
+            let (mut q, _) = plan::allowed(arm, &anywhere, ranges, draw).ok()?;
             for _ in 0..STEPS {
                 let tool = ball(&q);
                 let left = matrix::minus(there, tool);
