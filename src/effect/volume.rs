@@ -122,3 +122,79 @@ impl PlacedRow<'_> {
         Some(log_volume)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{EffectContext, EffectStack, Load, whole};
+    use crate::robot::import::{RobotFileText, read_calib};
+    use crate::robot::{Anchor, Measurements, MeasurementSetup, Named, Readings, RobotModel, Shape};
+    use crate::spatial::Pose;
+
+    const ARM: &str = "
+calib_robot: 1
+units: {length: mm, angle: deg}
+kinematics:
+  dh:
+    - {theta: 0, d: 120, a: 0, alpha: 90}
+    - {theta: 0, d: 0, a: -610, alpha: 0}
+    - {theta: 0, d: 0, a: -570, alpha: 0}
+    - {theta: 0, d: 160, a: 0, alpha: 90}
+    - {theta: 0, d: 115, a: 0, alpha: -90}
+    - {theta: 0, d: 90, a: 0, alpha: 0}
+tool: {point: [20, 10, 60]}
+";
+
+    #[test]
+    fn derivatives_of_the_volume_are_central_differences() {
+        let text = RobotFileText { label: "arm.yaml", text: ARM };
+        let robot = RobotModel::new(read_calib(text, None).expect("sound").robot);
+        let shapes = [Shape::Point, Shape::Plane(Vector3::new(0.3, -0.2, 0.9).normalize()), Shape::Sphere(0.05)];
+        for shape in shapes {
+            let anchor = Anchor { name: "a".into(), place: Vector3::new(0.4, -0.3, 0.2), shape };
+            let robot = robot.clone().measured_by(MeasurementSetup { targets: Vec::new(), anchors: vec![anchor] });
+            let setting = EffectContext { base: Pose::identity(), load: Load::GravityTorque };
+            let names = ["anchor", "base_frame", "tool_offset", "joint_offset", "link_geometry"];
+            let effects = names.iter().filter_map(|name| whole(name, &setting)).collect();
+            let stack = EffectStack::new(&robot, Pose::identity(), effects);
+            let x: Vec<f64> = (0..stack.specs().len()).map(|k| 3e-3 * (1.7 * k as f64).sin()).collect();
+            let readings = Readings {
+                kind: "socket",
+                sigma: vec![1e-4],
+                anchor: Some(Named::of(["a"].into_iter())),
+                ..Readings::default()
+            };
+            let data = Measurements {
+                joints: 6,
+                q: vec![0.4, -1.1, 0.9, 0.5, -0.8, 0.3],
+                position: vec![Vector3::zeros()],
+                sigma: vec![Vector3::repeat(f64::INFINITY)],
+                payload: vec![0.0],
+                readings: vec![readings],
+                ..Measurements::default()
+            };
+            let volume = |x: &[f64], emit: &mut dyn FnMut(usize, f64)| {
+                let mut scratch = stack.scratch(&robot);
+                let mut placed = stack.place(&robot, &data, 0, x, &mut scratch);
+                let closing = match placed.anchor_shape("a").expect("there") {
+                    Shape::Point => Closing::Point,
+                    Shape::Plane(normal) => Closing::Plane(normal),
+                    Shape::Sphere(_) => Closing::Sphere(placed.from_anchor("a").expect("there")),
+                };
+                placed.log_volume(&closing, emit).expect("no singular posture")
+            };
+            let mut rates = vec![0.0; x.len()];
+            volume(&x, &mut |k, rate| rates[k] += rate);
+            for (k, rate) in rates.iter().enumerate() {
+                let moved = |step: f64| {
+                    let mut beside = x.clone();
+                    beside[k] += step;
+                    volume(&beside, &mut |_, _| {})
+                };
+                let central = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                let name = &stack.specs()[k].name;
+                assert!((central - rate).abs() < 1e-5 * (1.0 + rate.abs()), "{shape:?}, {name}: {central} by differences, {rate}");
+            }
+        }
+    }
+}

@@ -23,10 +23,13 @@ pub struct Scale {
     pub reach: f64,
 }
 
-/// Of rows that were fitted; none where some measured other than that the target was brought to a place.
+/// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
 pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<Scale> {
     let brought = |row: &usize| kinds(data).iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
-    if rows.is_empty() || !rows.iter().all(brought) {
+    // Links that stay at nominal are the scale.
+    let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
+    let linked = model.stack.parameters_of("link_geometry").any(|k| free.contains(&k));
+    if rows.is_empty() || !linked || !rows.iter().all(brought) {
         return None;
     }
     let mut scratch = model.stack.scratch(&model.robot);

@@ -2,7 +2,7 @@
 //! it closes, which rows stand out, and what such data tell of the scale of the arm.
 
 use crate::error::{Error, Fault, Result, counted};
-use crate::estimate::{Fitted, KnownLength, Model, ParameterStatus, Prior, scale};
+use crate::estimate::{Fitted, KnownLength, Model, ParameterStatus, Prior, reseated, scale};
 use crate::observation::{MeasurementKind, kinds};
 use crate::robot::{Measurements, Shape};
 use crate::stage::Context;
@@ -103,6 +103,8 @@ pub(super) fn apply(
 
 /// A row farther off than so many standard deviations is named.
 const FAR: f64 = 4.0;
+/// And by so many more for each further axis.
+const MORE: f64 = 0.25;
 /// Rows of one name that stand off together in a row are an event from so many on.
 const TOGETHER: usize = 3;
 /// Weak directions that are named.
@@ -118,6 +120,7 @@ pub(super) fn note(context: &Context, model: &Model, fitted: &Fitted, data: &Mea
         return;
     }
     note_scale(context, model, fitted, data, rows);
+    note_reseat(context, model, fitted, data, recording, &own, &brought);
     note_far(context, model, fitted, data, recording, &brought);
     let weak: Vec<&str> = fitted
         .prior_checks
@@ -160,6 +163,28 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
     }
 }
 
+fn note_reseat(
+    context: &Context,
+    model: &Model,
+    fitted: &Fitted,
+    data: &Measurements,
+    recording: &Recording,
+    own: &[usize],
+    brought: &[&'static dyn MeasurementKind],
+) {
+    let stated = |row: &usize| brought.iter().find_map(|kind| kind.reading(data, *row)).map_or(0.0, |reading| reading.sigma);
+    let sigma = (own.iter().map(|row| stated(row).powi(2)).sum::<f64>() / own.len() as f64).sqrt().hypot(fitted.excess_sigma);
+    if let Some(found) = reseated(model, data, own, sigma) {
+        context.services.warn(format!(
+            "from {} on the ball sits elsewhere on the tool, by {:.2} mm or more ({:.0} standard errors): was it taken off? Name it \
+             there as another `target`, and each is placed on its own",
+            recording.point_id[found.row],
+            1e3 * found.shift,
+            found.statistic
+        ));
+    }
+}
+
 /// A row that does not close: its name, place in the recording, how far off (m).
 struct Far {
     row: usize,
@@ -185,11 +210,12 @@ fn note_far(
         let Some((kind, reading)) = brought.iter().find_map(|kind| Some((kind, kind.reading(data, row)?))) else { continue };
         let axes = kind.about().axes as f64;
         let sigma = reading.sigma.hypot(fitted.excess_sigma);
-        if error.length < FAR * sigma * axes.sqrt() {
+        let limit = (FAR + MORE * (axes - 1.0)) * sigma;
+        if error.length < limit {
             continue;
         }
         let near = |(name, place): &&(String, nalgebra::Vector3<f64>)| {
-            *name != reading.anchor && (predicted[row] - place).norm() < (FAR * sigma * axes.sqrt()).min(0.3 * error.length)
+            *name != reading.anchor && (predicted[row] - place).norm() < limit.min(0.3 * error.length)
         };
         let other = places.iter().find(near).map(|(name, _)| name.clone());
         far.push(Far { row, fixture: reading.anchor.into(), off: error.length, other });
@@ -200,7 +226,7 @@ fn note_far(
     let count = far.len();
     let texts: Vec<String> = far.chunk_by(|a, b| a.row + 1 == b.row && a.fixture == b.fixture && a.other == b.other).map(|run| run_text(run, recording)).collect();
     context.services.warn(format!(
-        "{} not close within {FAR} standard deviations, and {} down-weighted: {}",
+        "{} not close within their noise, and {} down-weighted: {}",
         if count == 1 { "1 row does".to_string() } else { format!("{count} rows do") },
         if count == 1 { "is" } else { "are" },
         texts.join("; ")

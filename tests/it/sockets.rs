@@ -1,5 +1,6 @@
 //! Calibration without an instrument: a ball that is brought to sockets, planes and spheres, nothing read but the joints.
 
+mod dirty;
 mod mukca;
 mod rank;
 mod twins;

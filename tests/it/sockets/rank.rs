@@ -34,7 +34,7 @@ fn sockets_show_all_but_the_base_and_the_scale_and_a_length_shows_that_too() {
         let two = [socket("a", A, 40, 0.0), socket("b", B, 40, 0.0), socket("c", C, 40, 0.0)];
         assert_eq!(seen(&robot, &two[..1], &[], &[]), 4 * n - 4, "{}: one socket", robot.name);
         assert_eq!(seen(&robot, &two, &[], &[]), 4 * n - 4, "{}: three sockets", robot.name);
-        assert_eq!(seen(&robot, &two, &[Length("a", "b", 0.051, 1e-4)], &[]), 4 * n - 3, "{}: a length", robot.name);
+        assert_eq!(seen(&robot, &two, &[Length("a", "b", 0.051, 1e-6)], &[]), 4 * n - 3, "{}: a length", robot.name);
         assert_eq!(seen(&robot, &two, &[], &["reduction_ratio"]), 5 * n - 4, "{}: ratios", robot.name);
     }
 }
@@ -45,7 +45,7 @@ fn planes_and_spheres_show_what_theory_says() {
         let n = robot.joints.len();
         let tilted = [plane("low", A, [0.3, -0.2, 1.0], 90, 0.0), plane("high", [480.0, 120.0, 380.0], [0.3, -0.2, 1.0], 90, 0.0)];
         assert_eq!(seen(&robot, &tilted[..1], &[], &[]), 4 * n - 4, "{}: a tilted plane", robot.name);
-        let apart = Length("low", "high", 0.08 / 1.13f64.sqrt(), 1e-4);
+        let apart = Length("low", "high", 0.08 / 1.13f64.sqrt(), 1e-6);
         assert_eq!(seen(&robot, &tilted, &[apart], &[]), 4 * n - 3, "{}: two planes a known distance apart", robot.name);
         let ball = sphere("ball", A, 40.0, 90, 0.0);
         assert_eq!(seen(&robot, &[ball], &[], &[]), 4 * n - 4, "{}: a sphere", robot.name);
