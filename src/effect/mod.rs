@@ -102,8 +102,8 @@ pub use tool_shift::ToolShift;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
-pub use words::{Clock, figure};
 pub use volume::Closing;
+pub use words::{Clock, figure};
 pub use zero_shift::ZeroShift;
 
 use crate::robot::{LoadCorrection, Measurements, Memory, Posture, RobotModel};

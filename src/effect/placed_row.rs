@@ -139,7 +139,9 @@ impl PlacedRow<'_> {
                 Direction::Joint(k, rate) => joint(*k) * *rate,
                 Direction::Station(k, rate) => before[*k].rotation * (stations[*k].jacobian * rate).fixed_rows::<3>(3),
                 Direction::Torque(k, rate) => joint(*k) * (deflection.compliance[*k] * *rate),
-                Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) | Direction::Instrument(_) => continue,
+                Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) | Direction::Instrument(_) => {
+                    continue;
+                }
             };
             emit(*parameter, rotation);
         }

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
     use crate::effect::{EffectContext, EffectStack, Load, whole};
     use crate::robot::import::{RobotFileText, read_calib};
-    use crate::robot::{Anchor, Measurements, MeasurementSetup, Named, Readings, RobotModel, Shape};
+    use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Shape};
     use crate::spatial::Pose;
 
     const ARM: &str = "
@@ -158,12 +158,8 @@ tool: {point: [20, 10, 60]}
             let effects = names.iter().filter_map(|name| whole(name, &setting)).collect();
             let stack = EffectStack::new(&robot, Pose::identity(), effects);
             let x: Vec<f64> = (0..stack.specs().len()).map(|k| 3e-3 * (1.7 * k as f64).sin()).collect();
-            let readings = Readings {
-                kind: "socket",
-                sigma: vec![1e-4],
-                anchor: Some(Named::of(["a"].into_iter())),
-                ..Readings::default()
-            };
+            let readings =
+                Readings { kind: "socket", sigma: vec![1e-4], anchor: Some(Named::of(["a"].into_iter())), ..Readings::default() };
             let data = Measurements {
                 joints: 6,
                 q: vec![0.4, -1.1, 0.9, 0.5, -0.8, 0.3],
@@ -193,7 +189,10 @@ tool: {point: [20, 10, 60]}
                 };
                 let central = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                 let name = &stack.specs()[k].name;
-                assert!((central - rate).abs() < 1e-5 * (1.0 + rate.abs()), "{shape:?}, {name}: {central} by differences, {rate}");
+                assert!(
+                    (central - rate).abs() < 1e-5 * (1.0 + rate.abs()),
+                    "{shape:?}, {name}: {central} by differences, {rate}"
+                );
             }
         }
     }

@@ -36,7 +36,9 @@ fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurem
                 let mut placed = model.place(&out, *row, &mut scratch);
                 let error = kind.residual(&out, *row, &placed).map(|(error, _)| error).filter(|error| error.norm() > CLOSED);
                 let closing = kind.closing(&out, *row, &placed);
-                let Some(step) = closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error)) else { break };
+                let Some(step) = closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error)) else {
+                    break;
+                };
                 let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];
                 joints.iter_mut().zip(step).for_each(|(q, change)| *q += change);
             }

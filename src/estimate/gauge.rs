@@ -51,7 +51,8 @@ pub fn gauge(
         None => target.clone(),
     };
     let targets = robot.setup().targets.iter().map(turned).collect();
-    let anchors: Vec<Anchor> = KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
+    let anchors: Vec<Anchor> =
+        KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
     if let Some(twice) = (1..anchors.len()).find(|k| anchors[..*k].iter().any(|other| other.name == anchors[*k].name)) {
         return Err(format!("`{}` names things of two kinds; give each a name of its own", anchors[twice].name));
     }

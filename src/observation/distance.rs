@@ -61,7 +61,8 @@ impl MeasurementKind for Distance {
 
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
         let along = self.along(data, row, placed).map_or_else(Vector3::zeros, |(along, _)| along);
-        let reach = placed.from_anchor(self.reading(data, row).map_or("", |reading| reading.anchor)).unwrap_or_else(Vector3::zeros);
+        let reach =
+            placed.from_anchor(self.reading(data, row).map_or("", |reading| reading.anchor)).unwrap_or_else(Vector3::zeros);
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 

@@ -32,7 +32,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
-pub const KINDS: &[&dyn MeasurementKind] = 
+pub const KINDS: &[&dyn MeasurementKind] =
     &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind];
 
 /// What a kind's residual is a size of.

@@ -26,7 +26,8 @@ pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
         let start = if overridden { PathBuf::new() } else { folder.to_path_buf() };
         match matching(&start, &pattern) {
             Ok(found) if found.is_empty() => {
-                troubles.push(Trouble::new(format!("no file matches `{}`", start.join(&pattern).display())).at(mark).below(&place));
+                troubles
+                    .push(Trouble::new(format!("no file matches `{}`", start.join(&pattern).display())).at(mark).below(&place));
             }
             Ok(found) => all.extend(found.into_iter().map(|path| {
                 let mut own = item.clone();
@@ -64,7 +65,9 @@ fn matching(start: &Path, pattern: &str) -> Result<Vec<String>, String> {
     for part in pattern.split('/').filter(|part| !part.is_empty()) {
         let mut next = Vec::new();
         for before in &found {
-            let below = |name: &str| if before.is_empty() || before.ends_with('/') { format!("{before}{name}") } else { format!("{before}/{name}") };
+            let below = |name: &str| {
+                if before.is_empty() || before.ends_with('/') { format!("{before}{name}") } else { format!("{before}/{name}") }
+            };
             if !part.contains(['*', '?']) {
                 next.push(below(part));
                 continue;

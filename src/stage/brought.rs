@@ -75,9 +75,10 @@ pub(super) fn apply(
             None => vec![[from, to].map(|name| setup.anchor(name).unwrap_or(usize::MAX))],
             Some(((before, after), (head, tail))) => {
                 let same = |name: &&str| name.strip_prefix(before)?.strip_suffix(after).map(str::to_string);
-                let pairs = names.iter().enumerate().filter_map(|(at, name)| {
-                    Some([at, setup.anchor(&format!("{head}{}{tail}", same(name)?))?])
-                });
+                let pairs = names
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(at, name)| Some([at, setup.anchor(&format!("{head}{}{tail}", same(name)?))?]));
                 pairs.collect()
             }
         };
@@ -113,7 +114,14 @@ const NAMED: usize = 4;
 const CARRIED: f64 = 0.7;
 
 /// Tells the person what a fit to such rows shows; nothing where no row was brought to a place.
-pub(super) fn note(context: &Context, model: &Model, fitted: &Fitted, data: &Measurements, recording: &Recording, rows: &[usize]) {
+pub(super) fn note(
+    context: &Context,
+    model: &Model,
+    fitted: &Fitted,
+    data: &Measurements,
+    recording: &Recording,
+    rows: &[usize],
+) {
     let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
     let own: Vec<usize> = rows.iter().copied().filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0)).collect();
     if own.is_empty() {
@@ -157,9 +165,9 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
             1e3 * sigma * scale.reach,
             1e3 * scale.reach
         )),
-        None => context.services.note(format!(
-            "all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated"
-        )),
+        None => context
+            .services
+            .note(format!("all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated")),
     }
 }
 
@@ -224,7 +232,10 @@ fn note_far(
         return;
     }
     let count = far.len();
-    let texts: Vec<String> = far.chunk_by(|a, b| a.row + 1 == b.row && a.fixture == b.fixture && a.other == b.other).map(|run| run_text(run, recording)).collect();
+    let texts: Vec<String> = far
+        .chunk_by(|a, b| a.row + 1 == b.row && a.fixture == b.fixture && a.other == b.other)
+        .map(|run| run_text(run, recording))
+        .collect();
     context.services.warn(format!(
         "{} not close within their noise, and {} down-weighted: {}",
         if count == 1 { "1 row does".to_string() } else { format!("{count} rows do") },
@@ -237,7 +248,11 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
     let id = |far: &Far| recording.point_id[far.row].as_str();
     let most = 1e3 * run.iter().map(|far| far.off).fold(0.0, f64::max);
     let (first, last) = (&run[0], &run[run.len() - 1]);
-    let who = if run.len() == 1 { id(first).to_string() } else { format!("{} to {} ({})", id(first), id(last), counted(run.len(), "row")) };
+    let who = if run.len() == 1 {
+        id(first).to_string()
+    } else {
+        format!("{} to {} ({})", id(first), id(last), counted(run.len(), "row"))
+    };
     let why = match &first.other {
         Some(other) => format!(", where `{other}` is"),
         None if run.len() >= TOGETHER => ": ball or fixture moved there".to_string(),

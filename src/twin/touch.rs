@@ -144,7 +144,10 @@ impl Experiment<'_> {
                 let q = self.reach(&arm, &effects, &ranges, there, [time_s, temperature_c], &mut draw);
                 let q = q.ok_or_else(|| {
                     let [x, y, z] = fixture.centre_mm;
-                    format!("`{}` at [{x}, {y}, {z}] mm is out of reach within the joints' limits and above poses.floor_mm", fixture.name)
+                    format!(
+                        "`{}` at [{x}, {y}, {z}] mm is out of reach within the joints' limits and above poses.floor_mm",
+                        fixture.name
+                    )
                 })?;
                 touches.push(Touch { fixture: number, q, time_s, temperature_c });
             }

@@ -1,14 +1,15 @@
 //! Calibration without an instrument: a ball that is brought to sockets, planes and spheres, nothing read but the joints.
 
 mod dirty;
+mod files;
 mod mukca;
 mod rank;
 mod twins;
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
-use calib::error::Result;
 use calib::effect::AnchorShift;
+use calib::error::Result;
 use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
 use calib::robot::description::RobotDescription;
 use calib::robot::{Measurements, Named, RobotModel};
@@ -88,7 +89,11 @@ fn calibrated(robot: &RobotDescription, data: &Measurements, lengths: &[Length],
     let number = |name: &str| robot.setup().anchor(name).expect("a fixture");
     model.lengths = lengths
         .iter()
-        .map(|Length(from, to, length, sigma)| KnownLength { between: [number(from), number(to)], length: *length, sigma: *sigma })
+        .map(|Length(from, to, length, sigma)| KnownLength {
+            between: [number(from), number(to)],
+            length: *length,
+            sigma: *sigma,
+        })
         .collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
@@ -129,7 +134,8 @@ fn fitted_with(
     let seen = |name: &String| rows.iter().any(|row| data.anchor(*row) == Some(name.as_str()));
     let number = |name: &String| robot.setup().anchor(name).expect("a socket");
     let there = pairs.iter().filter(|[from, to]| seen(from) && seen(to));
-    model.lengths = there.map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma: 1e-4 }).collect();
+    model.lengths =
+        there.map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma: 1e-4 }).collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     fit(&model, data, &FitOptions { rows, candidates: &candidates })
 }
@@ -138,5 +144,6 @@ fn fitted_with(
 fn places_of(model: &Model) -> BTreeMap<String, Vector3<f64>> {
     let first = model.stack.parameters_of(AnchorShift::NAME).next().expect("anchors");
     let all = model.robot.setup().anchors.iter().enumerate();
-    all.map(|(k, anchor)| (anchor.name.clone(), anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3]))).collect()
+    all.map(|(k, anchor)| (anchor.name.clone(), anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3])))
+        .collect()
 }

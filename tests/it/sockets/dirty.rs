@@ -55,7 +55,8 @@ fn rows_of_another_hole_are_named_with_the_hole() {
     assert!(text.contains("where `a/1` is"), "{text}");
     assert!(text.contains("the scale of the arm is known to") && text.contains("by the lengths that were given"), "{text}");
     let told = parameters.0.iter().filter(|row| row.name.starts_with("link_geometry") && row.status == "free");
-    let silent: Vec<&str> = told.filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior")).map(|row| row.name.as_str()).collect();
+    let silent: Vec<&str> =
+        told.filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior")).map(|row| row.name.as_str()).collect();
     assert!(silent.is_empty(), "priors are visible in the table: {silent:?}");
 }
 
@@ -115,7 +116,9 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
             *value += 2e-3 * (1.3 * k as f64).sin();
         }
         let mut checked = 0;
-        for (kind, row) in KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row))) {
+        for (kind, row) in
+            KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row)))
+        {
             let mut scratch = model.stack.scratch(&model.robot);
             let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
             if kind.residual(&data, row, &placed).is_none() {
@@ -135,7 +138,11 @@ fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
                 };
                 let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
                 let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());
-                assert!(off < 2e-6 * (1.0 + partial.norm()), "{}, {name}: {central} by differences, {partial}", kind.about().name);
+                assert!(
+                    off < 2e-6 * (1.0 + partial.norm()),
+                    "{}, {name}: {central} by differences, {partial}",
+                    kind.about().name
+                );
             }
         }
         assert_eq!(checked, 13);

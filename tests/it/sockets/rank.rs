@@ -43,7 +43,8 @@ fn sockets_show_all_but_the_base_and_the_scale_and_a_length_shows_that_too() {
 fn planes_and_spheres_show_what_theory_says() {
     for robot in arms() {
         let n = robot.joints.len();
-        let tilted = [plane("low", A, [0.3, -0.2, 1.0], 90, 0.0), plane("high", [480.0, 120.0, 380.0], [0.3, -0.2, 1.0], 90, 0.0)];
+        let tilted =
+            [plane("low", A, [0.3, -0.2, 1.0], 90, 0.0), plane("high", [480.0, 120.0, 380.0], [0.3, -0.2, 1.0], 90, 0.0)];
         assert_eq!(seen(&robot, &tilted[..1], &[], &[]), 4 * n - 4, "{}: a tilted plane", robot.name);
         let apart = Length("low", "high", 0.08 / 1.13f64.sqrt(), 1e-6);
         assert_eq!(seen(&robot, &tilted, &[apart], &[]), 4 * n - 3, "{}: two planes a known distance apart", robot.name);

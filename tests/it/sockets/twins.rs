@@ -44,14 +44,17 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
         }
         let Some(covariance) = &fitted.covariance else { panic!("{} {seed}: singular", robot.name) };
         let (arm, points) = (Arm::new(&robot, &truth), model.predict(&data));
-        let there = |row: usize| Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool);
+        let there =
+            |row: usize| Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool);
         let mut scratch = model.stack.scratch(&model.robot);
         for pair in [[3, 75], [40, 100], [10, data.rows() - 5], [70, data.rows() - 20]] {
             let [a, b] = pair;
             let along = (points[a] - points[b]).normalize();
             let mut rates = vec![0.0; model.x.len()];
             for (row, sign) in [(a, 1.0), (b, -1.0)] {
-                model.stack.derivatives(&model.robot, &data, row, &model.x, &mut scratch, |k, rate| rates[k] += sign * along.dot(&rate));
+                model
+                    .stack
+                    .derivatives(&model.robot, &data, row, &model.x, &mut scratch, |k, rate| rates[k] += sign * along.dot(&rate));
             }
             let parameters = covariance.parameters();
             let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| rates[*k]));
