@@ -124,6 +124,8 @@
 //! | held out | rows that no step is fitted to: they judge in the end and choose nothing |
 //! | set-up error | what is wrong between files and robot file before any physics: a unit, sign, zero, order, frame, typed number |
 //! | suspect | a row that no smooth model can follow; it is set aside and kept |
+//! | brought | of a target: laid into a socket, or to a plane or a sphere, so that joints alone are recorded; it closes where model and place agree |
+//! | volume term | the logarithm of how far joint noise spreads a point that was brought to a place: without it least squares shrinks the arm |
 //! | redundant | a parameter whose effect other free parameters have too; unseen: one that the data do not show |
 //! | observable | what these data determine; unobservable: what they cannot, however good the fit |
 //! | down-weighted | a row that counts for less than its noise says, by Huber's weights |

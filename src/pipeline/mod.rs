@@ -1,6 +1,7 @@
 //! The YAML, the plan, the run: `spec` reads and types, `wiring` and `plan` connect, `run` does what is not already done.
 
 mod execute;
+mod globs;
 mod history;
 mod identity;
 mod lock;

@@ -1,5 +1,6 @@
 //! The pipeline's YAML, typed: every stage with its settings and files, or every fault with its place.
 
+use super::globs;
 use super::overrides::{self, Override};
 use crate::error::{Fault, nearest};
 use crate::stage::{ErasedStage, StageEntry};
@@ -257,6 +258,11 @@ type Typed = (Option<Box<dyn ErasedStage>>, Vec<InputFile>, Vec<Trouble>);
 
 /// Types the settings of a stage and finds its files.
 fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let unnamed = globs::expand(&mut with, folder);
+    if !unnamed.is_empty() {
+        return (None, Vec::new(), unnamed);
+    }
     let stage = match (entry.parse)(&with) {
         Ok(stage) => stage,
         Err(troubles) => return (None, Vec::new(), troubles),
@@ -266,7 +272,6 @@ fn type_settings(file: &Path, mut with: Node, entry: &StageEntry) -> Typed {
         .into_iter()
         .map(|fault| Trouble::new(fault.message).at(with.nearest_mark(&fault.place)).below(&fault.place))
         .collect();
-    let folder = file.parent().unwrap_or(Path::new(""));
     let mut files = Vec::new();
     for (place, raw) in stage.files() {
         let overridden = with.at(&place).is_some_and(|node| node.overridden);

@@ -1,8 +1,10 @@
 //! A simulated recording as the files that a user of that robot would have, and beside them every true number.
 
 use crate::description::RobotDescription;
+use crate::observation::KINDS;
 use crate::table::{Recording, Truth};
 use crate::twin::folder::{self, Decimals, Log};
+use std::collections::BTreeMap;
 
 /// 1e-9 deg is 0.00005 um at 3 m.
 const DECIMALS: Decimals = Decimals { angle: 9, length: 9, time: 2 };
@@ -15,20 +17,35 @@ pub fn recorded(
     recording: Recording,
     truth: &Truth,
     moves: bool,
-) -> Result<[(&'static str, String); 4], String> {
+) -> Result<Vec<(String, String)>, String> {
     let decimals = if moves { MOVING } else { DECIMALS };
     let description = folder::robot(robot)?;
+    let touched = touched(&recording);
     let log = log(recording, moves);
     let mut numbers = "name,effect,where,unit,value\n".to_string();
     for row in &truth.0 {
         numbers.push_str(&format!("{},{},{},{},{}\n", row.name, row.effect, row.place, row.unit, row.value));
     }
-    Ok([
-        ("robot.json", description),
-        ("controller.csv", log.controller(decimals)),
-        ("tracker.csv", log.tracker(decimals)),
-        ("truth.csv", numbers),
-    ])
+    let own = |name: &str, text: String| (name.to_string(), text);
+    let mut files = vec![own("robot.json", description), own("truth.csv", numbers)];
+    if touched.is_empty() {
+        files.extend([own("controller.csv", log.controller(decimals)), own("tracker.csv", log.tracker(decimals))]);
+    }
+    files.extend(touched);
+    Ok(files)
+}
+
+/// Of a recording at fixtures the joints of each, rad (m of a prismatic joint), a file without a header under its name.
+fn touched(recording: &Recording) -> BTreeMap<String, String> {
+    let mut files: BTreeMap<String, String> = BTreeMap::new();
+    for row in 0..recording.rows() {
+        let name = KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| kind.telling());
+        if let Some(name) = name.filter_map(|column| recording.names.get(column.setting)?[row].as_deref()).next() {
+            let joints: Vec<String> = recording.q(row).iter().map(|q| format!("{q:.12}")).collect();
+            files.entry(format!("{name}.csv")).or_default().push_str(&(joints.join(",") + "\n"));
+        }
+    }
+    files
 }
 
 /// The recording as a log; what is not known in a row of it is 0, which the twin never leaves unknown.

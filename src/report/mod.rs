@@ -3,6 +3,7 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod axis;
+mod closure;
 mod corrections;
 mod course;
 mod data;
@@ -103,6 +104,7 @@ struct Page<'a> {
     hashes: &'a [(String, String)],
     errors: errors::ErrorsSection,
     diagnosis: Option<findings::FindingsSection>,
+    closure: Option<closure::ClosureSection>,
     workspace: Option<errors::WorkspaceSection>,
     parameters: parameters::ParametersSection,
     fits: fits::FitsSection,
@@ -136,6 +138,7 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
         errors: errors::ErrorsSection::new(tables, &steps, options.set, judgement.as_ref().is_none_or(|judged| judged.kept))?,
+        closure: closure::ClosureSection::new(tables),
         workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
         parameters: parameters::ParametersSection::new(&tables.parameters, tables.counting.as_deref()),
         fits: fits::FitsSection::new(tables, &steps),

@@ -9,6 +9,7 @@ use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
+use crate::stage::brought::{self, KnownDistance, KnownSphere};
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::screened::{fit_rows, numbered};
 use crate::stage::weightless::weightless_links;
@@ -30,6 +31,12 @@ crate::stage::identified::identification! {
         /// `{A: [50, 0, 20]}`. A target without an entry is placed by the recording. `tool_offset.A.x` and so on are changes from it.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub targets: BTreeMap<String, [f64; 3]>,
+        /// Distances between sockets, planes or spheres that are known from elsewhere: they tell the scale of the arm.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub distances: Vec<KnownDistance>,
+        /// Sizes of spheres that are known, by their names in the recording.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub spheres: BTreeMap<String, KnownSphere>,
     }
 }
 
@@ -52,12 +59,13 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 13;
+    const IMPLEMENTATION: u32 = 14;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = self.shared_faults("fit");
+        faults.extend(brought::faults(&self.distances, &self.spheres));
         for (name, place) in &self.targets {
             if !place.iter().all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET) {
                 faults.push(Fault::new(
@@ -110,6 +118,7 @@ impl Stage for Identify {
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
+        brought::apply(&mut model, &self.distances, &self.spheres, context)?;
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
@@ -128,6 +137,7 @@ impl Stage for Identify {
             repeatability,
             folds: self.folds,
         };
+        brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
         question_ratios(&model, &fitted, &fitting, &setting, context);
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }
@@ -199,7 +209,7 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    let expected = observation::rank(&model.robot, data, rows)?;
+    let expected = observation::rank(&model.robot, data, rows, !model.lengths.is_empty())?;
     (asked && !held && !told).then_some((found, expected))
 }
 
@@ -236,6 +246,7 @@ fn question_ratios(model: &Model, fitted: &Fitted, fitting: &Fitting, setting: &
     effects.push(compliance);
     let mut rival = Model::nominal(model.robot.clone(), EffectStack::new(&model.robot, setting.base, effects));
     rival.known.clone_from(&model.known);
+    rival.lengths.clone_from(&model.lengths);
     let candidates: Vec<usize> = (0..rival.stack.specs().len()).filter(|k| !fitting.held.contains(k)).collect();
     let (rival, refitted) = fit(&rival, fitting.data, &FitOptions { rows: fitting.rows, candidates: &candidates });
     let gain = evidence(fitted, fitting) - evidence(&refitted, fitting);

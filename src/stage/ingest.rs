@@ -113,7 +113,7 @@ writes! {
 impl Stage for Ingest {
     const NAME: &'static str = "ingest";
     const SUMMARY: &'static str = "reads raw files into a recording, and lists every rejected row with its reason";
-    const IMPLEMENTATION: u32 = 6;
+    const IMPLEMENTATION: u32 = 7;
     type Reads = IngestReads;
     type Writes = IngestWrites;
 

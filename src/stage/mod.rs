@@ -2,6 +2,7 @@
 
 mod advice;
 mod blank_payload;
+mod brought;
 mod compare;
 mod computed;
 mod copied;

@@ -1,5 +1,7 @@
 //! `simulate`: a recording from a twin of the robot whose truth is known.
 
+mod fixtures;
+
 use crate::description::{JointKind, RobotDescription};
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::{Instrument, START, SigmaSource};
@@ -8,6 +10,7 @@ use crate::table::{Recording, Robot, Truth, TruthRow};
 use crate::twin::effect::Physical;
 use crate::twin::plan::{Block, Climate, Poses, given};
 use crate::twin::recorder::{Experiment, Motors, Shot};
+use crate::twin::touch::Fixture;
 use crate::twin::tracker::Tracker;
 use crate::twin::true_value::TrueValue;
 use crate::twin::truth::TrueRobot;
@@ -53,7 +56,11 @@ pub struct Simulate {
     #[serde(default)]
     pub poses: Poses,
     /// Runs of points in the order of measurement; their labels become the column `usage`.
+    #[serde(default)]
     pub blocks: Vec<Block>,
+    /// Sockets, planes and spheres to which the ball on the tool is brought instead: no tracker, nothing but joints is recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fixtures: Vec<Fixture>,
     /// The arm moves while it is measured: the rows of all blocks follow one way, so many a second. Missing: it stands at every point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Way>,
@@ -83,14 +90,23 @@ writes! {
 impl Stage for Simulate {
     const NAME: &'static str = "simulate";
     const SUMMARY: &'static str = "records an experiment on a twin whose truth is known";
-    const IMPLEMENTATION: u32 = 2;
+    const IMPLEMENTATION: u32 = 3;
     type Reads = SimulateReads;
     type Writes = SimulateWrites;
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = Vec::new();
         let mut fault = |place: &str, message: &str| faults.push(Fault::new(place, message));
-        if self.blocks.iter().all(|block| block.count() == 0) {
+        for (index, fixture) in self.fixtures.iter().enumerate() {
+            fixture.faults().iter().for_each(|(at, message)| fault(&format!("fixtures[{index}].{at}"), message));
+            if self.fixtures[..index].iter().any(|other| other.name == fixture.name) {
+                fault(&format!("fixtures[{index}].name"), "another one has this name");
+            }
+        }
+        if !self.fixtures.is_empty() && !(self.blocks.is_empty() && self.motion.is_none()) {
+            fault("fixtures", "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`");
+        }
+        if self.fixtures.is_empty() && self.blocks.iter().all(|block| block.count() == 0) {
             fault("blocks", "expected at least one block with points, e.g. [{usage: fit, points: 50}]");
         }
         for (place, pose) in given(&self.blocks) {
@@ -154,6 +170,15 @@ impl Stage for Simulate {
             climate: &self.climate,
             seed: self.seed.unwrap_or(context.seed),
         };
+        if !self.fixtures.is_empty() {
+            let touches = experiment.touch(&self.fixtures).map_err(|message| Error::spec(place, message))?;
+            let (rows, things) = (counted(touches.len(), "row"), counted(self.fixtures.len(), "fixture"));
+            context.services.note(format!("{rows} of joints at {things} of a twin"));
+            let mut truth = truth(&robot, &self.truth, &self.tracker, effects);
+            truth.0.extend(self.fixtures.iter().flat_map(fixtures::truth));
+            truth.0.sort_by(|a, b| a.name.cmp(&b.name));
+            return Ok(SimulateWrites { recording: fixtures::recording(&robot, &self.fixtures, &touches), truth });
+        }
         let points: usize = self.blocks.iter().map(Block::count).sum();
         context.services.begin("measuring the twin", Some(points as u64), "points");
         let mut done = 0;

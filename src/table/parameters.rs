@@ -238,7 +238,7 @@ impl Parameters {
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
         let anchors =
-            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor { name, place: stand.translation });
+            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor::point(&name, stand.translation));
         let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
@@ -306,7 +306,10 @@ fn against_prior(check: &PriorCheck, unit: Unit) -> Option<String> {
                 "prior {mean:.4e} +- {own:.1e} and data {without:.4e} +- {sigma:.1e} contradict each other ({apart:.1} sigma)"
             ))
         }
-        Some((_, sigma)) if sigma < SILENT * check.prior.sigma => None,
+        Some((_, sigma)) if sigma < SILENT * check.prior.sigma => {
+            let [mean, own] = [check.prior.mean, check.prior.sigma].map(|value| unit.from_si(value));
+            Some(format!("prior {mean} +- {own}"))
+        }
         _ => Some("known from its prior alone: the data add nothing".into()),
     }
 }

@@ -22,6 +22,7 @@ pub mod polar;
 pub mod recorder;
 pub mod reveal;
 pub mod statics;
+pub mod touch;
 pub mod tracker;
 pub mod true_value;
 pub mod truth;

@@ -197,7 +197,7 @@ impl Experiment<'_> {
     }
 
     /// The chosen effects and the true robot's linear wind-up.
-    fn all_effects(&self, arm: &Arm) -> Vec<Physical> {
+    pub(super) fn all_effects(&self, arm: &Arm) -> Vec<Physical> {
         let wind_up = arm.links.iter().enumerate().map(|(joint, link)| {
             let rad_per_nm = self.truth.compliance(joint, link.gear * link.motor_constant);
             Physical::JointCompliance(JointCompliance { joint: joint + 1, rad_per_nm })

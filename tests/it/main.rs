@@ -62,6 +62,7 @@ mod robot_faults;
 mod schema;
 mod screen;
 mod shapes;
+mod sockets;
 mod source;
 mod split;
 mod sr210d;

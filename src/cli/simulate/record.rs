@@ -17,7 +17,8 @@ use std::path::PathBuf;
 /// Record an experiment on a robot with stated effects.
 ///
 /// Runs the stage `simulate` of a pipeline and what it needs, and writes what a user of that robot would have: robot.json,
-/// controller.csv and tracker.csv, and beside them truth.csv with every true number. Joints and points keep 9 decimals.
+/// controller.csv and tracker.csv, or of a ball at fixtures a file of joints under the name of each; and beside them truth.csv with every
+/// true number. Joints and points keep 9 decimals, joints at fixtures 12.
 #[derive(Args)]
 #[command(after_help = "Examples:
   calib simulate record pipelines/sr210d/pipeline.yaml --out sr210d
@@ -65,7 +66,9 @@ pub(super) fn main(arguments: &RecordArguments, command_line: &[OsString]) -> Re
     let fault = |error: std::io::Error| Error::store(arguments.out.display().to_string(), error.to_string());
     std::fs::create_dir_all(&arguments.out).map_err(fault)?;
     for (name, text) in files {
-        std::fs::write(arguments.out.join(name), text).map_err(fault)?;
+        let file = arguments.out.join(name);
+        file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(fault)?;
+        std::fs::write(file, text).map_err(fault)?;
     }
     if arguments.json {
         return emit_json(&json!({ "folder": arguments.out.to_string_lossy(), "points": rows, "true_numbers": truth.0.len() }));

@@ -1,15 +1,16 @@
-//! `anchor`: the far end of a draw-wire or ballbar is elsewhere; three parameters each, tracker axes. It moves no point.
+//! `anchor`: what is measured from is elsewhere: the far end of a draw-wire or ballbar, a socket, a plane, a sphere. It moves no point.
+//!
+//! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and `tilt1`, `tilt2` across; of a sphere its
+//! centre and `radius`.
 
 use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
-use crate::robot::RobotModel;
+use crate::robot::{Anchor, RobotModel, Shape};
 use crate::units::Unit;
 use nalgebra::Vector3;
 
-/// The far end of a draw-wire or ballbar.
+/// Where things are that distances go to and that a target is brought to.
 #[derive(Debug, Clone, Copy)]
 pub struct AnchorShift;
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 impl AnchorShift {
     /// Canonical name, as in tables and YAML.
@@ -19,6 +20,15 @@ impl AnchorShift {
     pub fn prefix(anchor: &str) -> String {
         if anchor.is_empty() { format!("{}.", Self::NAME) } else { format!("{}.{anchor}.", Self::NAME) }
     }
+
+    /// Endings of the names of an anchor's parameters.
+    pub fn endings(shape: &Shape) -> &'static [&'static str] {
+        match shape {
+            Shape::Point => &["x", "y", "z"],
+            Shape::Plane(_) => &["offset", "tilt1", "tilt2"],
+            Shape::Sphere(_) => &["x", "y", "z", "radius"],
+        }
+    }
 }
 
 impl Cause for AnchorShift {
@@ -26,10 +36,10 @@ impl Cause for AnchorShift {
         &CauseDescription {
             name: "anchor",
             place: "anchor",
-            formula: "the far end of a draw-wire or ballbar is elsewhere; it moves no point",
+            formula: "what is measured from is elsewhere: the end of a draw-wire or ballbar, a socket, a plane, a sphere; it moves no point",
             size: "any",
             confounded: "base_frame",
-            needs: "distances",
+            needs: "distances, sockets, planes or spheres",
         }
     }
 
@@ -46,10 +56,10 @@ impl Effect for AnchorShift {
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {
         let anchors = robot.setup().anchors.iter();
         let all = anchors.flat_map(|anchor| {
-            AXES.iter().map(move |axis| ParameterSpec {
-                name: format!("{}{axis}", Self::prefix(&anchor.name)),
+            Self::endings(&anchor.shape).iter().map(move |ending| ParameterSpec {
+                name: format!("{}{ending}", Self::prefix(&anchor.name)),
                 place: Place::Anchor,
-                unit: Unit::Millimetre,
+                unit: if ending.starts_with("tilt") { Unit::Radian } else { Unit::Millimetre },
                 prior_sigma: 1.0,
             })
         });
@@ -57,10 +67,21 @@ impl Effect for AnchorShift {
     }
 
     fn deflect(&self, robot: &RobotModel, state: &ArmState, p: &[f64], out: &mut Deflection) {
-        if let Some(number) = state.anchor(robot) {
-            for axis in 0..3 {
-                out.move_anchor(3 * number + axis, p, Vector3::ith(axis, 1.0));
-            }
+        let setup = robot.setup();
+        let Some((number, anchor)) = state.anchor(robot).and_then(|number| Some((number, setup.anchors.get(number)?))) else {
+            return;
+        };
+        let first = setup.first_of_anchor(number);
+        if let Shape::Plane(normal) = &anchor.shape {
+            out.move_anchor(first, p, *normal);
+            out.tilt_anchor(first + 1, p, normal, &Anchor::across(normal));
+            return;
+        }
+        for axis in 0..3 {
+            out.move_anchor(first + axis, p, Vector3::ith(axis, 1.0));
+        }
+        if let Shape::Sphere(_) = anchor.shape {
+            out.grow_anchor(first + 3, p);
         }
     }
 }

@@ -14,6 +14,10 @@ pub enum Direction {
     Torque(usize, f64),
     /// Of the row's anchor, tracker frame, m per unit.
     Anchor(Vector3<f64>),
+    /// Of the normal of the row's plane, which is the first vector: its change, the second, per unit.
+    AnchorTilt(Vector3<f64>, Vector3<f64>),
+    /// Of the radius of the row's sphere, m per unit.
+    AnchorGrowth(f64),
     /// Of the point as the instrument reads it, tracker frame, m per unit.
     Instrument(Vector3<f64>),
 }
@@ -27,6 +31,10 @@ pub struct Deflection {
     pub station: Vec<Twist>,
     /// How far the row's anchor is from where it was believed, tracker frame, m.
     pub anchor: Vector3<f64>,
+    /// What the normal of the row's plane has across the one that was believed.
+    pub anchor_tilt: Vector3<f64>,
+    /// How much larger the radius of the row's sphere is than was believed, m.
+    pub anchor_growth: f64,
     /// How far the point is read from where it is, tracker frame, m.
     pub reading: Vector3<f64>,
     /// How far each joint yields to a torque more, rad/Nm.
@@ -53,6 +61,8 @@ impl Deflection {
         let (joint, station) = (vec![0.0; joints], vec![Twist::zeros(); joints + 1]);
         Self {
             anchor: Vector3::zeros(),
+            anchor_tilt: Vector3::zeros(),
+            anchor_growth: 0.0,
             reading: Vector3::zeros(),
             compliance: joint.clone(),
             joint,
@@ -68,6 +78,8 @@ impl Deflection {
         self.joint.fill(0.0);
         self.station.fill(Twist::zeros());
         self.anchor = Vector3::zeros();
+        self.anchor_tilt = Vector3::zeros();
+        self.anchor_growth = 0.0;
         self.reading = Vector3::zeros();
         self.compliance.fill(0.0);
         self.partials.clear();
@@ -120,6 +132,22 @@ impl Deflection {
     pub fn move_anchor(&mut self, parameter: usize, p: &[f64], rate: Vector3<f64>) {
         self.anchor += rate * p[parameter];
         self.partial(parameter, Direction::Anchor(rate));
+    }
+
+    /// Tilts the row's plane by `p[first]` and `p[first + 1]` (rad) along `across`, from the unit normal that was believed.
+    pub fn tilt_anchor(&mut self, first: usize, p: &[f64], normal: &Vector3<f64>, across: &[Vector3<f64>; 2]) {
+        self.anchor_tilt = across[0] * p[first] + across[1] * p[first + 1];
+        let tilted = normal + self.anchor_tilt;
+        let (length, now) = (tilted.norm(), tilted.normalize());
+        for (k, direction) in across.iter().enumerate() {
+            self.partial(first + k, Direction::AnchorTilt(now, (direction - now * now.dot(direction)) / length));
+        }
+    }
+
+    /// Makes the radius of the row's sphere larger by `p[parameter]`, m.
+    pub fn grow_anchor(&mut self, parameter: usize, p: &[f64]) {
+        self.anchor_growth += p[parameter];
+        self.partial(parameter, Direction::AnchorGrowth(1.0));
     }
 
     /// Moves what the instrument reads by `p[parameter] * rate` (m per unit).

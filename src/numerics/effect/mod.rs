@@ -63,6 +63,7 @@ mod unknown;
 mod unweighed_windup;
 mod variable;
 mod viscous_windup;
+mod volume;
 mod warmth;
 mod words;
 mod wrong_point;
@@ -101,6 +102,7 @@ pub use tool_shift::ToolShift;
 pub use unknown::Unknown;
 pub use variable::Variable;
 pub use viscous_windup::ViscousWindup;
+pub use volume::Closing;
 pub use words::{Clock, figure};
 pub use zero_shift::ZeroShift;
 

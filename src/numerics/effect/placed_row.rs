@@ -3,7 +3,7 @@
 //! The buffers of an evaluation are in [`PlacementBuffers`]; what follows from them is asked of [`PlacedRow`], which holds them.
 
 use super::{Deflection, Direction};
-use crate::robot::{LoadCorrection, Posture, RobotModel, Travel};
+use crate::robot::{LoadCorrection, Posture, RobotModel, Shape, Travel};
 use crate::spatial::{Pose, Twist, hat, left_jacobian};
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
 
@@ -65,7 +65,7 @@ pub(super) struct Station {
     /// Whether nothing moves here: most stations of most models.
     pub still: bool,
     pub motion: Pose,
-    jacobian: Matrix6<f64>,
+    pub jacobian: Matrix6<f64>,
 }
 
 impl Station {
@@ -100,6 +100,17 @@ impl PlacedRow<'_> {
         Some(self.point - reading - anchor.place - shift)
     }
 
+    /// What an anchor is, corrections included. `None` where the robot knows no such anchor.
+    pub fn anchor_shape(&self, anchor: &str) -> Option<Shape> {
+        let setup = self.robot.setup();
+        let deflection = &self.scratch.deflection;
+        Some(match setup.anchors.get(setup.anchor(anchor)?)?.shape {
+            Shape::Point => Shape::Point,
+            Shape::Plane(normal) => Shape::Plane((normal + deflection.anchor_tilt).normalize()),
+            Shape::Sphere(radius) => Shape::Sphere(radius + deflection.anchor_growth),
+        })
+    }
+
     /// The tool frame, and the velocity (v; w) of its origin by each joint.
     pub(crate) fn tool(&self, velocities: &mut [Twist]) -> Pose {
         let behind = &self.scratch.posture.behind;
@@ -130,12 +141,13 @@ impl PlacedRow<'_> {
         }
     }
 
-    /// Derivatives of the vector from the row's anchor to the point, m.
-    pub fn partials_from_anchor(&mut self, mut emit: impl FnMut(usize, Vector3<f64>)) {
+    /// Derivatives of the vector from the row's anchor to the point (m), which is `reach`: as seen from a plane that tilts, from the
+    /// surface of a sphere that grows.
+    pub fn partials_from_anchor(&mut self, reach: &Vector3<f64>, mut emit: impl FnMut(usize, Vector3<f64>)) {
         self.scratch.velocities(self.robot, &self.point);
         let PlacementBuffers { deflection, by_station, by_joint, .. } = &*self.scratch;
         for (parameter, direction) in &deflection.partials {
-            emit(*parameter, from_anchor(direction, by_joint, by_station, &deflection.compliance));
+            emit(*parameter, from_anchor(direction, reach, by_joint, by_station, &deflection.compliance));
         }
     }
 }
@@ -189,20 +201,23 @@ impl Turns {
                 Some(frame * (twist * rate))
             }
             Direction::Torque(joint, rate) => Some(self.by_joint[*joint] * (yielding[*joint] * *rate)),
-            Direction::Anchor(_) | Direction::Instrument(_) => None,
+            Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) | Direction::Instrument(_) => None,
         }
     }
 }
 
-/// Derivative of the vector from the row's anchor to the point.
+/// Derivative of the vector from the row's anchor to the point, which is `reach`.
 pub(super) fn from_anchor(
     direction: &Direction,
+    reach: &Vector3<f64>,
     by_joint: &[Vector3<f64>],
     by_station: &[Matrix3x6<f64>],
     yielding: &[f64],
 ) -> Vector3<f64> {
     match direction {
         Direction::Anchor(rate) => -rate,
+        Direction::AnchorTilt(normal, turn) => normal * turn.dot(reach),
+        Direction::AnchorGrowth(rate) => reach.try_normalize(0.0).map_or_else(Vector3::zeros, |along| along * -*rate),
         Direction::Instrument(_) => Vector3::zeros(),
         other => along(other, by_joint, by_station, yielding),
     }
@@ -218,7 +233,7 @@ pub(super) fn along(
         Direction::Joint(joint, rate) => by_joint[*joint] * *rate,
         Direction::Station(station, rate) => by_station[*station] * rate,
         Direction::Torque(joint, rate) => by_joint[*joint] * (yielding[*joint] * *rate),
-        Direction::Anchor(_) => Vector3::zeros(),
+        Direction::Anchor(_) | Direction::AnchorTilt(..) | Direction::AnchorGrowth(_) => Vector3::zeros(),
         Direction::Instrument(rate) => *rate,
     }
 }

@@ -307,9 +307,9 @@ impl PointMotion {
         along(direction, &self.by_joint, &self.by_station, &self.compliance)
     }
 
-    /// Derivative of the vector from the row's anchor to the point, m per unit.
-    pub fn from_anchor_along(&self, direction: &Direction) -> Vector3<f64> {
-        from_anchor(direction, &self.by_joint, &self.by_station, &self.compliance)
+    /// Derivative of the vector from the row's anchor to the point, which is `reach`, m per unit.
+    pub fn from_anchor_along(&self, direction: &Direction, reach: &Vector3<f64>) -> Vector3<f64> {
+        from_anchor(direction, reach, &self.by_joint, &self.by_station, &self.compliance)
     }
 
     /// Rotation of the target about the tracker's axes, rad per unit; zero where turns were not asked for.

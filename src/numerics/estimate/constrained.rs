@@ -2,6 +2,7 @@
 
 use super::factor::TriangularFactor;
 use super::known::Known;
+use super::length::LengthTerm;
 use super::model::Model;
 use faer::Mat;
 
@@ -21,22 +22,30 @@ impl Model {
         self.known.get(&parameter).copied().unwrap_or_default()
     }
 
-    /// The factor with a row for every prior of the `free` parameters, and what the priors add to the cost.
+    /// The factor with a row for every prior of the `free` parameters and for every known length, and what these add to the cost.
     pub(crate) fn with_priors(&self, free: &[usize], factor: TriangularFactor) -> (TriangularFactor, f64) {
         let priors: Vec<(usize, f64, f64)> = free
             .iter()
             .enumerate()
             .filter_map(|(j, k)| self.known(*k).prior.map(|prior| (j, prior.sigma, (prior.mean - self.x[*k]) / prior.sigma)))
             .collect();
-        if priors.is_empty() {
+        let lengths: Vec<LengthTerm> = self.length_terms().collect();
+        if priors.is_empty() && lengths.is_empty() {
             return (factor, 0.0);
         }
-        let mut rows = Mat::zeros(priors.len(), free.len() + 1);
+        let mut rows = Mat::zeros(priors.len() + lengths.len(), free.len() + 1);
+        for (i, term) in lengths.iter().enumerate() {
+            for (parameter, rate) in &term.rates {
+                free.iter().position(|k| k == parameter).into_iter().for_each(|j| rows[(priors.len() + i, j)] += rate);
+            }
+            rows[(priors.len() + i, free.len())] = term.error;
+        }
         for (i, (j, sigma, off)) in priors.iter().enumerate() {
             rows[(i, *j)] = 1.0 / sigma;
             rows[(i, free.len())] = *off;
         }
-        let cost = priors.iter().map(|(_, _, off)| 0.5 * off * off).sum();
+        let squares = priors.iter().map(|(_, _, off)| off * off).chain(lengths.iter().map(|term| term.error * term.error));
+        let cost = squares.map(|square| 0.5 * square).sum();
         (factor.stack(&TriangularFactor::of(&rows)), cost)
     }
 

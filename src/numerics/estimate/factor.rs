@@ -120,6 +120,23 @@ impl TriangularFactor {
         Self { r: self.r.scaled(weight) }
     }
 
+    /// The same problem with `pull` beside J^T r: the downhill gradient of what is no sum of squares. Nothing where a column is nought.
+    pub fn pulled(self, pull: &[f64]) -> Self {
+        if pull.iter().all(|value| *value == 0.0) {
+            return self;
+        }
+        let p = self.parameters();
+        let mut more = vec![0.0; p];
+        for j in 0..p {
+            let column = self.r.column(j);
+            let pivot = column[j];
+            let known = dot(&column[..j], &more[..j]);
+            more[j] = if pivot.abs() > 1e-12 * self.column_norm(j) { (pull[j] - known) / pivot } else { 0.0 };
+        }
+        let entry = |i: usize, j: usize| self.r.at(i, j) + if j == p && i < p { more[i] } else { 0.0 };
+        Self { r: Triangle::from_fn(p + 1, entry) }
+    }
+
     /// An entry of R; row and column p are the right-hand side's.
     pub(super) fn entry(&self, i: usize, j: usize) -> f64 {
         self.r.at(i, j)

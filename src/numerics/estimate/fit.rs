@@ -121,7 +121,8 @@ pub fn fit(start: &Model, data: &Measurements, options: &FitOptions) -> (Model, 
     };
     search.settle(&mut problem, &mut model, options.candidates, sight, true);
     let mut all = problem.observe(&model, options.candidates);
-    if search.reconsider(&mut problem, &mut model, options.candidates, &all) {
+    let shown = problem.shown(&model, options.candidates).unwrap_or_else(|| all.factor.clone());
+    if search.reconsider(&mut problem, &mut model, options.candidates, shown) {
         all = problem.observe(&model, options.candidates);
     }
     let fitted = stated(&problem, &model, options.candidates, search, all);
@@ -165,7 +166,7 @@ fn stated(problem: &Problem, model: &Model, candidates: &[usize], search: Minimi
     }
     let has_angles = all.residuals.iter().any(|residual| residual.dimension() == Dimension::Angle);
     let (factor, _) = model.with_priors(&free, data);
-    let (everything, _) = model.with_priors(candidates, all.factor);
+    let (everything, _) = model.with_priors(candidates, problem.shown(model, candidates).unwrap_or(all.factor));
     let singular = factor.singular_values(&prior(&free));
     let singular_all = everything.singular_values(&prior(candidates));
     Fitted {
@@ -198,9 +199,9 @@ struct Minimisation {
 impl Minimisation {
     /// Takes up candidates that the nominal robot hid and the identified one (`all`, the data in all candidates there) shows: a
     /// point meant to lie on the last axis never does. Whether any was worth it; else the model is as before.
-    fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: &Evaluation) -> bool {
+    fn reconsider(&mut self, problem: &mut Problem, model: &mut Model, candidates: &[usize], all: TriangularFactor) -> bool {
         // What is estimated comes first, so that only what it cannot do counts as new.
-        let (sight, _) = model.with_priors(candidates, all.factor.clone());
+        let (sight, _) = model.with_priors(candidates, all);
         let mut order: Vec<usize> = (0..candidates.len()).collect();
         order.sort_by_key(|j| !self.free.contains(&candidates[*j]));
         let wary = order.iter().map(|j| model.stack.specs()[candidates[*j]].prior_sigma / CLEARLY).collect::<Vec<_>>();
@@ -213,9 +214,9 @@ impl Minimisation {
         }
         let free: Vec<usize> = candidates.iter().copied().filter(|k| self.free.contains(k) || new.contains(k)).collect();
         let (before, start) = (model.x.clone(), problem.evaluate(model, &free));
-        let cost = start.cost;
+        let cost = start.objective();
         let (_, stop, end) = minimise(problem, model, &free, start, FINE);
-        if stop != Stop::Converged || cost - end.cost < WORTH[0] + WORTH[1] * (new.len() - 1) as f64 {
+        if stop != Stop::Converged || cost - end.objective() < WORTH[0] + WORTH[1] * (new.len() - 1) as f64 {
             model.x = before;
             return false;
         }
@@ -229,7 +230,8 @@ impl Minimisation {
         let mut candidates = candidates.to_vec();
         for round in 0..ROUNDS {
             let prior: Vec<f64> = candidates.iter().map(|k| model.stack.specs()[*k].prior_sigma).collect();
-            let seen = visibility(&sight.factor, &prior);
+            let shown = problem.shown(model, &candidates).map(|factor| model.with_priors(&candidates, factor).0);
+            let seen = visibility(shown.as_ref().unwrap_or(&sight.factor), &prior);
             for (k, verdict) in candidates.iter().zip(&seen) {
                 self.statuses[*k] = match verdict {
                     Visibility::Seen => ParameterStatus::Free(f64::NAN),

@@ -2,7 +2,7 @@
 
 use super::align::align;
 use crate::observation::{KINDS, kinds};
-use crate::robot::{MeasurementSetup, Measurements, RobotModel, Target};
+use crate::robot::{Anchor, MeasurementSetup, Measurements, RobotModel, Target};
 use crate::spatial::Pose;
 use crate::statistics::nearest;
 use nalgebra::{Matrix3, Vector3};
@@ -51,7 +51,11 @@ pub fn gauge(
         None => target.clone(),
     };
     let targets = robot.setup().targets.iter().map(turned).collect();
-    let anchors = KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
+    let anchors: Vec<Anchor> =
+        KINDS.iter().map(|kind| kind.anchors(&robot, data, rows, &base)).collect::<Result<Vec<_>, _>>()?.concat();
+    if let Some(twice) = (1..anchors.len()).find(|k| anchors[..*k].iter().any(|other| other.name == anchors[*k].name)) {
+        return Err(format!("`{}` names things of two kinds; give each a name of its own", anchors[twice].name));
+    }
     Ok((robot.measured_by(MeasurementSetup { targets, anchors }), base))
 }
 

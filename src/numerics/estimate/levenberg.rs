@@ -97,7 +97,7 @@ pub(crate) fn minimise(
             }
             // Nearly every step is taken, so that its derivatives are worth computing at once.
             let next = problem.evaluate(model, free);
-            if next.cost.is_finite() && next.cost <= now.cost * (1.0 + 1e-12) {
+            if next.cost.is_finite() && next.objective() <= now.objective() + 1e-12 * now.cost {
                 break (step, next);
             }
             model.x = before;
@@ -107,7 +107,7 @@ pub(crate) fn minimise(
             damping = raise(damping);
         };
         let step_norm = step_norm(&now.factor, &step);
-        let fall = now.cost - next.cost;
+        let fall = now.objective() - next.objective();
         now = next;
         course.push(iteration(model, free, &now, step_norm, damping));
         if step_norm < effort.tolerance || fall <= COST_TOLERANCE * now.cost {

@@ -1,6 +1,7 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
 use super::known::Known;
+use super::length::KnownLength;
 use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, PlacementBuffers};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -20,13 +21,15 @@ pub struct Model {
     pub x: Vec<f64>,
     /// What is known of some parameters beforehand, by position in the stack.
     pub known: BTreeMap<usize, Known>,
+    /// Lengths between anchors that are known from elsewhere.
+    pub lengths: Vec<KnownLength>,
 }
 
 impl Model {
     /// The model with all parameters zero: the nominal robot.
     pub fn nominal(robot: RobotModel, stack: EffectStack) -> Self {
         let x = vec![0.0; stack.specs().len()];
-        Self { robot, stack: Arc::new(stack), x, known: BTreeMap::new() }
+        Self { robot, stack: Arc::new(stack), x, known: BTreeMap::new(), lengths: Vec::new() }
     }
 
     /// Where the base stands in the tracker's frame, corrections included.

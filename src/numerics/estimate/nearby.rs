@@ -37,6 +37,7 @@ pub(crate) struct NearbyFits<'a> {
 struct LeftOutRows<'a> {
     rows: &'a [usize],
     factor: TriangularFactor,
+    pull: Vec<f64>,
     /// Root of the Huber weight of each term.
     shares: Vec<f64>,
 }
@@ -53,11 +54,12 @@ impl<'a> NearbyFits<'a> {
             let problem = Problem { data, rows, excess };
             let seen = problem.observe(model, columns);
             let shares = problem.errors(&seen.residuals).into_iter().map(|(error, axes)| share(error, axes)).collect();
-            LeftOutRows { rows, factor: seen.factor, shares }
+            LeftOutRows { rows, factor: seen.factor, pull: seen.pull, shares }
         };
         let parts: Vec<LeftOutRows> = parts.par_iter().map(part).collect();
         let all = parts.iter().map(|part| part.factor.clone()).reduce(|sum, part| sum.stack(&part))?;
-        let (whole, _) = model.with_priors(columns, all);
+        let pull: Vec<f64> = (0..columns.len()).map(|j| parts.iter().map(|part| part.pull[j]).sum()).collect();
+        let whole = model.with_priors(columns, all).0.pulled(&pull);
         Some(Self { data, model, excess, scale, columns: columns.to_vec(), whole, parts })
     }
 

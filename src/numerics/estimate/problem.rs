@@ -28,11 +28,22 @@ pub(crate) struct Problem<'a> {
 pub(crate) struct Evaluation {
     /// Measured - predicted, in the order of the problem's rows; of a row in the order of kinds.
     pub residuals: Vec<Residual>,
-    /// Sum of Huber's losses and of the priors', dimensionless.
+    /// Sum of Huber's losses, of the priors' and of known lengths', dimensionless.
     pub cost: f64,
+    /// Sum over what was brought to a place of the logarithm of the volume that joint noise is spread over, and its derivatives by the
+    /// parameters.
+    pub volume: f64,
+    pub pull: Vec<f64>,
     /// Root mean square of the residual length of points, or of another length where no point was measured, m.
     pub rms: f64,
     pub factor: TriangularFactor,
+}
+
+impl Evaluation {
+    /// What is minimised: the cost less the volume, minus the logarithm of the likelihood but for constants.
+    pub fn objective(&self) -> f64 {
+        self.cost - self.volume
+    }
 }
 
 impl Problem<'_> {
@@ -46,7 +57,7 @@ impl Problem<'_> {
     pub fn evaluate(&self, model: &Model, free: &[usize]) -> Evaluation {
         let data = self.observe(model, free);
         let (factor, cost) = model.with_priors(free, data.factor);
-        Evaluation { factor, cost: data.cost + cost, ..data }
+        Evaluation { factor: factor.pulled(&data.pull), cost: data.cost + cost, ..data }
     }
 
     /// The same from the data alone.
@@ -58,13 +69,16 @@ impl Problem<'_> {
         let spans: Vec<Span> = self.rows.par_chunks(SPAN).map(|span| self.span(model, span, &column, free.len())).collect();
         let mut residuals = Vec::with_capacity(self.rows.len());
         let mut sum: Option<TriangularFactor> = None;
-        for Span { residuals: some, factor } in spans {
+        let (mut volume, mut pull) = (0.0, vec![0.0; free.len()]);
+        for Span { residuals: some, factor, volume: own, pull: towards } in spans {
             residuals.extend(some);
+            volume += own;
+            pull.iter_mut().zip(towards).for_each(|(sum, own)| *sum += own);
             sum = Some(sum.map_or_else(|| factor.clone(), |sum| sum.stack(&factor)));
         }
         let cost = self.errors(&residuals).into_iter().map(|(error, axes)| huber(error, axes)).sum();
         let factor = sum.unwrap_or_else(|| TriangularFactor::of(&Mat::zeros(1, free.len() + 1)));
-        Evaluation { cost, rms: rms(&residuals), residuals, factor }
+        Evaluation { cost, volume, pull, rms: rms(&residuals), residuals, factor }
     }
 
     /// Residuals and factor of some rows, in memory of a chunk.
@@ -75,6 +89,7 @@ impl Problem<'_> {
         let lines_of_row = 3 * kinds.len();
         let mut tall = StackedRows::new(p + 1, lines_of_row * rows.len().min(CHUNK));
         let mut residuals = Vec::with_capacity(rows.len());
+        let (mut volume, mut pull) = (0.0, vec![0.0; p]);
         for chunk in rows.chunks(CHUNK) {
             let height = lines_of_row * chunk.len();
             let mut lines = tall.chunk(height);
@@ -94,12 +109,18 @@ impl Problem<'_> {
                     if let Some((term, residual)) = ObservationTerm::of(*kind, self.data, row, &placed, self.excess) {
                         write(lines_of_row * i + 3 * k, term, &mut placed);
                         residuals.push(residual);
+                        if let Some(closing) = kind.closing(self.data, row, &placed) {
+                            let own = placed.log_volume(&closing, |parameter, change| {
+                                column[parameter].into_iter().for_each(|j| pull[j] += change);
+                            });
+                            volume += own.unwrap_or_default();
+                        }
                     }
                 }
             }
             tall.absorb(height);
         }
-        Span { residuals, factor: tall.factor() }
+        Span { residuals, factor: tall.factor(), volume, pull }
     }
 }
 
@@ -124,4 +145,6 @@ fn add(to: &mut [f64], value: &Vector3<f64>) {
 struct Span {
     residuals: Vec<Residual>,
     factor: TriangularFactor,
+    volume: f64,
+    pull: Vec<f64>,
 }

@@ -2,7 +2,7 @@
 
 use super::model::Model;
 use crate::effect::{AnchorShift, BaseFrame, ToolOffset};
-use crate::robot::Target;
+use crate::robot::{Shape, Target};
 use crate::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 
@@ -15,12 +15,22 @@ impl Model {
         let number = parameter - range.start;
         match effect.name() {
             BaseFrame::NAME => (component(self.stack.base(), number), component(&self.base(), number)),
-            AnchorShift::NAME => match self.robot.setup().anchors.get(number / 3) {
-                Some(anchor) => (anchor.place[number % 3], anchor.place[number % 3] + change.1),
-                None => change,
-            },
+            AnchorShift::NAME => self.anchored(number).map_or(change, |nominal| (nominal, nominal + change.1)),
             ToolOffset::NAME => self.seat(number, &self.x[range]).unwrap_or(change),
             _ => change,
+        }
+    }
+
+    /// Where the `number`-th parameter of anchors stands at the start: a coordinate or a radius; none of a plane's.
+    fn anchored(&self, number: usize) -> Option<f64> {
+        let setup = self.robot.setup();
+        let of = (0..setup.anchors.len()).rev().find(|of| setup.first_of_anchor(*of) <= number)?;
+        let axis = number - setup.first_of_anchor(of);
+        let anchor = setup.anchors.get(of)?;
+        match anchor.shape {
+            Shape::Plane(_) => None,
+            Shape::Sphere(radius) if axis == 3 => Some(radius),
+            _ => Some(anchor.place[axis]),
         }
     }
 

@@ -25,7 +25,7 @@ static ABOUT: KindDescription = KindDescription {
             "distance",
             &["distance"],
             Length,
-            [0.0, 200.0],
+            [1e-6, 200.0],
             "Distance of the target from an anchor: a draw-wire or ballbar.",
         )
         .as_part(Part::Value),
@@ -61,7 +61,9 @@ impl MeasurementKind for Distance {
 
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity {
         let along = self.along(data, row, placed).map_or_else(Vector3::zeros, |(along, _)| along);
-        Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)))
+        let reach =
+            placed.from_anchor(self.reading(data, row).map_or("", |reading| reading.anchor)).unwrap_or_else(Vector3::zeros);
+        Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 
     /// Each from d2 - p2 = a2 - 2 p a over its rows, linear in a and a2.
@@ -85,7 +87,7 @@ impl MeasurementKind for Distance {
             let lines = DMatrix::from_fn(count, 4, |i, j| if j < 3 { -2.0 * (seen[i].0 - middle)[j] } else { 1.0 });
             let right = DVector::from_fn(count, |i, _| seen[i].1.powi(2) - (seen[i].0 - middle).norm_squared());
             let solution = lines.svd(true, true).solve(&right, 1e-9).map_err(|_| format!("{called} cannot be placed"))?;
-            Ok(Anchor { name: name.into(), place: middle + Vector3::new(solution[0], solution[1], solution[2]) })
+            Ok(Anchor::point(name, middle + Vector3::new(solution[0], solution[1], solution[2])))
         };
         by_name.into_iter().map(place).collect()
     }

@@ -7,19 +7,25 @@ mod column;
 mod distance;
 mod inclination;
 mod orientation;
+mod plane;
 mod point;
 mod residual;
+mod socket;
+mod sphere;
 mod weight;
 
 pub use column::{ColumnShape, Convention, Conventions, DeclaredColumn, Part};
 pub use distance::Distance;
 pub use inclination::Inclination;
 pub use orientation::Orientation;
+pub use plane::PlaneKind;
 pub use point::PointKind;
 pub use residual::{ExcessSigma, Residual};
+pub use socket::SocketKind;
+pub use sphere::SphereKind;
 pub use weight::Weight;
 
-use crate::effect::{Direction, PlacedRow, PointMotion};
+use crate::effect::{Closing, Direction, PlacedRow, PointMotion};
 use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel};
 use crate::spatial::Pose;
 use crate::units::Unit;
@@ -27,7 +33,8 @@ use nalgebra::{Matrix3, Vector3};
 use std::ops::RangeInclusive;
 
 /// Every kind of measurement; a recording that maps no other holds the first.
-pub const KINDS: &[&dyn MeasurementKind] = &[&PointKind, &Orientation, &Distance, &Inclination];
+pub const KINDS: &[&dyn MeasurementKind] =
+    &[&PointKind, &Orientation, &Distance, &Inclination, &SocketKind, &PlaneKind, &SphereKind];
 
 /// What a kind's residual is a size of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,8 +94,8 @@ pub enum Sensitivity {
     Point(Weight),
     /// Derivatives are those of the rotation of the target.
     Rotation(Weight),
-    /// Derivatives are those of the point, along the line from the anchor.
-    FromAnchor(Weight),
+    /// Derivatives are those of the vector from the anchor, which stands here.
+    FromAnchor(Weight, Vector3<f64>),
 }
 
 impl Sensitivity {
@@ -97,7 +104,7 @@ impl Sensitivity {
         match self {
             Self::Point(weight) => weight.apply(&motion.point_along(direction)),
             Self::Rotation(weight) => weight.apply(&motion.turn_along(direction)),
-            Self::FromAnchor(weight) => weight.apply(&motion.from_anchor_along(direction)),
+            Self::FromAnchor(weight, reach) => weight.apply(&motion.from_anchor_along(direction, reach)),
         }
     }
 
@@ -106,7 +113,7 @@ impl Sensitivity {
         match self {
             Self::Point(weight) => placed.partials(|k, velocity| emit(k, weight.apply(&velocity))),
             Self::Rotation(weight) => placed.rotations(|k, rotation| emit(k, weight.apply(&rotation))),
-            Self::FromAnchor(weight) => placed.partials_from_anchor(|k, velocity| emit(k, weight.apply(&velocity))),
+            Self::FromAnchor(weight, reach) => placed.partials_from_anchor(reach, |k, velocity| emit(k, weight.apply(&velocity))),
         }
     }
 }
@@ -122,6 +129,11 @@ pub trait MeasurementKind: Sync {
 
     /// What it sees of the target's motion, its residual being turned into standard deviations by `weight`.
     fn sensitivity(&self, data: &Measurements, row: usize, placed: &PlacedRow, weight: Weight) -> Sensitivity;
+
+    /// In which directions the target was brought to something, where that is the measurement: nothing was read but the joints.
+    fn closing(&self, _data: &Measurements, _row: usize, _placed: &PlacedRow) -> Option<Closing> {
+        None
+    }
 
     /// Values that a row has of it.
     fn axes(&self, data: &Measurements, row: usize) -> usize {
@@ -191,6 +203,17 @@ impl dyn MeasurementKind + '_ {
         self.about().columns.iter().filter(move |column| column.part == part)
     }
 
+    /// Columns that say that a row measured it: its values or, of a kind that reads none, the name of what the target was brought to.
+    pub fn telling(&self) -> impl Iterator<Item = &'static DeclaredColumn> {
+        let part = if self.is_brought() { Part::Anchor } else { Part::Value };
+        self.about().columns.iter().filter(move |column| column.part == part)
+    }
+
+    /// Whether the target is brought to something, and nothing is read but the joints.
+    pub fn is_brought(&self) -> bool {
+        self.columns(Part::Value).next().is_none()
+    }
+
     /// What rows measured of it beside points, of the recording's `numbers` (SI, row-major) and `names` by setting.
     pub fn readings<'a>(
         &self,
@@ -208,7 +231,11 @@ impl dyn MeasurementKind + '_ {
             values.iter().for_each(|(all, width)| stored.extend_from_slice(&all[row * width..(row + 1) * width]));
             self.keep(&stored, &mut kept);
         }
-        let anchor = self.columns(Part::Anchor).next().map(|column| named(column.setting).unwrap_or_default());
+        let anchor = self.columns(Part::Anchor).next().map(|column| named(column.setting));
+        if self.is_brought() && anchor.as_ref().is_none_or(Option::is_none) {
+            return None;
+        }
+        let anchor = anchor.map(Option::unwrap_or_default);
         Some(Readings { kind: self.about().name, width: kept.len() / sigma.len().max(1), values: kept, sigma, anchor })
     }
 }
@@ -238,9 +265,9 @@ pub fn noise(data: &Measurements, row: usize) -> f64 {
 
 /// Parameters of the geometry that the rows see by theory; none where some saw axes of a point only, of which theory has no word.
 ///
-/// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor; less
-/// what moves the whole cell unseen.
-pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<usize> {
+/// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor (4 for a
+/// sphere); less what moves the whole cell unseen, and its scale where targets are only brought to things and no `length` is known.
+pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool) -> Option<usize> {
     let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
         rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)))
     };
@@ -262,6 +289,7 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize]) -> Option<u
     let setup = robot.setup();
     let place = if places { 3 } else { 0 };
     let targets: usize = setup.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
-    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + 3 * setup.anchors.len();
-    Some(seen - if places { translations } else { 0 } - rotations)
+    let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + setup.first_of_anchor(setup.anchors.len());
+    let scale = usize::from(used.iter().all(|kind| kind.is_brought()) && !length);
+    Some(seen - scale - if places { translations } else { 0 } - rotations)
 }

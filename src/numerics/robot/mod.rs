@@ -28,7 +28,7 @@ pub use posture::{Carried, LoadCorrection, Posture};
 pub use readings::{Named, Reading, Readings};
 pub use rows::{DhRow, DhTable};
 pub use sequence::Sequence;
-pub use setup::{Anchor, MeasurementSetup, Target};
+pub use setup::{Anchor, MeasurementSetup, Shape, Target};
 pub use travel::Travel;
 pub(crate) use visited::numbered;
 pub use visited::{Unmeasured, Visited};

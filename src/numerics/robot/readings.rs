@@ -14,7 +14,7 @@ pub struct Named {
 pub struct Readings {
     /// The kind's name.
     pub kind: &'static str,
-    /// Numbers of a row.
+    /// Numbers of a row; none of kinds that say only what the target was brought to.
     pub width: usize,
     /// Row-major; NaN where a row measured none.
     pub values: Vec<f64>,
@@ -40,7 +40,9 @@ impl Readings {
     pub fn row(&self, row: usize) -> Option<Reading<'_>> {
         let values = &self.values[row * self.width..(row + 1) * self.width];
         let anchor = self.anchor.as_ref().map_or("", |anchor| anchor.name(row));
-        values.iter().all(|value| value.is_finite()).then(|| Reading { values, sigma: self.sigma[row], anchor })
+        // What has no number was measured where it has a name.
+        let there = self.width > 0 || !anchor.is_empty();
+        (there && values.iter().all(|value| value.is_finite())).then(|| Reading { values, sigma: self.sigma[row], anchor })
     }
 }
 

@@ -1,4 +1,5 @@
-//! What a recording measures with: targets on the tool, each with its own seat, and anchors in the cell that distances go to.
+//! What a recording measures with: targets on the tool, each with its own seat, and anchors in the cell: ends of distances, sockets, planes,
+//! spheres.
 
 use crate::spatial::Pose;
 use nalgebra::Vector3;
@@ -14,13 +15,50 @@ pub struct Target {
     pub oriented: bool,
 }
 
-/// The far end of a draw-wire or ballbar.
+/// The far end of a draw-wire or ballbar, or what the target was brought to: a socket, a plane, a sphere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
     /// As the recording calls it; empty where it has no name.
     pub name: String,
-    /// Where it is believed to be, tracker frame, m.
+    /// Where it is believed to be, tracker frame, m: its centre, of a plane a point of it.
     pub place: Vector3<f64>,
+    /// What stands there.
+    pub shape: Shape,
+}
+
+/// What an anchor is.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Shape {
+    /// A point.
+    #[default]
+    Point,
+    /// A plane through the place, by its unit normal in the tracker frame.
+    Plane(Vector3<f64>),
+    /// A sphere about the place, by its radius, m.
+    Sphere(f64),
+}
+
+impl Shape {
+    /// Numbers that say where such an anchor is: x, y, z of a point; a plane's offset and two tilts; a sphere's radius beside its centre.
+    pub fn parameters(&self) -> usize {
+        match self {
+            Self::Point | Self::Plane(_) => 3,
+            Self::Sphere(_) => 4,
+        }
+    }
+}
+
+impl Anchor {
+    /// A point.
+    pub fn point(name: &str, place: Vector3<f64>) -> Self {
+        Self { name: name.into(), place, shape: Shape::Point }
+    }
+
+    /// Two unit vectors in a plane of this normal, square to each other.
+    pub fn across(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let first = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
+        [first, normal.cross(&first)]
+    }
 }
 
 /// Targets and anchors, each by the order of names.
@@ -28,7 +66,7 @@ pub struct Anchor {
 pub struct MeasurementSetup {
     /// None: the robot's tool point is what is measured.
     pub targets: Vec<Target>,
-    /// Fixed ends of distances.
+    /// What is measured from.
     pub anchors: Vec<Anchor>,
 }
 
@@ -41,5 +79,10 @@ impl MeasurementSetup {
     /// The number of an anchor by its name.
     pub fn anchor(&self, name: &str) -> Option<usize> {
         self.anchors.iter().position(|anchor| anchor.name == name)
+    }
+
+    /// Where the numbers of an anchor (by its own number) begin among those of all.
+    pub fn first_of_anchor(&self, number: usize) -> usize {
+        self.anchors.iter().take(number).map(|anchor| anchor.shape.parameters()).sum()
     }
 }

@@ -9,8 +9,7 @@ use crate::observation::{KINDS, MeasurementKind, Part};
 /// What a recording cannot be without: joints, and points unless another kind of measurement is mapped.
 pub(super) fn needed(settings: &Ingest) -> Vec<&'static str> {
     let [first, others @ ..] = KINDS else { return Vec::new() };
-    let mapped =
-        |kind: &&dyn MeasurementKind, columns: &Columns| kind.columns(Part::Value).any(|column| columns.has(column.setting));
+    let mapped = |kind: &&dyn MeasurementKind, columns: &Columns| kind.telling().any(|column| columns.has(column.setting));
     let other = |file: &FileLayout| others.iter().any(|kind| mapped(kind, &file.columns));
     let axes = match &settings.axes {
         Some(axes) => axes.iter().map(|axis| axis.name()).collect(),

@@ -164,8 +164,10 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
     }
     let cells = &binder.binding.cells;
     let measured = arm.slots.kinds.iter().flat_map(|kind| &kind.values);
+    let texts = &binder.binding.texts;
+    let brought = arm.slots.kinds.iter().filter_map(|kind| kind.name).any(|name| texts.get(name).is_some_and(Option::is_some));
     binder.binding.measures =
-        measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index)) || layout.targets.is_some();
+        brought || measured.into_iter().any(|index| cells.iter().any(|cell| cell.index == *index)) || layout.targets.is_some();
     if binder.faults.is_empty() {
         Ok(binder.binding)
     } else {

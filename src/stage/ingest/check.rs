@@ -61,7 +61,11 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     }
     for (declared, text) in columns.texts() {
         let place = format!("{place}.columns.{}", declared.setting);
-        one_of(text.column.is_some(), text.value.is_some(), "`column` or `value`", &place, faults);
+        if text.path.is_some() {
+            faults.push(Fault::new(format!("{place}.path"), "is filled in where a pipeline's file is read; here say `value`"));
+        } else {
+            one_of(text.column.is_some(), text.value.is_some(), "`column`, `value` or `path`", &place, faults);
+        }
         if declared.setting == "point_id" && text.value.is_some() {
             faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
         }
@@ -93,6 +97,7 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         convention_faults(declared, conventions, mapped, file, &place, faults);
     }
     twice::faults(file, place, faults);
+    no_distance(columns, &format!("{place}.columns"), faults);
     for kind in KINDS {
         kind_faults(*kind, columns, &format!("{place}.columns"), faults);
     }
@@ -106,20 +111,30 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     }
 }
 
+/// A distance of nought has no direction.
+fn no_distance(columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
+    if columns.number("distance").is_some_and(|distance| distance.value == Some(0.0)) {
+        let message = "a distance of 0 to an anchor has no direction; a ball that lies in a socket is `socket: {column: ...}` with \
+                       `sigma_socket`";
+        faults.push(Fault::new(format!("{place}.distance"), message));
+    }
+}
+
 /// What was measured comes with its standard deviation, and names of what it was measured from with it.
 fn kind_faults(kind: &dyn MeasurementKind, columns: &Columns, place: &str, faults: &mut Vec<Fault>) {
     let settings = |part: Part| kind.columns(part).map(|column| column.setting);
     let mapped = |part: Part| settings(part).any(|setting| columns.has(setting));
-    let values: Vec<&str> = settings(Part::Value).collect();
+    let values: Vec<&str> = kind.telling().map(|column| column.setting).collect();
+    let told = values.iter().any(|setting| columns.has(setting));
     let values = values.join("`, `");
-    if kind.about().own_sigma && mapped(Part::Value) != mapped(Part::Sigma) {
+    if kind.about().own_sigma && told != mapped(Part::Sigma) {
         for sigma in settings(Part::Sigma) {
             let message =
                 format!("`{values}` and `{sigma}` go together: its noise weights it, e.g. {sigma}: {{value: 0.02, unit: ...}}");
             faults.push(Fault::new(place, message));
         }
     }
-    for anchor in settings(Part::Anchor).filter(|setting| columns.has(setting) && !mapped(Part::Value)) {
+    for anchor in settings(Part::Anchor).filter(|setting| columns.has(setting) && !told) {
         let message = format!("an {anchor} is the end of a `{values}`; map that too");
         faults.push(Fault::new(format!("{place}.{anchor}"), message));
     }

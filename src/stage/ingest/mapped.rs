@@ -61,6 +61,10 @@ pub struct TextColumn {
     /// The text of every row, instead of a column.
     #[serde(default)]
     pub value: Option<String>,
+    /// The text of every row by the path of the file: what stands for the braces at its end, e.g. `"{position}/hole_{n}.csv"` names the
+    /// rows of `data/front/hole_0.csv` `front/0`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
     pub optional: bool,

@@ -275,16 +275,18 @@ impl RowReader<'_> {
     fn measured(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
         let there = |index: &usize| row.values.get(*index).is_some_and(|value| !value.is_nan());
         let kinds = &self.arm.slots.kinds;
+        let brought = |kind: &KindSlots| kind.name.and_then(|name| row.texts.get(name)).is_some_and(|name| !name.is_empty());
         let seen = row.points.iter().any(|point| !point[0].is_nan());
-        if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there)) {
+        if self.binding.measures && !seen && !kinds.iter().any(|kind| kind.values.iter().any(there) || brought(kind)) {
             return refuse(Reason::Blank, "nothing was measured in this row".into());
         }
-        for KindSlots { kind, values, sigma } in kinds.iter().filter(|own| own.kind.about().own_sigma) {
+        for own in kinds.iter().filter(|own| own.kind.about().own_sigma) {
+            let KindSlots { kind, values, sigma, .. } = own;
             let (name, measured) = (kind.about().name, values.iter().filter(|index| there(index)).count());
             if measured > 0 && measured < values.len() {
                 return refuse(Reason::Blank, format!("the {name} is incomplete"));
             }
-            if measured > 0 && !sigma.iter().all(there) {
+            if (measured > 0 || brought(own)) && !sigma.iter().all(there) {
                 return refuse(Reason::Blank, format!("a measured {name} without its standard deviation"));
             }
         }

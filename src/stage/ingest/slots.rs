@@ -22,6 +22,8 @@ pub(super) struct KindSlots {
     pub kind: &'static dyn MeasurementKind,
     pub values: Vec<usize>,
     pub sigma: Vec<usize>,
+    /// Among the row's texts: what the target was brought to, of a kind that reads nothing.
+    pub name: Option<usize>,
 }
 
 impl Slots {
@@ -47,8 +49,16 @@ impl Slots {
         let part = |kind: &dyn MeasurementKind, part: Part| -> Vec<usize> {
             kind.columns(part).flat_map(|column| slots.of(column.setting).take(column.stored.len())).collect()
         };
-        let kinds =
-            KINDS.iter().map(|kind| KindSlots { kind: *kind, values: part(*kind, Part::Value), sigma: part(*kind, Part::Sigma) });
+        let name = |kind: &dyn MeasurementKind| {
+            let own = kind.telling().next().filter(|_| kind.is_brought())?;
+            slots.texts.iter().position(|setting| *setting == own.setting)
+        };
+        let kinds = KINDS.iter().map(|kind| KindSlots {
+            kind: *kind,
+            values: part(*kind, Part::Value),
+            sigma: part(*kind, Part::Sigma),
+            name: name(*kind),
+        });
         slots.kinds = kinds.collect();
         slots
     }

@@ -303,7 +303,11 @@ impl<'a> Chunks<'a> {
             Error::data(format!("{label}:{}", row.line), message)
         })?;
         self.merged[decided.arm.slots.time] = time;
-        let id = if id.is_empty() { format!("row {number}") } else { id.clone() };
+        let id = match decided.arm.slots.kinds.iter().filter_map(|kind| texts.get(kind.name?)).find(|name| !name.is_empty()) {
+            _ if !id.is_empty() => id.clone(),
+            Some(name) => format!("{name} row {}", row.number),
+            None => format!("row {number}"),
+        };
         let Some(points) = decided.points(index, row, fate) else { return self.one(sequence, id, &texts) };
         // Numbered through: the targets of a row follow each other.
         let first = sequence.saturating_sub(1).saturating_mul(self.widest);

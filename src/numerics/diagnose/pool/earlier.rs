@@ -44,7 +44,7 @@ impl EarlierPool {
     /// yield as before.
     pub fn serves(&self, view: &RoundView) -> bool {
         let same = |(now, before): (&f64, &f64)| (now - before).abs() <= SAME * before.abs();
-        let points_alone = view.problem.residual_rows() == view.problem.of_points().len();
-        points_alone && self.rows == view.problem.rows && view.compliance.iter().zip(&self.compliance).all(same)
+        let readings_alone = view.problem.residual_rows() == view.problem.of_readings().len();
+        readings_alone && self.rows == view.problem.rows && view.compliance.iter().zip(&self.compliance).all(same)
     }
 }

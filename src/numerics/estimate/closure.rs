@@ -1,0 +1,48 @@
+//! Joints at which everything closes: what such data show is counted there.
+//!
+//! With the residuals left in, the scale of the arm and rotations of the cell look seen, by as much as the points scatter: the scatter
+//! of an arm that is a little smaller is a little smaller.
+
+use super::factor::TriangularFactor;
+use super::model::Model;
+use super::problem::Problem;
+use crate::observation::{MeasurementKind, kinds};
+use crate::robot::Measurements;
+
+/// Steps towards joints that close; each squares what is left of the error.
+const STEPS: usize = 12;
+/// m; nothing is left.
+const CLOSED: f64 = 1e-14;
+
+impl Problem<'_> {
+    /// The data of all candidates from joints at which what was brought to a place lies there; none where nothing was.
+    pub fn shown(&self, model: &Model, candidates: &[usize]) -> Option<TriangularFactor> {
+        let data = closed(model, self.data, self.rows)?;
+        Some(Problem { data: &data, ..*self }.observe(model, candidates).factor)
+    }
+}
+
+/// The measurements with joints that close in these rows; none where no row was brought to a place.
+fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
+    let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+    if brought.is_empty() {
+        return None;
+    }
+    let mut out = data.clone();
+    let mut scratch = model.stack.scratch(&model.robot);
+    for row in rows {
+        for kind in brought.iter().filter(|kind| kind.axes(data, *row) > 0) {
+            for _ in 0..STEPS {
+                let mut placed = model.place(&out, *row, &mut scratch);
+                let error = kind.residual(&out, *row, &placed).map(|(error, _)| error).filter(|error| error.norm() > CLOSED);
+                let closing = kind.closing(&out, *row, &placed);
+                let Some(step) = closing.zip(error).and_then(|(closing, error)| placed.closing_step(&closing, &error)) else {
+                    break;
+                };
+                let joints = &mut out.q[row * data.joints..(row + 1) * data.joints];
+                joints.iter_mut().zip(step).for_each(|(q, change)| *q += change);
+            }
+        }
+    }
+    Some(out)
+}

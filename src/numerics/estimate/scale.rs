@@ -1,0 +1,59 @@
+//! How well the scale of an arm is known: by how much all lengths of what it measures may be larger together.
+
+use super::covariance::Covariance;
+use super::model::Model;
+use crate::effect::{AnchorShift, ToolOffset};
+use crate::observation::kinds;
+use crate::robot::Measurements;
+use nalgebra::{DVector, Vector3};
+
+/// m; places that are no farther apart say nothing of scale.
+const APART: f64 = 0.02;
+
+/// What is known of the scale of an arm that was brought to places, where nothing else was measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Relative standard deviation of the distances between the places; none where all rows close at one.
+    pub sigma: Option<f64>,
+    /// Whether a length was given, or a radius.
+    pub by_length: bool,
+    /// Whether priors of links hold it.
+    pub by_priors: bool,
+    /// Farthest place from the base's origin, m.
+    pub reach: f64,
+}
+
+/// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
+pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<Scale> {
+    let brought = |row: &usize| kinds(data).iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
+    // Links that stay at nominal are the scale.
+    let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
+    let linked = model.stack.parameters_of("link_geometry").any(|k| free.contains(&k));
+    if rows.is_empty() || !linked || !rows.iter().all(brought) {
+        return None;
+    }
+    let mut scratch = model.stack.scratch(&model.robot);
+    let points: Vec<Vector3<f64>> =
+        rows.iter().map(|row| model.stack.point(&model.robot, data, *row, &model.x, &mut scratch)).collect();
+    let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let square: f64 = points.iter().map(|point| (point - middle).norm_squared()).sum();
+    let sigma = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
+        let mut along = vec![0.0; model.x.len()];
+        for (row, point) in rows.iter().zip(&points) {
+            let off = (point - middle) / square;
+            model.stack.derivatives(&model.robot, data, *row, &model.x, &mut scratch, |k, rate| along[k] += off.dot(&rate));
+        }
+        let parameters = covariance.parameters();
+        let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
+        let block = covariance.block(parameters)?;
+        Some(weights.dot(&(block * &weights)).max(0.0).sqrt())
+    });
+    let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
+    let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
+    Some(Scale {
+        sigma,
+        by_length: !model.lengths.is_empty() || told(AnchorShift::NAME),
+        by_priors: told("link_geometry") || told(ToolOffset::NAME),
+        reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
+    })
+}

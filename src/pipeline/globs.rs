@@ -1,0 +1,145 @@
+//! Files by a pattern, and names that stand in the paths of files: both are filled in before settings are typed, so that a table's key
+//! knows every file and every name.
+//!
+//! An entry of `files` with `file: data/*/hole_?.csv` stands for one entry for each file that matches, in the order of their paths; `*` is
+//! any text within a folder's or file's name, `?` one letter. A column with `path: "{position}/hole_{n}.csv"` has as its value what stands
+//! for the braces at the end of its file's path, joined by `/`: `front/0`.
+
+use crate::yaml::{Node, Trouble, YamlValue};
+use std::path::{Path, PathBuf};
+
+/// Most files that a pattern may stand for: a slip must not read a whole disk.
+const MOST: usize = 10_000;
+
+/// Fills in the entries of `files` below the settings of a stage; relative paths start at `folder`.
+pub(super) fn expand(with: &mut Node, folder: &Path) -> Vec<Trouble> {
+    let mut troubles = Vec::new();
+    let Some(Node { value: YamlValue::List(items), .. }) = with.at_mut("files") else { return troubles };
+    let mut all = Vec::with_capacity(items.len());
+    for (index, item) in std::mem::take(items).into_iter().enumerate() {
+        let place = format!("files[{index}].file");
+        let file = item.get("file").and_then(|node| Some((node.text()?, node.overridden, node.mark)));
+        let Some((pattern, overridden, mark)) = file.filter(|(pattern, ..)| pattern.contains(['*', '?'])) else {
+            all.push(item);
+            continue;
+        };
+        let start = if overridden { PathBuf::new() } else { folder.to_path_buf() };
+        match matching(&start, &pattern) {
+            Ok(found) if found.is_empty() => {
+                troubles
+                    .push(Trouble::new(format!("no file matches `{}`", start.join(&pattern).display())).at(mark).below(&place));
+            }
+            Ok(found) => all.extend(found.into_iter().map(|path| {
+                let mut own = item.clone();
+                if let Some(file) = own.at_mut("file") {
+                    file.value = YamlValue::Text(path);
+                }
+                own
+            })),
+            Err(message) => troubles.push(Trouble::new(message).at(mark).below(&place)),
+        }
+    }
+    *items = all;
+    for (index, item) in items.iter_mut().enumerate() {
+        let path = item.get("file").and_then(Node::text).unwrap_or_default();
+        let Some(Node { value: YamlValue::Map(columns), .. }) = item.at_mut("columns") else { continue };
+        for (key, _, column) in columns.iter_mut() {
+            let Some((pattern, mark)) = column.get("path").and_then(|node| Some((node.text()?, node.mark))) else { continue };
+            let place = format!("files[{index}].columns.{key}.path");
+            match named(&pattern, &path) {
+                Ok(name) => {
+                    let YamlValue::Map(entries) = &mut column.value else { continue };
+                    entries.retain(|(key, ..)| key != "path");
+                    entries.push(("value".into(), mark, Node::new(YamlValue::Text(name), mark)));
+                }
+                Err(message) => troubles.push(Trouble::new(message).at(mark).below(&place)),
+            }
+        }
+    }
+    troubles
+}
+
+/// Files below `start` whose path matches, as the pattern writes them, sorted.
+fn matching(start: &Path, pattern: &str) -> Result<Vec<String>, String> {
+    let mut found = vec![if pattern.starts_with('/') { "/".to_string() } else { String::new() }];
+    for part in pattern.split('/').filter(|part| !part.is_empty()) {
+        let mut next = Vec::new();
+        for before in &found {
+            let below = |name: &str| {
+                if before.is_empty() || before.ends_with('/') { format!("{before}{name}") } else { format!("{before}/{name}") }
+            };
+            if !part.contains(['*', '?']) {
+                next.push(below(part));
+                continue;
+            }
+            let Ok(entries) = std::fs::read_dir(start.join(if before.is_empty() { "." } else { before })) else { continue };
+            let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+            next.extend(names.filter(|name| !name.starts_with('.') && fits(part, name)).map(|name| below(&name)));
+        }
+        if next.len() > MOST {
+            return Err(format!("more than {MOST} files match; name a folder"));
+        }
+        found = next;
+    }
+    found.retain(|path| start.join(path).is_file());
+    found.sort();
+    Ok(found)
+}
+
+/// Whether a name matches a pattern with `*` and `?`.
+fn fits(pattern: &str, name: &str) -> bool {
+    let mut rest = pattern.chars();
+    match rest.next() {
+        None => name.is_empty(),
+        Some('*') => name.char_indices().map(|(at, _)| &name[at..]).chain([""]).any(|end| fits(rest.as_str(), end)),
+        Some('?') => name.chars().next().is_some_and(|first| fits(rest.as_str(), &name[first.len_utf8()..])),
+        Some(letter) => name.strip_prefix(letter).is_some_and(|end| fits(rest.as_str(), end)),
+    }
+}
+
+/// What stands for the braces of a pattern at the end of a path, joined by `/`.
+fn named(pattern: &str, path: &str) -> Result<String, String> {
+    let wrong = || format!("`{path}` does not end like `{pattern}`; braces stand for text within a folder's or file's name");
+    let (parts, all): (Vec<&str>, Vec<&str>) = (pattern.split('/').collect(), path.split('/').collect());
+    let own = all.len().checked_sub(parts.len()).map(|first| &all[first..]).ok_or_else(wrong)?;
+    let mut names = Vec::new();
+    for (pattern, text) in parts.iter().zip(own) {
+        names.extend(braces(pattern, text).ok_or_else(wrong)?);
+    }
+    if names.is_empty() {
+        return Err(format!("`{pattern}` has no braces; e.g. \"{{position}}/hole_{{n}}.csv\""));
+    }
+    Ok(names.join("/"))
+}
+
+/// What stands for the braces of one name: each the shortest text that lets the rest match.
+fn braces(pattern: &str, text: &str) -> Option<Vec<String>> {
+    let Some((before, rest)) = pattern.split_once('{') else { return (pattern == text).then(Vec::new) };
+    let (_, after) = rest.split_once('}')?;
+    let text = text.strip_prefix(before)?;
+    let ends = text.char_indices().skip(1).map(|(at, _)| at).chain([text.len()]);
+    ends.filter(|end| *end > 0).find_map(|end| {
+        let more = braces(after, &text[end..])?;
+        Some(std::iter::once(text[..end].to_string()).chain(more).collect())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{fits, named};
+
+    #[test]
+    fn a_star_is_any_text_and_a_question_mark_one_letter() {
+        assert!(fits("hole_?.csv", "hole_0.csv") && !fits("hole_?.csv", "hole_0_pose.csv"));
+        assert!(fits("*", "front") && fits("a*c*", "abcd") && !fits("a*d?", "abcd"));
+    }
+
+    #[test]
+    fn braces_name_what_stands_in_a_path() {
+        let pattern = "{position}/hole_{n}.csv";
+        assert_eq!(named(pattern, "../data/front_left/hole_0.csv"), Ok("front_left/0".into()));
+        assert!(named(pattern, "../data/front/socket_0.csv").is_err_and(|message| message.contains("does not end like")));
+        assert!(named(pattern, "hole_0.csv").is_err());
+        assert!(named("hole.csv", "a/hole.csv").is_err_and(|message| message.contains("has no braces")));
+    }
+}

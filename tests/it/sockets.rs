@@ -1,0 +1,149 @@
+//! Calibration without an instrument: a ball that is brought to sockets, planes and spheres, nothing read but the joints.
+
+mod dirty;
+mod files;
+mod mukca;
+mod rank;
+mod twins;
+
+use crate::fixture;
+use crate::identify::{GEOMETRY, model, normal};
+use calib::effect::AnchorShift;
+use calib::error::Result;
+use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
+use calib::description::RobotDescription;
+use calib::robot::{Measurements, Named, RobotModel};
+use calib::stage::{Context, OpenedInput, RawFile, Services, Simulate, SimulateReads, Sink, Stage};
+use calib::table::{Recording, Robot};
+use calib::twin::touch::{Fixture, FixtureKind};
+use calib::twin::truth::{LinkError, TrueRobot};
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+struct Quiet;
+
+impl Services for Quiet {
+    fn open(&self, _file: &RawFile) -> Result<OpenedInput> {
+        unreachable!("no files")
+    }
+    fn sink(&self, _kind: &'static str) -> Result<Box<dyn Sink>> {
+        unreachable!("no streams")
+    }
+    fn begin(&self, _what: &str, _total: Option<u64>, _unit: &str) {}
+    fn advance(&self, _done: u64, _message: &str) {}
+    fn note(&self, _line: String) {}
+    fn warn(&self, _line: String) {}
+}
+
+fn socket(name: &str, centre_mm: [f64; 3], points: usize, sigma_um: f64) -> Fixture {
+    let (normal, radius_mm, usage) = (None, None, "fit".into());
+    Fixture { kind: FixtureKind::Socket, name: name.into(), centre_mm, normal, radius_mm, points, sigma_um, usage }
+}
+
+fn plane(name: &str, centre_mm: [f64; 3], normal: [f64; 3], points: usize, sigma_um: f64) -> Fixture {
+    let (kind, normal, radius_mm) = (FixtureKind::Plane, Some(normal), Some(300.0));
+    Fixture { kind, normal, radius_mm, ..socket(name, centre_mm, points, sigma_um) }
+}
+
+fn sphere(name: &str, centre_mm: [f64; 3], radius_mm: f64, points: usize, sigma_um: f64) -> Fixture {
+    Fixture { kind: FixtureKind::Sphere, radius_mm: Some(radius_mm), ..socket(name, centre_mm, points, sigma_um) }
+}
+
+/// Errors of every link and joint as a maker leaves them: 0.3 mm, 1 mrad, zeros of 2 mrad.
+fn truth(robot: &RobotDescription, seed: usize) -> TrueRobot {
+    let joints = robot.joints.len();
+    let draw = |k: usize| normal(10_000 * (seed + 1) + k);
+    let link = |link: usize| LinkError {
+        link: link + 1,
+        shift_mm: [0, 1, 2].map(|axis| 0.3 * draw(10 * link + axis)),
+        tilt_arcsec: [0, 1, 2].map(|axis| 206.0 * draw(10 * link + 3 + axis)),
+    };
+    TrueRobot {
+        links: (0..joints).map(link).collect(),
+        offset_deg: (0..joints).map(|joint| 0.115 * draw(1000 + joint)).collect(),
+        ..TrueRobot::default()
+    }
+}
+
+/// What a twin records at fixtures.
+fn touched(robot: &RobotDescription, truth: &TrueRobot, fixtures: &[Fixture], seed: usize) -> Recording {
+    let settings = Simulate {
+        truth: truth.clone(),
+        fixtures: fixtures.to_vec(),
+        seed: Some(seed as u64),
+        ..serde_saphyr::from_str("{}").expect("every setting has a default")
+    };
+    assert_eq!(settings.check(), []);
+    let context = Context { id: "simulate", seed: 1, jobs: 1, services: &Quiet };
+    settings.run(SimulateReads { robot: Robot::from_description(robot) }, &context).expect("all in reach").recording
+}
+
+/// A length between two fixtures of a setup, m.
+struct Length<'a>(&'a str, &'a str, f64, f64);
+
+/// A fit of the geometry to all rows, from the nominal robot.
+fn calibrated(robot: &RobotDescription, data: &Measurements, lengths: &[Length], effects: &[&str]) -> (Model, Fitted) {
+    let rows: Vec<usize> = (0..data.rows()).collect();
+    let (robot, base) = gauge(RobotModel::new(robot.clone()), data, &rows, &BTreeMap::new()).expect("placed");
+    let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY, effects].concat());
+    let number = |name: &str| robot.setup().anchor(name).expect("a fixture");
+    model.lengths = lengths
+        .iter()
+        .map(|Length(from, to, length, sigma)| KnownLength {
+            between: [number(from), number(to)],
+            length: *length,
+            sigma: *sigma,
+        })
+        .collect();
+    let candidates: Vec<usize> = (0..model.x.len()).collect();
+    fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+}
+
+fn free(fitted: &Fitted) -> usize {
+    fitted.statuses.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count()
+}
+
+/// One standard deviation beforehand, SI, of what a maker's tolerances justify.
+fn priors(name: &str) -> Option<f64> {
+    let effect = name.split('.').next().unwrap_or_default();
+    let tilt = name.rsplit('.').next().is_some_and(|ending| ending.starts_with('r'));
+    match effect {
+        "link_geometry" => Some(if tilt { 1e-3 } else { 3e-4 }),
+        "joint_offset" => Some(0.03),
+        "joint_compliance" => Some(1e-4),
+        _ => None,
+    }
+}
+
+/// A fit of some rows with priors by name and sockets 50 mm apart.
+fn fitted_with(
+    robot: &RobotDescription,
+    data: &Measurements,
+    rows: &[usize],
+    effects: &[&str],
+    pairs: &[[String; 2]],
+    prior: impl Fn(&str) -> Option<f64>,
+) -> (Model, Fitted) {
+    let (robot, base) = gauge(RobotModel::new(robot.clone()), data, rows, &BTreeMap::new()).expect("placed");
+    let mut model = model(&robot, base, &[&["anchor", "base_frame", "tool_offset"][..], effects].concat());
+    for (k, spec) in model.stack.specs().iter().enumerate() {
+        if let Some(sigma) = prior(&spec.name) {
+            model.known.insert(k, Known { prior: Some(Prior { mean: 0.0, sigma }), bounds: None });
+        }
+    }
+    let seen = |name: &String| rows.iter().any(|row| data.anchor(*row) == Some(name.as_str()));
+    let number = |name: &String| robot.setup().anchor(name).expect("a socket");
+    let there = pairs.iter().filter(|[from, to]| seen(from) && seen(to));
+    model.lengths =
+        there.map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma: 1e-4 }).collect();
+    let candidates: Vec<usize> = (0..model.x.len()).collect();
+    fit(&model, data, &FitOptions { rows, candidates: &candidates })
+}
+
+/// Where a fit has the sockets, m.
+fn places_of(model: &Model) -> BTreeMap<String, Vector3<f64>> {
+    let first = model.stack.parameters_of(AnchorShift::NAME).next().expect("anchors");
+    let all = model.robot.setup().anchors.iter().enumerate();
+    all.map(|(k, anchor)| (anchor.name.clone(), anchor.place + Vector3::from_column_slice(&model.x[first + 3 * k..][..3])))
+        .collect()
+}

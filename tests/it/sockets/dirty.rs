@@ -1,0 +1,150 @@
+//! Recordings that are not as they should be get an answer in plain words; derivatives of what is closed are those of differences.
+
+use super::{fixture, plane, socket, sphere, touched, truth};
+use crate::desk::{self, Desk};
+use calib::observation::{KINDS, Weight};
+use calib::description::RobotDescription;
+use calib::stage::{Identify, IdentifyReads};
+use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
+use nalgebra::Vector3;
+
+const SETTINGS: &str = r#"
+on: [fit]
+effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]
+prior: {"link_geometry.*": {sigma: 0.3}, "link_geometry.*.r*": {sigma: 0.001}, "joint_offset.*": {sigma: 0.03}}
+distances: [{between: ["*/0", "*/1"], mm: 50, sigma: 0.05}]
+"#;
+
+fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
+    [
+        socket("a/0", [480.0, 120.0, 300.0], points, 60.0),
+        socket("a/1", [480.0, 170.0, 300.0], points, 60.0),
+        socket("b/0", [-250.0, 450.0, 380.0], points, 60.0),
+        socket("b/1", [-250.0, 450.0, 430.0], points, 60.0),
+    ]
+}
+
+/// Every row to fit.
+fn all(recording: &Recording) -> Split {
+    let ids = recording.sequence.iter().zip(&recording.point_id);
+    Split(ids.map(|(sequence, id)| SplitRow { sequence: *sequence, point_id: id.clone(), set: "fit".into() }).collect())
+}
+
+/// All that an identification says, and its parameters.
+fn said(robot: &RobotDescription, recording: Recording, settings: &str) -> (String, Parameters) {
+    let split = all(&recording);
+    let desk = Desk::default();
+    let stage: Identify = serde_saphyr::from_str(settings).expect("good settings");
+    let reads = IdentifyReads { robot: Robot::from_description(robot), recording, split };
+    let tables = desk.run(&stage, reads).expect("identified");
+    let parameters = desk::table::<Parameters>(&tables).remove(0);
+    let (warnings, notes) = (desk.warnings.into_inner().unwrap(), desk.notes.into_inner().unwrap());
+    ([warnings, notes].concat().join("\n"), parameters)
+}
+
+#[test]
+fn rows_of_another_hole_are_named_with_the_hole() {
+    let robot = fixture::seven();
+    let mut recording = touched(&robot, &truth(&robot, 3), &cell(25), 3);
+    let names = recording.names.get_mut("socket").expect("sockets");
+    for row in [30, 31] {
+        names[row] = Some("b/0".into());
+    }
+    let (text, parameters) = said(&robot, recording, SETTINGS);
+    assert!(text.contains("2 rows do not close within their noise") && text.contains("a/1-0006 to a/1-0007 (2 rows)"), "{text}");
+    assert!(text.contains("where `a/1` is"), "{text}");
+    assert!(text.contains("the scale of the arm is known to") && text.contains("by the lengths that were given"), "{text}");
+    let told = parameters.0.iter().filter(|row| row.name.starts_with("link_geometry") && row.status == "free");
+    let silent: Vec<&str> =
+        told.filter(|row| !row.remark.as_deref().unwrap_or("").contains("prior")).map(|row| row.name.as_str()).collect();
+    assert!(silent.is_empty(), "priors are visible in the table: {silent:?}");
+}
+
+#[test]
+fn a_ball_that_was_put_back_elsewhere_is_said_with_the_row() {
+    let robot = fixture::seven();
+    let before = truth(&robot, 4);
+    let mut after = before.clone();
+    after.links.last_mut().expect("links").shift_mm[0] += 1.5;
+    let (first, second) = (touched(&robot, &before, &cell(20), 4), touched(&robot, &after, &cell(20), 5));
+    let mut recording = first.clone();
+    let half = 40 * first.joints;
+    recording.q[half..].copy_from_slice(&second.q[half..]);
+    let (text, _) = said(&robot, recording, SETTINGS);
+    assert!(text.contains("on the ball sits elsewhere on the tool") && text.contains("from b/0-000"), "{text}");
+    let (clean, _) = said(&robot, first, SETTINGS);
+    assert!(!clean.contains("sits elsewhere") && !clean.contains("do not close"), "{clean}");
+}
+
+#[test]
+fn five_rows_and_no_length_are_said_to_be_too_little() {
+    let robot = fixture::seven();
+    let recording = touched(&robot, &truth(&robot, 5), &[socket("a/0", [480.0, 120.0, 300.0], 5, 60.0)], 5);
+    let bare = "{effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]}";
+    let (text, _) = said(&robot, recording, bare);
+    assert!(text.contains("only 5 points for"), "{text}");
+    assert!(text.contains("the scale of the arm is not observable: no length was given"), "{text}");
+}
+
+#[test]
+fn names_that_the_recording_does_not_have_are_refused() {
+    let robot = fixture::seven();
+    let recording = touched(&robot, &truth(&robot, 5), &[socket("a/0", [480.0, 120.0, 300.0], 9, 60.0)], 5);
+    let split = all(&recording);
+    for (more, expected) in [
+        ("distances: [{between: [a/0, a/7], mm: 50, sigma: 0.1}]", "no `a/0` and `a/7`; the recording has: a/0"),
+        ("spheres: {ball: {diameter: 30, sigma: 0.1}}", "no sphere `ball`; the recording has: a/0"),
+    ] {
+        let stage: Identify = serde_saphyr::from_str(more).expect("good settings");
+        let reads = IdentifyReads { robot: Robot::from_description(&robot), recording: recording.clone(), split: split.clone() };
+        let message = Desk::default().run(&stage, reads).err().expect("refused").to_string();
+        assert!(message.contains(expected), "{message}");
+    }
+}
+
+#[test]
+fn derivatives_of_sockets_planes_and_spheres_are_central_differences() {
+    let things = [
+        socket("a", [480.0, 120.0, 300.0], 4, 0.0),
+        plane("table", [100.0, -480.0, 320.0], [0.2, 0.1, 1.0], 4, 0.0),
+        sphere("ball", [350.0, -350.0, 450.0], 40.0, 5, 0.0),
+    ];
+    for robot in [fixture::offset_wrist(), fixture::seven()] {
+        let data = touched(&robot, &truth(&robot, 2), &things, 2).measurements();
+        let (mut model, _) = super::calibrated(&robot, &data, &[], &[]);
+        for (k, value) in model.x.iter_mut().enumerate() {
+            *value += 2e-3 * (1.3 * k as f64).sin();
+        }
+        let mut checked = 0;
+        for (kind, row) in
+            KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| (0..data.rows()).map(move |row| (*kind, row)))
+        {
+            let mut scratch = model.stack.scratch(&model.robot);
+            let mut placed = model.stack.place(&model.robot, &data, row, &model.x, &mut scratch);
+            if kind.residual(&data, row, &placed).is_none() {
+                continue;
+            }
+            checked += 1;
+            let mut partials = vec![Vector3::zeros(); model.x.len()];
+            let sensitivity = kind.sensitivity(&data, row, &placed, Weight::uniform(1.0));
+            sensitivity.derivatives(&mut placed, |k, derivative| partials[k] += derivative);
+            for (k, partial) in partials.iter().enumerate() {
+                let moved = |step: f64| {
+                    let mut x = model.x.clone();
+                    x[k] += step;
+                    let mut scratch = model.stack.scratch(&model.robot);
+                    let placed = model.stack.place(&model.robot, &data, row, &x, &mut scratch);
+                    kind.residual(&data, row, &placed).expect("measured").0
+                };
+                let central = (moved(-1e-6) - moved(1e-6)) / 2e-6;
+                let (name, off) = (&model.stack.specs()[k].name, (central - partial).norm());
+                assert!(
+                    off < 2e-6 * (1.0 + partial.norm()),
+                    "{}, {name}: {central} by differences, {partial}",
+                    kind.about().name
+                );
+            }
+        }
+        assert_eq!(checked, 13);
+    }
+}

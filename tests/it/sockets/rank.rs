@@ -1,0 +1,54 @@
+//! What such data show is what theory says, counted at joints that close; the volume term is the derivative that it claims to be.
+
+use super::{Length, calibrated, fixture, free, plane, socket, sphere, touched, truth};
+use calib::observation::rank;
+use calib::description::RobotDescription;
+use calib::twin::touch::Fixture;
+
+/// Geometry of an arm with its ball that a fit sees beside the numbers of the fixtures themselves.
+fn seen(robot: &RobotDescription, fixtures: &[Fixture], lengths: &[Length], effects: &[&str]) -> usize {
+    let data = touched(robot, &truth(robot, 1), fixtures, 7).measurements();
+    let (model, fitted) = calibrated(robot, &data, lengths, effects);
+    let setup = model.robot.setup();
+    let own = setup.first_of_anchor(setup.anchors.len());
+    if effects.is_empty() {
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        assert_eq!(rank(&model.robot, &data, &rows, !lengths.is_empty()), Some(free(&fitted)));
+    }
+    free(&fitted) - own
+}
+
+fn arms() -> [RobotDescription; 2] {
+    [fixture::offset_wrist(), fixture::seven()]
+}
+
+/// Within reach of both arms.
+const A: [f64; 3] = [480.0, 120.0, 300.0];
+const B: [f64; 3] = [480.0, 170.0, 310.0];
+const C: [f64; 3] = [-200.0, 450.0, 420.0];
+
+#[test]
+fn sockets_show_all_but_the_base_and_the_scale_and_a_length_shows_that_too() {
+    for robot in arms() {
+        let n = robot.joints.len();
+        let two = [socket("a", A, 40, 0.0), socket("b", B, 40, 0.0), socket("c", C, 40, 0.0)];
+        assert_eq!(seen(&robot, &two[..1], &[], &[]), 4 * n - 4, "{}: one socket", robot.name);
+        assert_eq!(seen(&robot, &two, &[], &[]), 4 * n - 4, "{}: three sockets", robot.name);
+        assert_eq!(seen(&robot, &two, &[Length("a", "b", 0.051, 1e-6)], &[]), 4 * n - 3, "{}: a length", robot.name);
+        assert_eq!(seen(&robot, &two, &[], &["reduction_ratio"]), 5 * n - 4, "{}: ratios", robot.name);
+    }
+}
+
+#[test]
+fn planes_and_spheres_show_what_theory_says() {
+    for robot in arms() {
+        let n = robot.joints.len();
+        let tilted =
+            [plane("low", A, [0.3, -0.2, 1.0], 90, 0.0), plane("high", [480.0, 120.0, 380.0], [0.3, -0.2, 1.0], 90, 0.0)];
+        assert_eq!(seen(&robot, &tilted[..1], &[], &[]), 4 * n - 4, "{}: a tilted plane", robot.name);
+        let apart = Length("low", "high", 0.08 / 1.13f64.sqrt(), 1e-6);
+        assert_eq!(seen(&robot, &tilted, &[apart], &[]), 4 * n - 3, "{}: two planes a known distance apart", robot.name);
+        let ball = sphere("ball", A, 40.0, 90, 0.0);
+        assert_eq!(seen(&robot, &[ball], &[], &[]), 4 * n - 4, "{}: a sphere", robot.name);
+    }
+}
