@@ -3,6 +3,7 @@
 use super::emit;
 use crate::error::{Error, Fault, Result};
 use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
+use crate::robot::LIBRARY;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use std::path::{Path, PathBuf};
@@ -20,8 +21,8 @@ pub(super) struct InitArguments {
     /// Recordings, delimited text or workbooks (.xlsx): one file, or the controller's and the tracker's
     #[arg(long, short, value_name = "FILE", num_args = 1..=2)]
     data: Vec<PathBuf>,
-    /// The robot to start from
-    #[arg(long, default_value = KINDS[0].name(), value_parser = kinds())]
+    /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace
+    #[arg(long, value_name = "ARM", default_value = KINDS[0].name(), value_parser = kinds())]
     robot: RobotFileKind,
     /// Takes the robot from this URDF instead
     #[arg(long, value_name = "FILE")]
@@ -34,12 +35,14 @@ pub(super) struct InitArguments {
 const EXAMPLES: &str = "Examples:
   calib init cell7 --data cell7/controller.csv cell7/tracker.csv --robot spherical6
   calib init cell7 --data measurements.csv --urdf arm.urdf --tip flange
+  calib init cell7 --data measurements.csv --robot ur10e
   calib init --robot seven";
 
-/// The robots as values of an option, each with its line of help.
+/// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
 fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let values = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
-    PossibleValuesParser::new(values).try_map(|name| KINDS.into_iter().find(|kind| kind.name() == name).ok_or("no kind"))
+    let typical = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    let arms = LIBRARY.iter().map(|arm| PossibleValue::new(arm.name).hide(true));
+    PossibleValuesParser::new(typical.chain(arms)).try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
 }
 
 pub(super) fn main(arguments: &InitArguments) -> Result<()> {
@@ -70,7 +73,9 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
     }
     let [robot, pipeline] = files.each_ref().map(|path| path.display());
     text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n"));
-    if arguments.urdf.is_none() {
+    if let RobotFileKind::Arm(_) = arguments.robot {
+        text.push_str(&format!("  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"));
+    } else if arguments.urdf.is_none() {
         text.push_str(&format!("  1. {robot}: put your robot's numbers where it says REPLACE\n"));
     } else {
         text.push_str(&format!("  1. {robot}: say where the measured point sits on the tool\n"));

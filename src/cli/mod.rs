@@ -19,6 +19,7 @@ mod panics;
 mod pipeline_arguments;
 mod poses;
 mod query;
+mod robots;
 mod run;
 mod schema;
 mod shell;
@@ -60,6 +61,7 @@ enum Verb {
     Log(log::LogArguments),
     Poses(poses::PosesArguments),
     Query(query::QueryArguments),
+    Robots(robots::RobotsArguments),
     Schema(schema::SchemaArguments),
     Show(show::ShowArguments),
     Simulate(simulate::SimulateArguments),
@@ -122,6 +124,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Log(verb) => log::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Query(verb) => query::main(&verb),
+        Verb::Robots(verb) => robots::main(&verb),
         Verb::Completions(verb) => shell::completions(&verb),
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),

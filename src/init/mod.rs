@@ -56,7 +56,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     let robot = match request.urdf {
         Some(_) => robots::of_urdf(request.tip),
         None => {
-            let own = request.robot.joints();
+            let own = request.robot.joints()?;
             if let Some(n) = joints.filter(|n| *n != own) {
                 let (name, own) = (request.robot.name(), counted(own, "joint"));
                 return Err(Error::spec("--robot", format!("{name} has {own}, the recording {n}; choose another kind")));
@@ -65,7 +65,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         }
     };
     let joined = together::join(&mut found);
-    let pipeline = pipeline::text(request, &found, &joined);
+    let pipeline = pipeline::text(request, &found, &joined)?;
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
     Ok(StarterFiles {
         robot,

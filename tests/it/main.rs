@@ -41,6 +41,7 @@ mod init;
 mod layers;
 mod learn;
 mod library;
+mod library_of_arms;
 mod motion;
 mod names;
 mod network;
