@@ -110,7 +110,7 @@ fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
         Verb::Run(verb) => return run::main(&verb, arguments),
-        Verb::Check(verb) => check::main(&verb),
+        Verb::Check(verb) => check::main(&verb, arguments),
         Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),
         Verb::Diagnose(verb) => return diagnose::main(&verb, arguments),

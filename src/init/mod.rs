@@ -12,7 +12,7 @@ mod sheet;
 mod together;
 mod words;
 
-pub use marks::marked;
+pub use marks::{MarkedLines, marked};
 pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result, counted};
