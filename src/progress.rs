@@ -4,9 +4,9 @@ mod fleet;
 
 pub use fleet::FleetProgress;
 
-use crate::summary::folded;
-use crate::pipeline::{Observer, StageReport, StageStatus};
 use crate::error::counted;
+use crate::pipeline::{Observer, StageReport, StageStatus};
+use crate::summary::folded;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
@@ -57,8 +57,10 @@ impl Progress {
         let terminal = matches!(verbosity, Verbosity::Detailed | Verbosity::Normal) && std::io::stderr().is_terminal();
         let bar = terminal.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));
         let now = Instant::now();
-        let state = State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now, warned: BTreeSet::new() };
-        let columns = std::io::stderr().is_terminal().then(terminal_size::terminal_size).flatten().map(|(width, _)| usize::from(width.0));
+        let state =
+            State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now, warned: BTreeSet::new() };
+        let columns =
+            std::io::stderr().is_terminal().then(terminal_size::terminal_size).flatten().map(|(width, _)| usize::from(width.0));
         Self { verbosity, width, columns, state: Mutex::new(state) }
     }
 
@@ -137,7 +139,10 @@ impl Observer for Progress {
                 let warnings: String = report.warnings.iter().map(|line| format!("; warning: {line}")).collect();
                 self.print(&report.id, &format!("cached{rows}{warnings}"));
             }
-            _ => self.print(&report.id, &format!("cached; {} as said when it ran: calib show HEAD/{}", counted(warnings, "warning"), report.id)),
+            _ => self.print(
+                &report.id,
+                &format!("cached; {} as said when it ran: calib show HEAD/{}", counted(warnings, "warning"), report.id),
+            ),
         }
     }
 

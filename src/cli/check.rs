@@ -60,6 +60,9 @@ pub(super) fn main(arguments: &CheckArguments, command_line: &[OsString]) -> Res
     }
     let stages = counted(plan.stages.len(), "stage");
     emit_lines(&match to_fill {
+        0 if arguments.means.overrides() || !arguments.means.store_again().is_empty() => {
+            labelled("ready", &format!("{stages} can run"))
+        }
         0 => labelled("ready", &format!("{stages} can run: calib run {}", arguments.pipeline.display())),
         1 => labelled("not yet", &format!("a line is left to fill in; {stages} are wired")),
         lines => labelled("not yet", &format!("{lines} lines are left to fill in; {stages} are wired")),

@@ -46,8 +46,23 @@ pub struct StarterFiles {
     pub missing: Vec<&'static str>,
 }
 
+impl StarterFiles {
+    /// Whether recordings were given and neither joints nor points were found in them.
+    pub fn understood_nothing(&self) -> bool {
+        !self.accounts.is_empty() && self.missing.len() == 2
+    }
+}
+
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
+    if request.data.len() > 2 {
+        let message = format!(
+            "{} files; allowed: one recording, or the controller's and the tracker's. Join the files of several reflectors or sets before, or \
+             name them under `files` of `ingest` and say there how their rows belong together",
+            request.data.len()
+        );
+        return Err(Error::spec("--data", message));
+    }
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let tables = request.data.iter().map(|path| ExaminedFile::read(path, places)).collect::<Result<Vec<_>>>()?;

@@ -1,7 +1,7 @@
 //! The text of the pipeline that `init` writes.
 
 use super::InitRequest;
-use super::columns::{Choice, ExaminedFile, Mapping};
+use super::columns::{Choice, ExaminedFile, MOST_NAMED, Mapping};
 use super::together::Joined;
 use crate::error::{Result, one_line};
 use crate::stage::ingest::instruments;
@@ -134,12 +134,17 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     lacking(file, lacks, &mut put);
     file.remarks.iter().for_each(|remark| put(&format!("# {}", one_line(remark))));
     if sheet.header && sheet.trouble.is_none() {
-        for (column, name) in sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column)) {
+        let unused = || sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column));
+        let more = unused().count().saturating_sub(MOST_NAMED);
+        for (column, name) in unused().take(MOST_NAMED) {
             let name = if name.is_empty() { format!("column {}", column + 1) } else { quoted(name) };
             put(&format!("# not used: {name}"));
         }
+        if more > 0 {
+            put(&format!("# not used: {more} more"));
+        }
     } else {
-        (0..sheet.names.len()).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
+        (0..sheet.names.len().min(MOST_NAMED)).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
     }
     out
 }

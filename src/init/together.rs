@@ -1,8 +1,9 @@
 //! How two files belong together: by points' names, found by equal values whatever the header; else by time; else row by row.
 
-use super::columns::ExaminedFile;
+use super::columns::{ExaminedFile, MOST_NAMED};
 use super::sheet::number;
 use super::words;
+use crate::stage::ingest::last_number;
 use crate::statistics;
 use std::collections::BTreeSet;
 
@@ -21,6 +22,8 @@ pub(super) struct Joined {
 #[derive(Debug, Clone, PartialEq)]
 struct Pair {
     columns: [usize; 2],
+    /// The numbers in the names are equal, not the names.
+    numbers: bool,
     /// Text, not running numbers.
     text: bool,
     /// Share of the names of the shorter file that stand in the other, in hundredths.
@@ -43,7 +46,8 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
     let timing = timing(one, two);
     let sizes = [one.sheet.rows.len(), two.sheet.rows.len()];
     // Rows that are only counted: where files are of unequal length, numbers say no more than the order of rows.
-    let running = pairs.first().is_some_and(|pair| !pair.text && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
+    let running =
+        pairs.first().is_some_and(|pair| !pair.text && !pair.numbers && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
     let doubtful = running && sizes[0] != sizes[1];
     if let Some(best) = pairs.first().filter(|_| !doubtful || timing.is_none()).cloned() {
         if one.get("time").is_some() {
@@ -99,12 +103,18 @@ fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     }
 }
 
-/// Pairs of columns with equal values, best first.
+/// Pairs of columns with equal values, best first; where there are none, of columns in whose names the numbers are equal.
 fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
+    let whole = pairs_by(one, two, false);
+    if whole.is_empty() { pairs_by(one, two, true) } else { whole }
+}
+
+fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
         (0..file.said.len())
             .filter(|column| may_name(file, *column))
-            .map(|column| (column, cells(file, column)))
+            .filter_map(|column| Some((column, if numbers { numbers_of(file, column)? } else { cells(file, column) })))
+            .take(MOST_NAMED)
             .collect::<Vec<_>>()
     });
     let mut pairs = Vec::new();
@@ -116,12 +126,18 @@ fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
                 let listed =
                     |file: &ExaminedFile, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
                 let named = listed(one, *a) + listed(two, *b);
-                pairs.push(Pair { columns: [*a, *b], text, shared: (100.0 * shared) as u32, named });
+                pairs.push(Pair { columns: [*a, *b], numbers, text, shared: (100.0 * shared) as u32, named });
             }
         }
     }
     pairs.sort_by_key(|pair| std::cmp::Reverse((pair.text, pair.shared, pair.named)));
     pairs
+}
+
+/// The numbers in the names of a column; none where a name has none, or two have the same.
+fn numbers_of(file: &ExaminedFile, column: usize) -> Option<BTreeSet<&str>> {
+    let numbers: BTreeSet<&str> = file.sheet.texts(column).map(last_number).collect::<Option<_>>()?;
+    (numbers.len() == file.distinct(column)).then_some(numbers)
 }
 
 fn cells(file: &ExaminedFile, column: usize) -> BTreeSet<&str> {
@@ -153,6 +169,14 @@ fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[P
     };
     one.map("point_id", &columns(0), None, None);
     two.map("point_id", &columns(1), None, None);
+    if best.numbers {
+        [one, two].into_iter().for_each(|file| file.add("point_id", "match: number"));
+        let shared = best.shared;
+        let line = format!(
+            "      join: {{by: id}}          # CHECK: by the numbers in the names, of which {shared} % stand in both files"
+        );
+        return Joined { lines: vec![line] };
+    }
     let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
     let repeated = [&*one, &*two].iter().zip(best.columns).any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
     let question = if running && a == b {

@@ -31,7 +31,13 @@ pub(super) struct Certificate {
 }
 
 impl Certificate {
-    pub fn new(tables: &Tables, robot: &str, identity: &BTreeMap<String, String>, judgement: Option<&Judgement>, set: Option<&str>) -> Self {
+    pub fn new(
+        tables: &Tables,
+        robot: &str,
+        identity: &BTreeMap<String, String>,
+        judgement: Option<&Judgement>,
+        set: Option<&str>,
+    ) -> Self {
         let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
         let first = after.and_then(|after| before(&tables.statistics.0, after));
         let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
@@ -42,7 +48,12 @@ impl Certificate {
             kind,
             verdict,
             subject: subject.into_iter().chain(given).chain(files(tables)).collect(),
-            figures: first.map(|row| ("before", row)).into_iter().chain(after.map(|row| ("after", row))).flat_map(figures).collect(),
+            figures: first
+                .map(|row| ("before", row))
+                .into_iter()
+                .chain(after.map(|row| ("after", row)))
+                .flat_map(figures)
+                .collect(),
             uncertainty: after.map(uncertainty).unwrap_or_default(),
             limits: judgement.map(|judgement| judgement.lines.clone()).unwrap_or_default(),
             conditions: conditions(tables),
@@ -99,7 +110,10 @@ fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
     let name = format!("{when} ({})", row.step);
     let mut rows = vec![[name, count(row.points), mm(row.mean_mm), mm(row.p95_mm), mm(row.max_mm)]];
     if let Some(mean) = row.mean_without_mm {
-        let name = format!("{when}, without {}", if row.suspects == 1 { "a suspect".into() } else { format!("{} suspects", row.suspects) });
+        let name = format!(
+            "{when}, without {}",
+            if row.suspects == 1 { "a suspect".into() } else { format!("{} suspects", row.suspects) }
+        );
         rows.push([name, count(row.points - row.suspects), mm(mean), none(), row.max_without_mm.map_or_else(none, mm)]);
     }
     rows
@@ -141,7 +155,11 @@ fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
     };
     let region: Vec<String> = if recording.rows() == 0 { Vec::new() } else { (0..recording.joints).map(joint).collect() };
     let sliding = recording.prismatic.iter().any(|prismatic| *prismatic);
-    let region = if region.is_empty() { "no point was measured".into() } else { format!("{} {}", region.join(", "), if sliding { "deg, mm" } else { "deg" }) };
+    let region = if region.is_empty() {
+        "no point was measured".into()
+    } else {
+        format!("{} {}", region.join(", "), if sliding { "deg, mm" } else { "deg" })
+    };
     vec![
         ("temperature", range(&recording.temperature, "\u{b0}C", 1)),
         ("payload", range(&recording.payload, "kg", 1)),

@@ -42,8 +42,7 @@ impl Judgement {
     pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let figures = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
         let asked = figures.iter().any(|(_, limit)| limit.is_some());
-        let unjudged =
-            |sentence: String| Self { sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
+        let unjudged = |sentence: String| Self { sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
         if let Some(wrong) = wrong_setup(tables) {
             return Some(unjudged(format!("Not accepted: {wrong}.")));
         }

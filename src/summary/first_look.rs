@@ -59,7 +59,8 @@ fn ranges(recording: &Recording, robot: &Robot) -> Result<String> {
         let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
         let (lower, upper) = values.fold((f64::MAX, f64::MIN), |(a, b), q| (a.min(q), b.max(q)));
         let prismatic = recording.prismatic.get(k).copied().unwrap_or(false);
-        let shown = |value: f64| if prismatic { format!("{:.1} mm", 1e3 * value) } else { format!("{:.1} deg", value.to_degrees()) };
+        let shown =
+            |value: f64| if prismatic { format!("{:.1} mm", 1e3 * value) } else { format!("{:.1} deg", value.to_degrees()) };
         let limits = joint.limits.filter(|[a, b]| lower < a - 1e-6 || upper > b + 1e-6);
         let beyond = limits.map(|[a, b]| format!("; beyond the robot file's limits, {} to {}", shown(a), shown(b)));
         let still = if upper - lower < 1e-6 { "; it does not move, so that nothing of it can be seen" } else { "" };
@@ -106,7 +107,8 @@ fn errors(prediction: &Prediction) -> String {
 
 /// How many parameters are estimated, and the others by their reason.
 fn observable(parameters: &Parameters) -> String {
-    let of = |status: &str| parameters.0.iter().filter(|row| row.status == status).map(|row| row.name.as_str()).collect::<Vec<_>>();
+    let of =
+        |status: &str| parameters.0.iter().filter(|row| row.status == status).map(|row| row.name.as_str()).collect::<Vec<_>>();
     let named = |names: &[&str]| {
         let more = if names.len() > NAMED { format!(" and {} more", names.len() - NAMED) } else { String::new() };
         format!("{}{more}", names[..names.len().min(NAMED)].join(", "))

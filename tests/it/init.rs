@@ -2,6 +2,7 @@
 
 mod foreign;
 mod layouts;
+mod lists;
 
 use crate::compensate::calib;
 use std::fmt::Write;

@@ -74,6 +74,7 @@ mod tables;
 mod trail;
 mod transfer;
 mod twin;
+mod verify_robot;
 mod vouched;
 mod weights;
 mod workbook;
