@@ -87,7 +87,7 @@ fn standing(
     };
     match (within, cause) {
         (Some(within), None) => ("better", format!("{within}. The error is explained.")),
-        (Some(within), Some(cause)) => ("open", format!("{within}; {cause}.")),
+        (Some(within), Some(cause)) => ("open", format!("{}, but {cause}.", within.replacen("Accepted: within", "Within", 1))),
         (None, None) => ("unknown", "Explained. No limits were stated, so that nothing is accepted or refused.".into()),
         (None, Some(cause)) => ("open", format!("Not judged, as no limits were stated; {cause}.")),
     }
