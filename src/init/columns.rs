@@ -159,6 +159,13 @@ impl ExaminedFile {
         parts.join("; ")
     }
 
+    /// Gives every row the same text of a quantity.
+    pub fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
+        let choice = Choice::of(vec![format!("{quantity}: {{value: {value}}}")], Vec::new());
+        let account = format!("{quantity} {value}");
+        self.mappings.push(Mapping { quantity, choices: vec![choice], check: Some(check.into()), account });
+    }
+
     /// Adds a setting to a quantity's line.
     pub fn add(&mut self, quantity: &str, setting: &str) {
         let mapping = self.mappings.iter_mut().find(|mapping| mapping.quantity == quantity);

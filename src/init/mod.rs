@@ -55,18 +55,18 @@ impl StarterFiles {
 
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
-    if request.data.len() > 2 {
-        let message = format!(
-            "{} files; allowed: one recording, or the controller's and the tracker's. Join the files of several reflectors or sets before, or \
-             name them under `files` of `ingest` and say there how their rows belong together",
-            request.data.len()
-        );
-        return Err(Error::spec("--data", message));
-    }
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let tables = request.data.iter().map(|path| ExaminedFile::read(path, places)).collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
+    if request.data.len() > 2 && !found.iter().all(together::is_whole) {
+        let message = format!(
+            "{} files; allowed: one recording, the controller's and the tracker's, or recordings that have joints and points each. Join the files \
+             of several reflectors before, or name them under `files` of `ingest` and say there how their rows belong together",
+            request.data.len()
+        );
+        return Err(Error::spec("--data", message));
+    }
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
     let robot = match request.urdf {
         Some(_) => robots::of_urdf(request.tip),

@@ -33,6 +33,9 @@ struct Pair {
 
 /// Decides, and leaves every quantity in one of the files.
 pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
+    if found.len() > 1 && found.iter().all(is_whole) {
+        return one_after_the_other(found);
+    }
     let [one, two] = found else {
         if let [only] = found {
             return alone(only);
@@ -73,6 +76,32 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         _ => format!("REPLACE: neither names nor times were found in both, and {a} and {b} rows cannot be joined by order"),
     };
     Joined { lines: vec![format!("      join: {{by: order}}       # {why}")] }
+}
+
+/// Whether a file is a recording of its own: it has joints and points.
+pub(super) fn is_whole(file: &ExaminedFile) -> bool {
+    file.get("q").is_some() && file.get("x").is_some()
+}
+
+/// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so
+/// themselves. Points keep their names where no two files have the same.
+fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
+    let ids: Vec<Option<usize>> = found.iter().map(|file| file.ids().first().copied()).collect();
+    let mut names = BTreeSet::new();
+    let apart = found
+        .iter()
+        .zip(&ids)
+        .all(|(file, id)| id.is_some_and(|id| cells(file, id).into_iter().all(|name| names.insert(name.to_string()))));
+    let silent = found.iter().all(|file| file.get("usage").is_none());
+    for ((k, file), id) in found.iter_mut().enumerate().zip(ids) {
+        if let Some(id) = id.filter(|_| apart) {
+            file.map("point_id", &[id], None, None);
+        }
+        if silent {
+            file.state("usage", if k == 0 { "fit" } else { "validate" }, "every row of this file");
+        }
+    }
+    Joined { lines: vec!["      join: {by: append}      # CHECK: recordings of their own, one after the other".into()] }
 }
 
 /// Names and repeats of a file that stands alone.

@@ -129,7 +129,7 @@ fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
     vec![
         (
             "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)",
-            format!("\u{b1} {} mm", mm(COVERAGE * axis)),
+            format!("\u{b1}\u{a0}{}\u{a0}mm", mm(COVERAGE * axis)),
         ),
         ("standard uncertainty of a measured point, rms length", format!("{} mm{basis}", mm(after.noise_rms_mm))),
     ]

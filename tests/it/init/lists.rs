@@ -48,7 +48,7 @@ fn what_cannot_be_told_ends_with_code_1_and_a_sentence_and_too_many_files_with_2
     let output = calib(folder.path(), &["init", "more", "--data", "notes.csv", "notes.csv", "notes.csv"], "");
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
-    assert!(told.contains("--data: 3 files; allowed: one recording, or the controller's and the tracker's"), "{told}");
+    assert!(told.contains("--data: 3 files; allowed: one recording, the controller's and the tracker's, or recordings that have joints and points each"), "{told}");
     assert!(!folder.path().join("more").exists());
 }
 
@@ -66,4 +66,19 @@ fn a_wide_file_takes_time_in_proportion_to_its_width() {
     let [narrow, broad] = [2_000, 16_000].map(wide);
     // Eight times the width: 64 times the time would be quadratic.
     assert!(broad < 24.0 * narrow.max(0.05), "{narrow} s for 2,000 columns, {broad} s for 16,000");
+}
+
+#[test]
+fn a_grid_and_a_check_set_are_two_recordings_of_which_the_second_judges() {
+    let recording =
+        |name: &str| table("Punkt;A1;A2;A3;A4;A5;A6;X;Y;Z", |k| format!("{name}{k};{};{}", joints(k, ";"), point(k, ";")));
+    let made = made(&[("grid.csv", recording("G").into()), ("check.csv", recording("C").into())]);
+    made.has(&[
+        "usage: {value: fit}   # CHECK: every row of this file",
+        "usage: {value: validate}   # CHECK: every row of this file",
+        "join: {by: append}      # CHECK: recordings of their own, one after the other",
+        "with: {by: usage, blank: fit}",
+        "point_id: {column: \"Punkt\"}",
+    ]);
+    made.runs(60);
 }
