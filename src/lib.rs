@@ -31,9 +31,9 @@
 //! | [`report`] | tables -> HTML; computes nothing that is not a column | table |
 //! | [`stage`] | one file per step of a pipeline | program, raw, report, table, numerics, twin, yaml |
 //! | [`pipeline`] | the YAML, the plan, the run | raw, stage, store, yaml |
-//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, table, numerics |
+//! | [`identified`] | the identified model of a run, or of tables, as it is compensated and exported | compensate, pipeline, raw, stage, store, targets, table, numerics |
 //! | [`export`] | the identified model for other programs, one file per format | compensate, effect, estimate, identified, robot, yaml |
-//! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, stage, yaml |
+//! | [`init`] | what a folder of files is, and the pipeline that reads it | program, raw, robot, stage, yaml |
 //! | [`fleet`] | many robots: roster, records, workers, cluster, tables | pipeline, raw, report, shell, stage, store, table, yaml |
 //! | [`audit`] | runs told, explained, compared, asked, traced, swept | diff, pipeline, raw, shell, stage, store |
 //! | [`proof`] | sets of concealed recordings, their seal, diagnoses held against the truth | estimate, raw, robot, table, twin |

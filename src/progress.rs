@@ -4,8 +4,11 @@ mod fleet;
 
 pub use fleet::FleetProgress;
 
+use crate::error::counted;
 use crate::pipeline::{Observer, StageReport, StageStatus};
+use crate::summary::folded;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -13,10 +16,14 @@ use std::time::{Duration, Instant};
 /// How much is shown while a run works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verbosity {
-    /// Bars, notes and warnings.
+    /// Besides, what stages note while they work, rows of tables, and what was warned of when a cached stage ran.
+    Detailed,
+    /// A line a stage, bars on a terminal, warnings once.
     Normal,
     /// Warnings only.
     Quiet,
+    /// Nothing: who runs it says what came of it.
+    Silent,
 }
 
 /// Time between two plain lines about the same work; a log file has no use for more.
@@ -27,6 +34,8 @@ pub struct Progress {
     verbosity: Verbosity,
     /// Width of the stages' ids.
     width: usize,
+    /// Of the terminal, if it is one.
+    columns: Option<usize>,
     state: Mutex<State>,
 }
 
@@ -38,16 +47,21 @@ struct State {
     total: Option<u64>,
     begun: Instant,
     said: Instant,
+    /// What was warned of: several stages say the same of one recording.
+    warned: BTreeSet<String>,
 }
 
 impl Progress {
     /// Progress on stderr; `width` is that of the longest stage id.
     pub fn new(verbosity: Verbosity, width: usize) -> Self {
-        let terminal = verbosity == Verbosity::Normal && std::io::stderr().is_terminal();
+        let terminal = matches!(verbosity, Verbosity::Detailed | Verbosity::Normal) && std::io::stderr().is_terminal();
         let bar = terminal.then(|| ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)));
         let now = Instant::now();
-        let state = State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now };
-        Self { verbosity, width, state: Mutex::new(state) }
+        let state =
+            State { bar, what: String::new(), unit: String::new(), total: None, begun: now, said: now, warned: BTreeSet::new() };
+        let columns =
+            std::io::stderr().is_terminal().then(terminal_size::terminal_size).flatten().map(|(width, _)| usize::from(width.0));
+        Self { verbosity, width, columns, state: Mutex::new(state) }
     }
 
     /// Takes the bar away.
@@ -61,13 +75,23 @@ impl Progress {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
     fn line(&self, id: &str, text: &str) {
-        if self.verbosity == Verbosity::Normal {
+        if matches!(self.verbosity, Verbosity::Detailed | Verbosity::Normal) {
+            self.print(id, text);
+        }
+    }
+    fn detail(&self, id: &str, text: &str) {
+        if self.verbosity == Verbosity::Detailed {
             self.print(id, text);
         }
     }
     fn print(&self, id: &str, text: &str) {
+        if self.verbosity == Verbosity::Silent {
+            return;
+        }
         // A reader that has gone away is no fault.
-        let write = || drop(writeln!(std::io::stderr(), "{id:width$}  {text}", width = self.width));
+        let text = format!("{id:width$}  {text}", width = self.width);
+        let text = self.columns.map_or_else(|| text.clone() + "\n", |columns| folded(&text, columns));
+        let write = || drop(std::io::stderr().write_all(text.as_bytes()));
         match &self.state().bar {
             Some(bar) => bar.suspend(write),
             None => write(),
@@ -78,16 +102,16 @@ impl Progress {
 fn spinner() -> ProgressStyle {
     ProgressStyle::with_template("{prefix}  {spinner} {msg} ({elapsed})").unwrap_or_else(|_| ProgressStyle::default_spinner())
 }
-fn counted(unit: &str) -> ProgressStyle {
+fn bar_of(unit: &str) -> ProgressStyle {
     // Braces in a template are its own.
     let unit = unit.replace(['{', '}'], "");
-    let template = format!("{{prefix}}  {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{eta}} left  {{msg}}");
+    let template = format!("{{prefix}}  {{wide_bar}} {{human_pos}}/{{human_len}} {unit}, {{per_sec}}, {{eta}} left  {{msg}}");
     ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 impl Observer for Progress {
     fn stage_begins(&self, id: &str, _uses: &str, reason: &str) {
-        self.line(id, &format!("runs ({reason})"));
+        self.detail(id, &format!("runs ({reason})"));
         if let Some(bar) = &self.state().bar {
             bar.reset();
             bar.set_style(spinner());
@@ -103,15 +127,22 @@ impl Observer for Progress {
             bar.finish_and_clear();
         }
         let rows: Vec<String> = report.outputs.iter().map(|output| format!("{} {}", output.port, output.table.rows)).collect();
-        let rows = rows.join(", ");
-        match report.status {
-            StageStatus::Cached => {
-                // One line: what the stage noted was said when it ran, and `calib show` says it again. What it warned of still holds.
+        let rows = if self.verbosity == Verbosity::Detailed { format!(" (rows: {})", rows.join(", ")) } else { String::new() };
+        if report.status != StageStatus::Cached {
+            return self.line(&report.id, &format!("done in {:.1} s{rows}", report.wall_seconds.unwrap_or_default()));
+        }
+        // What the stage warned of was said when it ran, and still holds.
+        let warnings = report.warnings.len();
+        match (self.verbosity, warnings) {
+            (_, 0) => self.line(&report.id, &format!("cached{rows}")),
+            (Verbosity::Detailed, _) => {
                 let warnings: String = report.warnings.iter().map(|line| format!("; warning: {line}")).collect();
-                let text = format!("cached (rows: {rows}){warnings}");
-                if warnings.is_empty() { self.line(&report.id, &text) } else { self.print(&report.id, &text) }
+                self.print(&report.id, &format!("cached{rows}{warnings}"));
             }
-            _ => self.line(&report.id, &format!("done in {:.1} s (rows: {rows})", report.wall_seconds.unwrap_or_default())),
+            _ => self.print(
+                &report.id,
+                &format!("cached; {} as said when it ran: calib show HEAD/{}", counted(warnings, "warning"), report.id),
+            ),
         }
     }
 
@@ -125,7 +156,7 @@ impl Observer for Progress {
             match total {
                 Some(total) => {
                     bar.set_length(total);
-                    bar.set_style(counted(unit));
+                    bar.set_style(bar_of(unit));
                 }
                 None => bar.set_style(spinner()),
             }
@@ -161,9 +192,12 @@ impl Observer for Progress {
     }
 
     fn note(&self, id: &str, line: &str) {
-        self.line(id, &format!("  {line}"));
+        self.detail(id, &format!("  {line}"));
     }
     fn warn(&self, id: &str, line: &str) {
-        self.print(id, &format!("  warning: {line}"));
+        let first = self.state().warned.insert(line.into());
+        if first || self.verbosity == Verbosity::Detailed {
+            self.print(id, &format!("warning: {line}"));
+        }
     }
 }

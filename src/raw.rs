@@ -2,8 +2,10 @@
 //!
 //! A pipe or a device may never end, and may wait for a writer for ever. The decoder of Parquet panics on some damaged files.
 
+mod utf16;
 mod workbook;
 
+pub use utf16::{Utf16Reader, is_utf16};
 pub use workbook::{Workbook, is_workbook};
 
 use arrow::array::RecordBatch;

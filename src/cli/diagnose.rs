@@ -1,6 +1,6 @@
 //! `calib diagnose`: where simulation and recording differ, what physics is missing, the fit before and after.
 
-use super::means::{CommandTask, Means};
+use super::means::{CommandTask, Means, shown};
 use super::pipeline_arguments::told_as;
 use super::run::WRONG_SETUP;
 use super::{complain, emit_json, emit_lines};
@@ -76,7 +76,8 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         };
         let id = id.to_string();
         let plan = plan.needed_for(at);
-        let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), quiet: arguments.quiet };
+        let shown = shown(arguments.quiet, arguments.details);
+        let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), shown };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
         DiagnosisSummary::read(&outcome.manifest.run_id, stage, &store)?

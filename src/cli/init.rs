@@ -1,10 +1,12 @@
 //! `calib init`: a commented robot file and pipeline to start from, made for the columns of one's own files.
 
-use super::emit;
+use super::{complain, emit};
 use crate::error::{Error, Fault, Result};
 use crate::init::{InitRequest, KINDS, RobotFileKind, StarterFiles, start};
+use crate::robot::LIBRARY;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Write a robot file and a pipeline to start from, with comments, for the columns found in your recordings.
@@ -18,10 +20,10 @@ pub(super) struct InitArguments {
     #[arg(value_name = "DIR", default_value = ".")]
     folder: PathBuf,
     /// Recordings, delimited text or workbooks (.xlsx): one file, or the controller's and the tracker's
-    #[arg(long, short, value_name = "FILE", num_args = 1..=2)]
+    #[arg(long, short, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
-    /// The robot to start from
-    #[arg(long, default_value = KINDS[0].name(), value_parser = kinds())]
+    /// The robot to start from: an arm of the library (`calib robots` lists them), or a typical one whose numbers you replace
+    #[arg(long, value_name = "ARM", default_value = KINDS[0].name(), value_parser = kinds())]
     robot: RobotFileKind,
     /// Takes the robot from this URDF instead
     #[arg(long, value_name = "FILE")]
@@ -34,15 +36,34 @@ pub(super) struct InitArguments {
 const EXAMPLES: &str = "Examples:
   calib init cell7 --data cell7/controller.csv cell7/tracker.csv --robot spherical6
   calib init cell7 --data measurements.csv --urdf arm.urdf --tip flange
+  calib init cell7 --data measurements.csv --robot ur10e
   calib init --robot seven";
 
-/// The robots as values of an option, each with its line of help.
+/// Typical robots as values of an option, each with its line of help; arms of the library are taken by name and listed by `calib robots`.
 fn kinds() -> impl TypedValueParser<Value = RobotFileKind> {
-    let values = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
-    PossibleValuesParser::new(values).try_map(|name| KINDS.into_iter().find(|kind| kind.name() == name).ok_or("no kind"))
+    let typical = KINDS.iter().map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    let arms = LIBRARY.iter().map(|arm| PossibleValue::new(arm.name).hide(true));
+    PossibleValuesParser::new(typical.chain(arms)).try_map(|name| RobotFileKind::find(&name).ok_or("no such arm"))
 }
 
-pub(super) fn main(arguments: &InitArguments) -> Result<()> {
+/// Gives the exit code: 1 where nothing was understood of the recordings.
+pub(super) fn main(arguments: &InitArguments) -> u8 {
+    match execute(arguments) {
+        Ok(start) if start.understood_nothing() => {
+            let files: Vec<String> = start.accounts.iter().map(|(path, _)| path.display().to_string()).collect();
+            let message = format!(
+                "neither joints nor a measured point were recognised in {}: name the columns where it says REPLACE",
+                files.join(" and ")
+            );
+            let _ = writeln!(std::io::stderr(), "error: {message}");
+            1
+        }
+        Ok(_) => 0,
+        Err(error) => complain(&error),
+    }
+}
+
+fn execute(arguments: &InitArguments) -> Result<StarterFiles> {
     let InitArguments { folder, data, robot, urdf, tip } = arguments;
     let files = ["robot.yaml", "pipeline.yaml"].map(|name| folder.join(name));
     let there = files.iter().filter(|path| path.exists());
@@ -60,7 +81,8 @@ pub(super) fn main(arguments: &InitArguments) -> Result<()> {
     for (path, text) in files.iter().zip([&start.robot, &start.pipeline]) {
         std::fs::write(path, text).map_err(refused(path))?;
     }
-    emit(&closing(arguments, &start, &files))
+    emit(&closing(arguments, &start, &files))?;
+    Ok(start)
 }
 
 fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]) -> String {
@@ -70,7 +92,9 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
     }
     let [robot, pipeline] = files.each_ref().map(|path| path.display());
     text.push_str(&format!("wrote {robot} and {pipeline}\n\nnext:\n"));
-    if arguments.urdf.is_none() {
+    if let RobotFileKind::Arm(_) = arguments.robot {
+        text.push_str(&format!("  1. {robot}: the arm's own numbers; put the measured point where it says REPLACE\n"));
+    } else if arguments.urdf.is_none() {
         text.push_str(&format!("  1. {robot}: put your robot's numbers where it says REPLACE\n"));
     } else {
         text.push_str(&format!("  1. {robot}: say where the measured point sits on the tool\n"));

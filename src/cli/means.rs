@@ -24,11 +24,20 @@ pub(super) struct Means {
     jobs: Option<u16>,
 }
 
-/// What a pipeline is run for, how much of it, and whether progress is shown.
+/// What a pipeline is run for, how much of it, and how much of its progress is shown.
 pub(super) struct CommandTask {
     pub purpose: Purpose,
     pub selection: Selection,
-    pub quiet: bool,
+    pub shown: Verbosity,
+}
+
+/// As much as `--quiet` and `--details` ask for.
+pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
+    match (quiet, details) {
+        (true, _) => Verbosity::Quiet,
+        (_, true) => Verbosity::Detailed,
+        _ => Verbosity::Normal,
+    }
 }
 
 impl Means {
@@ -54,11 +63,10 @@ impl Means {
         self.jobs.map_or_else(cores, usize::from)
     }
 
-    /// Runs the selected stages; with progress unless the task is a quiet one.
+    /// Runs the selected stages; with as much progress as is to be shown.
     pub fn run(&self, plan: &Plan, store: &Store, task: CommandTask, command_line: &[OsString]) -> Result<CompletedRun> {
-        let CommandTask { purpose, selection, quiet } = task;
-        let verbosity = if quiet { Verbosity::Quiet } else { Verbosity::Normal };
-        let progress = Progress::new(verbosity, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
+        let CommandTask { purpose, selection, shown } = task;
+        let progress = Progress::new(shown, plan.stages.iter().map(|stage| stage.id.len()).max().unwrap_or(0));
         let options = RunOptions { selection, jobs: self.jobs(), purpose };
         let result = run(plan, store, &options, &surroundings(command_line), &progress);
         progress.finish();

@@ -19,6 +19,7 @@ mod panics;
 mod pipeline_arguments;
 mod poses;
 mod query;
+mod robots;
 mod run;
 mod schema;
 mod shell;
@@ -27,6 +28,7 @@ mod simulate;
 mod surroundings;
 mod tag;
 mod verify;
+mod verify_robot;
 
 use crate::error::{Error, Result, counted, nearest};
 use clap::error::{ContextKind, ContextValue};
@@ -60,6 +62,7 @@ enum Verb {
     Log(log::LogArguments),
     Poses(poses::PosesArguments),
     Query(query::QueryArguments),
+    Robots(robots::RobotsArguments),
     Schema(schema::SchemaArguments),
     Show(show::ShowArguments),
     Simulate(simulate::SimulateArguments),
@@ -67,9 +70,10 @@ enum Verb {
     Man(shell::ManArguments),
     Tag(tag::TagArguments),
     Verify(verify::VerifyArguments),
+    VerifyRobot(verify_robot::VerifyRobotArguments),
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected, or the set-up is wrong (do not retry); \
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 diff or verify found a difference, init understood nothing of the recordings, or a run is beyond its report's limits; 2 wrong usage or a faulty YAML; 10 the data were rejected, or the set-up is wrong (do not retry); \
 70 a bug in calib; 75 try again later (disk, permissions).";
 
 /// The command line as a description: every verb with its options, for pages, completions and checks of typed lines.
@@ -108,20 +112,21 @@ fn with_nearest_verb(mut error: clap::Error) -> clap::Error {
 fn done(verb: Verb, arguments: &[OsString]) -> u8 {
     let result = match verb {
         Verb::Run(verb) => return run::main(&verb, arguments),
-        Verb::Check(verb) => check::main(&verb),
+        Verb::Check(verb) => check::main(&verb, arguments),
         Verb::Compensate(verb) => compensate::main(&verb, arguments),
         Verb::Effects(verb) => effects::main(&verb),
         Verb::Diagnose(verb) => return diagnose::main(&verb, arguments),
         Verb::Diff(verb) => return diff::main(&verb),
         Verb::Fleet(verb) => fleet::main(&verb, arguments),
         Verb::Export(verb) => export::main(&verb, arguments),
-        Verb::Init(verb) => init::main(&verb),
+        Verb::Init(verb) => return init::main(&verb),
         Verb::Explain(verb) => explain::main(&verb),
         Verb::Gc(verb) => gc::main(&verb),
         Verb::Lineage(verb) => lineage::main(&verb),
         Verb::Log(verb) => log::main(&verb),
         Verb::Poses(verb) => poses::main(&verb),
         Verb::Query(verb) => query::main(&verb),
+        Verb::Robots(verb) => robots::main(&verb),
         Verb::Completions(verb) => shell::completions(&verb),
         Verb::Man(verb) => shell::man(&verb),
         Verb::Schema(verb) => schema::main(&verb),
@@ -129,6 +134,7 @@ fn done(verb: Verb, arguments: &[OsString]) -> u8 {
         Verb::Simulate(verb) => simulate::main(&verb, arguments),
         Verb::Tag(verb) => tag::main(&verb),
         Verb::Verify(verb) => return verify::main(&verb),
+        Verb::VerifyRobot(verb) => verify_robot::main(&verb, arguments),
     };
     match result {
         Ok(()) => 0,

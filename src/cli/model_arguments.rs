@@ -1,6 +1,6 @@
 //! The identified model that a verb works with: from a pipeline, a run in the store, or a table of parameters.
 
-use super::means::{CommandTask, Means};
+use super::means::{CommandTask, Means, shown};
 use crate::compensate::{Gate, GateLimits};
 use crate::error::{Error, Fault, Result};
 use crate::identified::{Files, IdentifiedModel, judges_of, steps_of};
@@ -108,7 +108,7 @@ impl ModelArguments {
         let plan = self.means.plan(&self.model)?;
         // A report with limits says whether the model is accepted.
         let wanted = [steps_of(&plan)?, judges_of(&plan)].concat();
-        let task = CommandTask { purpose, selection: Selection::default(), quiet: self.quiet };
+        let task = CommandTask { purpose, selection: Selection::default(), shown: shown(self.quiet, false) };
         let outcome = self.means.run(&plan.needed_for_all(&wanted), &store, task, command_line)?;
         let mut identified = IdentifiedModel::of_run(&store, &outcome.manifest, step)?;
         identified.refusals.extend(LimitsSummary::of(&outcome.manifest, &store)?.exceeded());

@@ -1,7 +1,7 @@
 //! What every verb that runs a pipeline takes, and how it fails under `--json`.
 
 use super::emit_json;
-use super::means::{CommandTask, Means};
+use super::means::{CommandTask, Means, shown};
 use crate::error::{Error, Fault, Result};
 use crate::pipeline::{CompletedRun, Plan, Purpose, Selection};
 use crate::store::Store;
@@ -34,9 +34,10 @@ impl PipelineArguments {
         self.means.store()
     }
 
-    /// Runs the selected stages with progress.
-    pub fn run(&self, plan: &Plan, store: &Store, selection: Selection, command_line: &[OsString]) -> Result<CompletedRun> {
-        let task = CommandTask { purpose: Purpose::Run, selection, quiet: self.quiet };
+    /// Runs the selected stages with progress, and with `details` all that stages note.
+    pub fn run(&self, plan: &Plan, store: &Store, wanted: (Selection, bool), command_line: &[OsString]) -> Result<CompletedRun> {
+        let (selection, details) = wanted;
+        let task = CommandTask { purpose: Purpose::Run, selection, shown: shown(self.quiet, details) };
         self.means.run(plan, store, task, command_line)
     }
 

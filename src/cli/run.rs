@@ -36,7 +36,7 @@ pub(super) struct RunArguments {
     /// Runs up to and with this stage
     #[arg(long, value_name = "STAGE")]
     until: Option<String>,
-    /// Prints the errors of every step and set, cross-validated and beside reference figures, too
+    /// Prints what stages note while they run, and the errors of every step and set, cross-validated and beside reference figures, too
     #[arg(long, conflicts_with = "json")]
     details: bool,
     /// Runs again though cached: all selected stages, or this one (give it after PIPELINE)
@@ -78,7 +78,7 @@ fn execute(arguments: &RunArguments, command_line: &[OsString]) -> Result<u8> {
         }
         return Ok(0);
     }
-    let outcome = shared.run(&plan, &store, selection, command_line)?;
+    let outcome = shared.run(&plan, &store, (selection, arguments.details), command_line)?;
     let limits = LimitsSummary::read(&outcome, &store)?;
     let (standing, wrong) = (standing_of(&outcome.manifest, &store)?, wrong_setup_of(&outcome.manifest, &store)?);
     let code = if wrong.is_some() { WRONG_SETUP } else { u8::from(limits.accepted() == Some(false)) };

@@ -1,11 +1,13 @@
 //! The identified model of a run, or of tables that were taken out of a store: what commands are corrected with and what is exported.
 
+mod achieved;
 mod convention;
 mod robot_file;
 mod scatter;
 mod standing;
 mod written;
 
+pub use achieved::{Achieved, RepeatedPose, achieved};
 pub use convention::{convention_of, counted_otherwise};
 pub use robot_file::robot_file;
 use standing::unexplained_of;

@@ -3,15 +3,18 @@
 use super::names::{LENGTHS, Name, joints, pattern};
 use super::points::{PointColumns, Points, points};
 use super::reading::tables;
-use super::sheet::Sheet;
+use super::sheet::{Sheet, number};
 use super::words;
 use crate::error::Result;
 use crate::stage::ingest::is_clock_time;
 use crate::yaml::quoted;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// No angle in rad is beyond this.
 const MOST_RADIANS: f64 = 6.5;
+/// Columns that are named where they are not used.
+pub(super) const MOST_NAMED: usize = 200;
 /// Beyond this coordinates are millimetres, by the size of robots.
 const MOST_METRES: f64 = 50.0;
 
@@ -46,6 +49,8 @@ pub(super) struct ExaminedFile {
     pub name: String,
     pub sheet: Sheet,
     pub said: Vec<Name>,
+    /// How many columns are called so.
+    named: BTreeMap<String, usize>,
     pub mappings: Vec<Mapping>,
     /// Seconds in the unit of a time column.
     pub second: f64,
@@ -66,8 +71,13 @@ impl ExaminedFile {
         for (name, unit) in said.iter_mut().zip(&sheet.units) {
             name.unit = name.unit.or(*unit);
         }
-        let mut found = Self { path: path.into(), name, sheet, said, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
-        if found.sheet.header && found.sheet.trouble.is_none() {
+        let mut named = BTreeMap::new();
+        sheet.names.iter().for_each(|name| *named.entry(name.clone()).or_insert(0) += 1);
+        let mut found =
+            Self { path: path.into(), name, sheet, said, named, mappings: Vec::new(), second: 1.0, remarks: Vec::new() };
+        if !found.sheet.header {
+            found.bare();
+        } else if found.sheet.trouble.is_none() {
             found.joints();
             found.point();
             found.per_joint();
@@ -76,6 +86,46 @@ impl ExaminedFile {
             found.texts();
         }
         found
+    }
+
+    /// A list of points, or of joints, without a header: perhaps names, then three lengths, or six or seven angles.
+    fn bare(&mut self) {
+        let width = self.sheet.names.len();
+        let named = usize::from(self.may_be_names(0) && [4, 7, 8].contains(&width));
+        let columns: Vec<usize> = (named..width).collect();
+        if !columns.iter().all(|column| self.sheet.is_numeric(*column)) {
+            return;
+        }
+        let most = columns.iter().map(|column| self.sheet.largest(*column)).fold(0.0, f64::max);
+        let check = "no header says so; is it right?";
+        let mapping = match columns[..] {
+            [x, y, z] => {
+                let unit = self.length_unit(&[x, y, z]).0;
+                let lines = ["x", "y", "z"].iter().zip([x, y, z]).map(|(name, column)| self.line(name, column, Some(unit)));
+                let account = format!("the point ({})", self.shown(&columns));
+                Mapping {
+                    quantity: "x",
+                    choices: vec![Choice::of(lines.collect(), columns.clone())],
+                    check: Some(check.into()),
+                    account,
+                }
+            }
+            [_, _, _, _, _, _] | [_, _, _, _, _, _, _] if most <= 400.0 => {
+                let unit = if most > MOST_RADIANS { "deg" } else { "rad" };
+                let lines = vec![self.joints_line("q", &columns, Some(unit))];
+                let account = format!("{} joints ({})", columns.len(), self.shown(&columns));
+                Mapping { quantity: "q", choices: vec![Choice::of(lines, columns.clone())], check: Some(check.into()), account }
+            }
+            _ => return,
+        };
+        self.sheet.trouble = None;
+        self.mappings.push(mapping);
+    }
+
+    /// Whether a column without a header may name points: texts or whole numbers, each another.
+    fn may_be_names(&self, column: usize) -> bool {
+        let whole = self.sheet.texts(column).all(|cell| number(cell).is_none() || !cell.contains(['.', ',']));
+        whole && !self.sheet.rows.is_empty() && self.distinct(column) == self.sheet.rows.len()
     }
 
     pub fn get(&self, quantity: &str) -> Option<&Mapping> {
@@ -103,9 +153,27 @@ impl ExaminedFile {
         parts.extend(self.mappings.iter().map(|mapping| mapping.account.clone()));
         let unused = (0..self.said.len()).filter(|column| !self.is_taken(*column)).collect::<Vec<usize>>();
         if !unused.is_empty() && self.sheet.trouble.is_none() {
-            parts.push(format!("not used: {}", self.shown(&unused)));
+            let more = if unused.len() > MOST_NAMED { format!(" and {} more", unused.len() - MOST_NAMED) } else { String::new() };
+            parts.push(format!("not used: {}{more}", self.shown(&unused[..unused.len().min(MOST_NAMED)])));
         }
         parts.join("; ")
+    }
+
+    /// Gives every row the same text of a quantity.
+    pub fn state(&mut self, quantity: &'static str, value: &str, check: &str) {
+        let choice = Choice::of(vec![format!("{quantity}: {{value: {value}}}")], Vec::new());
+        let account = format!("{quantity} {value}");
+        self.mappings.push(Mapping { quantity, choices: vec![choice], check: Some(check.into()), account });
+    }
+
+    /// Adds a setting to a quantity's line.
+    pub fn add(&mut self, quantity: &str, setting: &str) {
+        let mapping = self.mappings.iter_mut().find(|mapping| mapping.quantity == quantity);
+        for line in mapping.into_iter().flat_map(|mapping| &mut mapping.choices).flat_map(|choice| &mut choice.lines) {
+            if let Some(open) = line.strip_suffix('}') {
+                *line = format!("{open}, {setting}}}");
+            }
+        }
     }
 
     pub fn is_taken(&self, column: usize) -> bool {
@@ -115,7 +183,7 @@ impl ExaminedFile {
     /// A column as the pipeline names it: by its number where the name is not its alone.
     pub fn reference(&self, column: usize) -> String {
         let name = self.sheet.names.get(column).map_or("", String::as_str);
-        let alone = self.sheet.names.iter().filter(|other| *other == name).count() == 1;
+        let alone = self.named.get(name) == Some(&1);
         if name.is_empty() || !alone || name.contains("${") || !self.sheet.header {
             (column + 1).to_string()
         } else {
@@ -380,7 +448,8 @@ impl ExaminedFile {
             let name = self.sheet.names[*column].trim();
             let ends = stem.ends_with("_id") || stem.ends_with("_name") || ["#", "n\u{b0}", "n\u{ba}"].contains(&name);
             let whole = self.sheet.texts(*column).count() == rows;
-            (words::IDS.contains(&stem.as_str()) || ends) && whole && !self.is_taken(*column)
+            let first = !self.sheet.header && *column == 0 && self.may_be_names(0);
+            (words::IDS.contains(&stem.as_str()) || ends || first) && whole && !self.is_taken(*column)
         };
         let mut columns: Vec<usize> = (0..self.said.len()).filter(named).collect();
         let rank = |column: usize| (self.distinct(column) < rows, self.sheet.is_numeric(column));

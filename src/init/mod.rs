@@ -12,7 +12,7 @@ mod sheet;
 mod together;
 mod words;
 
-pub use marks::marked;
+pub use marks::{MarkedLines, marked};
 pub use robots::{KINDS, RobotFileKind};
 
 use crate::error::{Error, Result, counted};
@@ -46,17 +46,32 @@ pub struct StarterFiles {
     pub missing: Vec<&'static str>,
 }
 
+impl StarterFiles {
+    /// Whether recordings were given and neither joints nor points were found in them.
+    pub fn understood_nothing(&self) -> bool {
+        !self.accounts.is_empty() && self.missing.len() == 2
+    }
+}
+
 /// Looks at the recordings. Fails where one cannot be read, or has another number of joints than the robot.
 pub fn start(request: &InitRequest) -> Result<StarterFiles> {
     // Joints and points may stand in two sheets of one workbook.
     let places = if request.data.len() == 1 { 2 } else { 1 };
     let tables = request.data.iter().map(|path| ExaminedFile::read(path, places)).collect::<Result<Vec<_>>>()?;
     let mut found: Vec<ExaminedFile> = tables.into_iter().flatten().collect();
+    if request.data.len() > 2 && !found.iter().all(together::is_whole) {
+        let message = format!(
+            "{} files; allowed: one recording, the controller's and the tracker's, or recordings that have joints and points each. Join the files \
+             of several reflectors before, or name them under `files` of `ingest` and say there how their rows belong together",
+            request.data.len()
+        );
+        return Err(Error::spec("--data", message));
+    }
     let joints = found.iter().filter_map(|file| file.get("q")).map(|joints| joints.choices[0].columns.len()).max();
     let robot = match request.urdf {
         Some(_) => robots::of_urdf(request.tip),
         None => {
-            let own = request.robot.joints();
+            let own = request.robot.joints()?;
             if let Some(n) = joints.filter(|n| *n != own) {
                 let (name, own) = (request.robot.name(), counted(own, "joint"));
                 return Err(Error::spec("--robot", format!("{name} has {own}, the recording {n}; choose another kind")));
@@ -65,7 +80,7 @@ pub fn start(request: &InitRequest) -> Result<StarterFiles> {
         }
     };
     let joined = together::join(&mut found);
-    let pipeline = pipeline::text(request, &found, &joined);
+    let pipeline = pipeline::text(request, &found, &joined)?;
     let unknown = ["columns of joints", "the measured point"].into_iter().zip(missing(&found));
     Ok(StarterFiles {
         robot,

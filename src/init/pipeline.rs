@@ -1,9 +1,9 @@
 //! The text of the pipeline that `init` writes.
 
 use super::InitRequest;
-use super::columns::{Choice, ExaminedFile, Mapping};
+use super::columns::{Choice, ExaminedFile, MOST_NAMED, Mapping};
 use super::together::Joined;
-use crate::error::one_line;
+use crate::error::{Result, one_line};
 use crate::stage::ingest::instruments;
 use crate::yaml::quoted;
 use std::path::Path;
@@ -16,7 +16,7 @@ fn from_folder(folder: &Path, file: &Path) -> String {
     quoted(&path.display().to_string())
 }
 
-pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joined) -> String {
+pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joined) -> Result<String> {
     // A folder that is still to be made has its name already.
     let folder = request.folder.canonicalize().unwrap_or_else(|_| request.folder.to_path_buf());
     let name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
@@ -31,23 +31,35 @@ pub(super) fn text(request: &InitRequest, found: &[ExaminedFile], joined: &Joine
         "  # Which column holds what, in which unit. Nothing is guessed when this runs: only what is written here counts.\n",
     );
     out.push_str("  - uses: ingest\n    with:\n      files:\n");
+    let counting = if request.urdf.is_none() { request.robot.counting()? } else { None };
     if found.is_empty() {
-        out.push_str(EMPTY);
+        out.push_str(&EMPTY.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
     }
     let missing = missing(found);
     for (k, file) in found.iter().enumerate() {
         out.push_str(&format!("        - file: {}\n", from_folder(request.folder, &file.path)));
         // Joints come first, in the controller's file; the tracker's is the last.
         let lacks =
-            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints() };
-        out.push_str(&file_text(file, &lacks));
+            Lacks { joints: missing[0] && k == 0, point: missing[1] && k + 1 == found.len(), count: request.robot.joints()? };
+        let text = file_text(file, &lacks);
+        out.push_str(&text.lines().map(|line| counted(line, counting.as_deref()) + "\n").collect::<String>());
     }
     joined.lines.iter().for_each(|line| out.push_str(&format!("{line}\n")));
     out.push_str(&instrument());
     let by_usage = found.iter().any(|file| file.get("usage").is_some());
     out.push_str(if by_usage { BY_USAGE } else { EVERY });
     out.push_str(STAGES);
-    out
+    Ok(out)
+}
+
+/// The line of joints with how the arm's controller counts them; any other line as it is.
+fn counted(line: &str, counting: Option<&str>) -> String {
+    let (Some(counting), true) = (counting, line.trim_start().trim_start_matches("# ").starts_with("q: {")) else {
+        return line.into();
+    };
+    // The map ends at the last brace before a comment: names of columns may hold both.
+    let end = line.find("}   #").unwrap_or(line.len() - 1);
+    format!("{}, {counting}{}", &line[..end], &line[end..])
 }
 
 /// A line to fill in: nobody but the person knows what measured.
@@ -122,12 +134,17 @@ fn file_text(file: &ExaminedFile, lacks: &Lacks) -> String {
     lacking(file, lacks, &mut put);
     file.remarks.iter().for_each(|remark| put(&format!("# {}", one_line(remark))));
     if sheet.header && sheet.trouble.is_none() {
-        for (column, name) in sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column)) {
+        let unused = || sheet.names.iter().enumerate().filter(|(column, _)| !file.is_taken(*column));
+        let more = unused().count().saturating_sub(MOST_NAMED);
+        for (column, name) in unused().take(MOST_NAMED) {
             let name = if name.is_empty() { format!("column {}", column + 1) } else { quoted(name) };
             put(&format!("# not used: {name}"));
         }
+        if more > 0 {
+            put(&format!("# not used: {more} more"));
+        }
     } else {
-        (0..sheet.names.len()).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
+        (0..sheet.names.len().min(MOST_NAMED)).for_each(|column| put(&format!("# seen: {}", one_line(&sheet.seen(column)))));
     }
     out
 }

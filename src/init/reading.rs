@@ -3,7 +3,7 @@
 use super::sheet::Sheet;
 use crate::error::{Error, Result};
 use crate::program::listing;
-use crate::raw::{self, Workbook, is_workbook};
+use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook};
 use crate::stage::ingest::{ListedTable, encoding};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -30,7 +30,9 @@ pub(super) fn tables(path: &Path, places: usize) -> Result<Vec<Sheet>> {
         return Ok(vec![Sheet::not_understood(kind.into())]);
     }
     let mut lines: Vec<String> = Vec::new();
-    for line in reader.take(LOOKED).split(b'\n').take(LINES) {
+    let wide = is_utf16(head);
+    let text: Box<dyn BufRead> = if wide { Box::new(BufReader::new(Utf16Reader::new(reader))) } else { Box::new(reader) };
+    for line in text.take(LOOKED).split(b'\n').take(LINES) {
         let line = line.map_err(failed)?;
         lines.push(encoding::shown(&line).trim_end_matches('\r').trim_start_matches('\u{feff}').to_string());
     }
@@ -53,7 +55,7 @@ fn sheets(source: impl Read, places: usize) -> Result<Vec<Sheet>, String> {
 fn no_text(head: &[u8]) -> Option<&'static str> {
     match head {
         [b'P', b'A', b'R', b'1', ..] => Some("a Parquet file: its columns are not looked at; name them"),
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("a text in UTF-16; save it as UTF-8"),
+        _ if is_utf16(head) => None,
         _ if head.contains(&0) => Some("no text"),
         _ => None,
     }

@@ -1,5 +1,7 @@
 //! Robot files to start from: typical arms, every number of which the user replaces.
 
+use crate::error::Result;
+use crate::robot::LibraryArm;
 use crate::yaml::quoted;
 
 /// Kinds of arms that a robot file starts from.
@@ -13,13 +15,21 @@ pub enum RobotFileKind {
     Seven,
     /// Six joints as a DH table.
     Dh6,
+    /// A common arm as its maker and public models describe it.
+    Arm(&'static LibraryArm),
 }
 
-/// All of them, in the order of the help.
+/// Typical arms, in the order of the help.
 pub const KINDS: [RobotFileKind; 4] =
     [RobotFileKind::Spherical6, RobotFileKind::Offset6, RobotFileKind::Seven, RobotFileKind::Dh6];
 
 impl RobotFileKind {
+    /// The typical arm or the arm of the library that is called so.
+    pub fn find(name: &str) -> Option<Self> {
+        let typical = KINDS.into_iter().find(|kind| kind.name() == name);
+        typical.or_else(|| LibraryArm::find(name).map(Self::Arm))
+    }
+
     /// As the command line names it.
     pub fn name(self) -> &'static str {
         match self {
@@ -27,6 +37,7 @@ impl RobotFileKind {
             Self::Offset6 => "offset6",
             Self::Seven => "seven",
             Self::Dh6 => "dh6",
+            Self::Arm(arm) => arm.name,
         }
     }
 
@@ -37,16 +48,30 @@ impl RobotFileKind {
             Self::Offset6 => "Six joints, offset wrist (most cobots)",
             Self::Seven => "Seven joints, alternating axes",
             Self::Dh6 => "Six joints as a table of DH parameters",
+            Self::Arm(_) => "A common arm, as its maker and public models describe it",
         }
     }
 
-    /// How many.
-    pub fn joints(self) -> usize {
-        if self == Self::Seven { 7 } else { 6 }
+    /// How many. Fails with the faults of a file of the library, which would be a fault of calib.
+    pub fn joints(self) -> Result<usize> {
+        match self {
+            Self::Arm(arm) => Ok(arm.read()?.robot.joints.len()),
+            Self::Seven => Ok(7),
+            _ => Ok(6),
+        }
+    }
+
+    /// What `ingest` must be told of how the arm's controller counts joints, as settings of `q`.
+    pub(super) fn counting(self) -> Result<Option<String>> {
+        match self {
+            Self::Arm(arm) => Ok(arm.read()?.about.counting()),
+            _ => Ok(None),
+        }
     }
 
     pub(super) fn text(self) -> String {
         let (kinematics, tool) = match self {
+            Self::Arm(arm) => return arm.text.to_string(),
             Self::Spherical6 => (SPHERICAL6, "{point: [1854, 50, 1340]}"),
             Self::Offset6 => (OFFSET6, "{point: [-1184.3, -300, 11.6]}"),
             Self::Seven => (SEVEN, "{point: [60, 30, 1300]}"),
@@ -56,7 +81,7 @@ impl RobotFileKind {
         let mut out = format!(
             "{HEAD}{kinematics}tool: {tool}       # REPLACE: the measured point, {where_given}; off the last axis, else that joint cannot be seen\njoints:                           # REPLACE limits; reduction_ratio (motor turns per turn) only if known\n"
         );
-        for joint in 1..=self.joints() {
+        for joint in 1..=if self == Self::Seven { 7 } else { 6 } {
             out.push_str(&format!("  - {{name: A{joint}, limits: [-170, 170]}}\n"));
         }
         out + LINKS + PAYLOAD

@@ -41,10 +41,27 @@ struct Content<'a> {
     text: &'a str,
 }
 
-/// A number as people write it: finite, with a point or one comma.
+/// A number as people write it: finite, with a point or one comma, and thousands in groups of three where both marks stand.
 pub(super) fn number(text: &str) -> Option<f64> {
-    let value = text.parse::<f64>().ok().or_else(|| text.replacen(',', ".", 1).parse().ok().filter(|_| !text.ends_with(',')));
+    let plain = || text.replacen(',', ".", 1).parse().ok().filter(|_| !text.ends_with(','));
+    let value = text.parse::<f64>().ok().or_else(plain).or_else(|| grouped(text));
     value.filter(|value| value.is_finite())
+}
+
+/// `1.234,56` and `1,234.56`: the mark that stands last and once is the decimal one.
+fn grouped(text: &str) -> Option<f64> {
+    let mark = decimal_mark(text).filter(|_| text.contains('.') && text.contains(','))?;
+    let (whole, rest) = text.split_once(mark).filter(|(_, rest)| !rest.contains(['.', ',']))?;
+    let mut groups = whole.trim_start_matches('-').split(['.', ',']);
+    let first = groups.next().is_some_and(|digits| (1..=3).contains(&digits.len()));
+    let others = groups.all(|digits| digits.len() == 3);
+    let digits = whole.replace(['.', ','], "");
+    (first && others).then(|| format!("{digits}.{rest}").parse().ok())?
+}
+
+/// The last mark of a number.
+fn decimal_mark(text: &str) -> Option<char> {
+    text.chars().rev().find(|letter| ['.', ','].contains(letter))
 }
 
 fn numeric(cells: &[String]) -> usize {
@@ -147,7 +164,7 @@ impl Sheet {
         let rows = table.into_iter().skip(first).map(filled).filter(|row| !row.is_empty() && row.len() <= width);
         sheet.rows = rows.map(|row| row.into_iter().chain(std::iter::repeat(String::new())).take(width).collect()).collect();
         let marks = |mark: char| {
-            let numbers = sheet.rows.iter().flatten().filter(|cell| cell.contains(mark) && number(cell).is_some());
+            let numbers = sheet.rows.iter().flatten().filter(|cell| decimal_mark(cell) == Some(mark) && number(cell).is_some());
             numbers.count()
         };
         sheet.comma = marks(',') > marks('.');
@@ -304,6 +321,13 @@ mod tests {
         assert_eq!((exported.names[2].as_str(), exported.rows.len()), ("Target", 4));
         let number = sheet("#,X,Y,Z\n1,1,2,3\n2,1,2,3\n3,1,2,3\n");
         assert_eq!((number.comment, number.header_in_comment, number.names[0].as_str()), (None, false, "#"));
+    }
+
+    #[test]
+    fn marks_of_thousands_are_no_decimal_marks() {
+        assert_eq!([number("1.234,56"), number("-1,234.5"), number("1.23,4")], [Some(1234.56), Some(-1234.5), None]);
+        let german = sheet("Name;X;Y;Z\nP1;1.234,50;-2.000,25;900,5\nP2;1.235,50;-2.001,25;901,5\n");
+        assert_eq!((german.comma, german.is_numeric(1)), (true, true));
     }
 
     #[test]

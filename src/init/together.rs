@@ -1,8 +1,9 @@
 //! How two files belong together: by points' names, found by equal values whatever the header; else by time; else row by row.
 
-use super::columns::ExaminedFile;
+use super::columns::{ExaminedFile, MOST_NAMED};
 use super::sheet::number;
 use super::words;
+use crate::stage::ingest::last_number;
 use crate::statistics;
 use std::collections::BTreeSet;
 
@@ -21,6 +22,8 @@ pub(super) struct Joined {
 #[derive(Debug, Clone, PartialEq)]
 struct Pair {
     columns: [usize; 2],
+    /// The numbers in the names are equal, not the names.
+    numbers: bool,
     /// Text, not running numbers.
     text: bool,
     /// Share of the names of the shorter file that stand in the other, in hundredths.
@@ -30,6 +33,9 @@ struct Pair {
 
 /// Decides, and leaves every quantity in one of the files.
 pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
+    if found.len() > 1 && found.iter().all(is_whole) {
+        return one_after_the_other(found);
+    }
     let [one, two] = found else {
         if let [only] = found {
             return alone(only);
@@ -43,7 +49,8 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
     let timing = timing(one, two);
     let sizes = [one.sheet.rows.len(), two.sheet.rows.len()];
     // Rows that are only counted: where files are of unequal length, numbers say no more than the order of rows.
-    let running = pairs.first().is_some_and(|pair| !pair.text && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
+    let running =
+        pairs.first().is_some_and(|pair| !pair.text && !pair.numbers && runs(one, pair.columns[0]) && runs(two, pair.columns[1]));
     let doubtful = running && sizes[0] != sizes[1];
     if let Some(best) = pairs.first().filter(|_| !doubtful || timing.is_none()).cloned() {
         if one.get("time").is_some() {
@@ -69,6 +76,32 @@ pub(super) fn join(found: &mut [ExaminedFile]) -> Joined {
         _ => format!("REPLACE: neither names nor times were found in both, and {a} and {b} rows cannot be joined by order"),
     };
     Joined { lines: vec![format!("      join: {{by: order}}       # {why}")] }
+}
+
+/// Whether a file is a recording of its own: it has joints and points.
+pub(super) fn is_whole(file: &ExaminedFile) -> bool {
+    file.get("q").is_some() && file.get("x").is_some()
+}
+
+/// Several recordings, e.g. a grid and a check set: rows of the first are fitted to, those of the others judge, unless the files say so
+/// themselves. Points keep their names where no two files have the same.
+fn one_after_the_other(found: &mut [ExaminedFile]) -> Joined {
+    let ids: Vec<Option<usize>> = found.iter().map(|file| file.ids().first().copied()).collect();
+    let mut names = BTreeSet::new();
+    let apart = found
+        .iter()
+        .zip(&ids)
+        .all(|(file, id)| id.is_some_and(|id| cells(file, id).into_iter().all(|name| names.insert(name.to_string()))));
+    let silent = found.iter().all(|file| file.get("usage").is_none());
+    for ((k, file), id) in found.iter_mut().enumerate().zip(ids) {
+        if let Some(id) = id.filter(|_| apart) {
+            file.map("point_id", &[id], None, None);
+        }
+        if silent {
+            file.state("usage", if k == 0 { "fit" } else { "validate" }, "every row of this file");
+        }
+    }
+    Joined { lines: vec!["      join: {by: append}      # CHECK: recordings of their own, one after the other".into()] }
 }
 
 /// Names and repeats of a file that stands alone.
@@ -99,12 +132,18 @@ fn single(one: &mut ExaminedFile, two: &mut ExaminedFile) {
     }
 }
 
-/// Pairs of columns with equal values, best first.
+/// Pairs of columns with equal values, best first; where there are none, of columns in whose names the numbers are equal.
 fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
+    let whole = pairs_by(one, two, false);
+    if whole.is_empty() { pairs_by(one, two, true) } else { whole }
+}
+
+fn pairs_by(one: &ExaminedFile, two: &ExaminedFile, numbers: bool) -> Vec<Pair> {
     let [left, right] = [one, two].map(|file| {
         (0..file.said.len())
             .filter(|column| may_name(file, *column))
-            .map(|column| (column, cells(file, column)))
+            .filter_map(|column| Some((column, if numbers { numbers_of(file, column)? } else { cells(file, column) })))
+            .take(MOST_NAMED)
             .collect::<Vec<_>>()
     });
     let mut pairs = Vec::new();
@@ -116,12 +155,18 @@ fn pairs(one: &ExaminedFile, two: &ExaminedFile) -> Vec<Pair> {
                 let listed =
                     |file: &ExaminedFile, column: usize| usize::from(words::IDS.contains(&file.said[column].stem().as_str()));
                 let named = listed(one, *a) + listed(two, *b);
-                pairs.push(Pair { columns: [*a, *b], text, shared: (100.0 * shared) as u32, named });
+                pairs.push(Pair { columns: [*a, *b], numbers, text, shared: (100.0 * shared) as u32, named });
             }
         }
     }
     pairs.sort_by_key(|pair| std::cmp::Reverse((pair.text, pair.shared, pair.named)));
     pairs
+}
+
+/// The numbers in the names of a column; none where a name has none, or two have the same.
+fn numbers_of(file: &ExaminedFile, column: usize) -> Option<BTreeSet<&str>> {
+    let numbers: BTreeSet<&str> = file.sheet.texts(column).map(last_number).collect::<Option<_>>()?;
+    (numbers.len() == file.distinct(column)).then_some(numbers)
 }
 
 fn cells(file: &ExaminedFile, column: usize) -> BTreeSet<&str> {
@@ -153,6 +198,14 @@ fn by_id(one: &mut ExaminedFile, two: &mut ExaminedFile, best: &Pair, pairs: &[P
     };
     one.map("point_id", &columns(0), None, None);
     two.map("point_id", &columns(1), None, None);
+    if best.numbers {
+        [one, two].into_iter().for_each(|file| file.add("point_id", "match: number"));
+        let shared = best.shared;
+        let line = format!(
+            "      join: {{by: id}}          # CHECK: by the numbers in the names, of which {shared} % stand in both files"
+        );
+        return Joined { lines: vec![line] };
+    }
     let [a, b] = [&*one, &*two].map(|file| file.sheet.rows.len());
     let repeated = [&*one, &*two].iter().zip(best.columns).any(|(file, column)| file.distinct(column) < file.sheet.rows.len());
     let question = if running && a == b {

@@ -6,7 +6,7 @@ use super::findings::wrong_setup;
 use super::number::{count, mm};
 use super::workspace::{Colours, VIEWS, scatter};
 use crate::error::{Error, Result};
-use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, VerdictRow, Withdrawn};
+use crate::table::{Prediction, Statistics, StatisticsRow, UNFOLDED, Withdrawn};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -66,12 +66,7 @@ pub(super) struct ErrorsSection {
 
 #[derive(Serialize)]
 struct VerdictView {
-    /// `better`, `worse` or `unknown`: the class of its colour.
-    kind: &'static str,
     sentence: String,
-    before: Option<(String, String)>,
-    after: Option<(String, String)>,
-    facts: Vec<(String, String)>,
     others: Vec<String>,
 }
 
@@ -123,7 +118,7 @@ struct Picture {
 }
 
 impl ErrorsSection {
-    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>, accepted: bool) -> Result<Self> {
+    pub fn new(tables: &Tables, steps: &Steps, wished: Option<&str>) -> Result<Self> {
         let rows = &tables.statistics.0;
         let mut last: Vec<&StatisticsRow> = rows.iter().filter(|r| Some(r.order) == steps.standing() && r.held_out).collect();
         if let Some(wished) = wished
@@ -148,7 +143,7 @@ impl ErrorsSection {
         Ok(Self {
             verdict: match wrong_setup(tables) {
                 Some(wrong) => nothing_known(format!("Nothing is calibrated: {wrong}.")),
-                None => tempered(verdict(rows, &last, &tables.withdrawn), tables, accepted),
+                None => verdict(rows, &last, &tables.withdrawn),
             },
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
@@ -234,7 +229,7 @@ fn beside(row: &StatisticsRow) -> Option<ReferenceView> {
 }
 
 /// The first step with held-out rows of the same set as `after`.
-fn before<'a>(rows: &'a [StatisticsRow], after: &StatisticsRow) -> Option<&'a StatisticsRow> {
+pub(super) fn before<'a>(rows: &'a [StatisticsRow], after: &StatisticsRow) -> Option<&'a StatisticsRow> {
     rows.iter().filter(|r| r.held_out && r.set == after.set && r.order < after.order).min_by_key(|r| r.order)
 }
 
@@ -244,14 +239,7 @@ fn points(number: i64) -> String {
 
 /// A sentence without figures.
 fn nothing_known(sentence: String) -> VerdictView {
-    VerdictView { kind: "unknown", sentence, before: None, after: None, facts: Vec::new(), others: Vec::new() }
-}
-
-/// A result that is beyond the limits, or that the diagnosis does not explain, is not shown as good.
-fn tempered(view: VerdictView, tables: &Tables, accepted: bool) -> VerdictView {
-    let unexplained = tables.verdict.iter().flat_map(|table| &table.0).next_back().is_some_and(VerdictRow::is_unexplained);
-    let kind = if view.kind == "better" && (unexplained || !accepted) { "unknown" } else { view.kind };
-    VerdictView { kind, ..view }
+    VerdictView { sentence, others: Vec::new() }
 }
 
 fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdrawn]) -> VerdictView {
@@ -262,20 +250,16 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
     };
     let before_row = before(rows, after);
     let sample = format!("{} of the set \u{201c}{}\u{201d}, to which nothing was fitted", points(after.points), after.set);
-    let (kind, sentence) = match before_row {
-        Some(before) if after.mean_mm < before.mean_mm => (
-            "better",
-            format!("The mean position error fell from {} mm to {} mm on {sample}.", mm(before.mean_mm), mm(after.mean_mm)),
+    let sentence = match before_row {
+        Some(before) if after.mean_mm < before.mean_mm => {
+            format!("The mean position error fell from {} mm to {} mm on {sample}.", mm(before.mean_mm), mm(after.mean_mm))
+        }
+        Some(before) => format!(
+            "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
+            mm(before.mean_mm),
+            mm(after.mean_mm)
         ),
-        Some(before) => (
-            "worse",
-            format!(
-                "The calibration did not help: the mean position error went from {} mm to {} mm on {sample}.",
-                mm(before.mean_mm),
-                mm(after.mean_mm)
-            ),
-        ),
-        None => ("unknown", format!("The mean position error is {} mm on {sample}.", mm(after.mean_mm))),
+        None => format!("The mean position error is {} mm on {sample}.", mm(after.mean_mm)),
     };
     let uneven = before_row.filter(|before| before.points != after.points).map(|before| {
         format!("Before, the set had {} held-out points; the two means are not of the same points.", count(before.points))
@@ -284,34 +268,9 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
         let from = before(rows, row).map_or_else(String::new, |before| format!("{} mm \u{2192} ", mm(before.mean_mm)));
         format!("Set \u{201c}{}\u{201d} ({} held-out points): mean {from}{} mm.", row.set, count(row.points), mm(row.mean_mm))
     };
-    let suspects = || {
-        format!("mean without {}", if after.suspects == 1 { "a suspect".into() } else { format!("{} suspects", after.suspects) })
-    };
-    let without = after.mean_without_mm.map(|mean| (suspects(), mm(mean)));
     VerdictView {
-        kind,
         sentence,
-        before: before_row.map(|before| (before.step.clone(), mm(before.mean_mm))),
-        after: Some((after.step.clone(), mm(after.mean_mm))),
-        facts: [
-            ("95 % of points within".into(), mm(after.p95_mm)),
-            ("worst point".into(), mm(after.max_mm)),
-            ("rms".into(), mm(after.rms_mm)),
-        ]
-        .into_iter()
-        .chain(without)
-        .chain([(noise(after), mm(after.noise_rms_mm))])
-        .collect(),
         others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
-    }
-}
-
-/// What the noise is called by what it rests on.
-fn noise(row: &StatisticsRow) -> String {
-    match row.noise_basis.as_deref() {
-        _ if row.is_inferred() => "assumed noise (none is recorded, no instrument is stated)".into(),
-        Some(basis) => format!("rms of measurement noise alone (by {basis})"),
-        None => "rms of measurement noise alone".into(),
     }
 }
 

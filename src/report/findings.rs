@@ -36,7 +36,6 @@ pub(super) struct FindingsSection {
     findings: Vec<FindingView>,
     /// What each figure of the evidence means.
     meanings: Vec<(&'static str, &'static str)>,
-    not_observable: Vec<String>,
     next: Vec<String>,
     signature: Option<String>,
     /// Findings that were taken back.
@@ -93,7 +92,6 @@ impl FindingsSection {
             facts: facts(verdict),
             findings,
             meanings,
-            not_observable: lines(&verdict.not_observable),
             next: verdict.next_measurements.as_deref().map(lines).unwrap_or_default(),
             signature: verdict.signature.clone(),
             withdrawn: verdict.withdrawn.as_deref().map(lines).unwrap_or_default(),

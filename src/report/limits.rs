@@ -5,7 +5,6 @@ use super::errors::Steps;
 use super::findings::wrong_setup;
 use super::number::mm;
 use crate::table::StatisticsRow;
-use serde::Serialize;
 
 /// What the user accepts, mm; of held-out points of the diagnosed model, without a diagnosis after the last step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -18,19 +17,15 @@ pub struct AcceptanceLimits {
     pub max_mm: Option<f64>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 pub(super) struct Judgement {
-    /// `better` where all are kept, else `worse`.
-    kind: &'static str,
     pub sentence: String,
     /// Figure, found, allowed, whether it is kept.
     pub lines: Vec<(&'static str, String, String, bool)>,
     /// What was found and what is allowed, mm, of each line.
-    #[serde(skip)]
     pub values: Vec<[f64; 2]>,
     pub kept: bool,
     /// Whether there are limits: a wrong set-up is not accepted without any.
-    #[serde(skip)]
     pub asked: bool,
 }
 
@@ -47,8 +42,7 @@ impl Judgement {
     pub fn new(tables: &Tables, limits: &AcceptanceLimits, set: Option<&str>) -> Option<Self> {
         let figures = [("mean", limits.mean_mm), ("95 % of the points", limits.p95_mm), ("largest", limits.max_mm)];
         let asked = figures.iter().any(|(_, limit)| limit.is_some());
-        let unjudged =
-            |sentence: String| Self { kind: "worse", sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
+        let unjudged = |sentence: String| Self { sentence, lines: Vec::new(), values: Vec::new(), kept: false, asked };
         if let Some(wrong) = wrong_setup(tables) {
             return Some(unjudged(format!("Not accepted: {wrong}.")));
         }
@@ -72,6 +66,6 @@ impl Judgement {
             row.set,
             row.step
         );
-        Some(Self { kind: if kept { "better" } else { "worse" }, sentence, lines, values, kept, asked })
+        Some(Self { sentence, lines, values, kept, asked })
     }
 }

@@ -3,6 +3,7 @@
 //! Every figure is a column of a table; the pictures only bin, sort and scale them, and values are shown in people's units.
 
 mod axis;
+mod certificate;
 mod closure;
 mod corrections;
 mod course;
@@ -99,8 +100,8 @@ struct Page<'a> {
     style: &'static str,
     version: &'static str,
     robot: String,
-    judgement: Option<&'a limits::Judgement>,
-    identity: Vec<(&'a String, &'a String)>,
+    certificate: certificate::Certificate,
+    has_identity: bool,
     hashes: &'a [(String, String)],
     errors: errors::ErrorsSection,
     diagnosis: Option<findings::FindingsSection>,
@@ -131,13 +132,13 @@ pub fn pages(tables: &Tables, options: &ReportOptions) -> Result<Pages> {
     let page = Page {
         title,
         policy: "",
-        judgement: judgement.as_ref(),
-        identity: options.identity.iter().collect(),
+        certificate: certificate::Certificate::new(tables, &robot, options.identity, judgement.as_ref(), options.set),
+        has_identity: !options.identity.is_empty(),
         hashes: &options.hashes,
         diagnosis: findings::FindingsSection::new(tables),
         style: include_str!("report.css"),
         version: env!("CARGO_PKG_VERSION"),
-        errors: errors::ErrorsSection::new(tables, &steps, options.set, judgement.as_ref().is_none_or(|judged| judged.kept))?,
+        errors: errors::ErrorsSection::new(tables, &steps, options.set)?,
         closure: closure::ClosureSection::new(tables),
         workspace: errors::WorkspaceSection::new(&tables.prediction, tables.standing.as_deref()),
         parameters: parameters::ParametersSection::new(&tables.parameters, tables.counting.as_deref()),

@@ -37,7 +37,8 @@ pub use later::LaterFiles;
 pub use layout::{Axis, Decimal, Duplicates, FileLayout, Join, LimitPolicy};
 pub use listing::ListedTable;
 pub use mapped::{
-    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, ScalarColumn, TextColumn, UncertaintyColumn,
+    ColumnRef, ConventionColumns, CountColumn, CoupledColumn, JointColumns, NameMatch, ScalarColumn, TextColumn,
+    UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
 pub use noise::{InstrumentSetting, instruments};

@@ -37,7 +37,7 @@ pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use registry::{ErasedStage, StageEntry};
-pub use report::{Report, ReportReads};
+pub use report::{Accepted, Report, ReportReads};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};

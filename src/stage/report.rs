@@ -33,9 +33,11 @@ pub struct Report {
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Accepted {
+    /// Arithmetic mean.
     pub mean_mm: Option<f64>,
     /// 95 % of the points.
     pub p95_mm: Option<f64>,
+    /// Of the worst point.
     pub max_mm: Option<f64>,
 }
 
@@ -75,7 +77,7 @@ writes! {
 impl Stage for Report {
     const NAME: &'static str = "report";
     const SUMMARY: &'static str = "writes one self-contained HTML file: errors before and after, parameters, rejected rows";
-    const IMPLEMENTATION: u32 = 15;
+    const IMPLEMENTATION: u32 = 16;
     type Reads = ReportReads;
     type Writes = ReportWrites;
 

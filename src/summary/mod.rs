@@ -4,6 +4,7 @@ mod columns;
 mod corrections;
 mod diagnosis;
 mod explanation;
+mod first_look;
 #[cfg(feature = "query")]
 mod grid;
 mod in_short;
@@ -23,6 +24,7 @@ pub use columns::{columns, columns_json};
 pub use corrections::{corrections, corrections_json};
 pub use diagnosis::DiagnosisSummary;
 pub use explanation::explanation;
+pub use first_look::first_look;
 #[cfg(feature = "query")]
 pub use grid::grid;
 pub use in_short::in_short;

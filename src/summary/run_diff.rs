@@ -36,10 +36,10 @@ pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
     if differing.is_empty() {
         return text + &format!("same: {}\n", counted(same, "table"));
     }
-    // What people ask for first; within one kind the order of the pipeline.
+    // The largest change of a length first; of tables without one what people ask for, in the order of the pipeline.
     let rank =
         |table: &TableChange| ["parameters", "statistics", "prediction"].iter().position(|kind| *kind == table.kind).unwrap_or(3);
-    differing.sort_by_key(|table| rank(table));
+    differing.sort_by(|a, b| largest_mm(b).total_cmp(&largest_mm(a)).then(rank(a).cmp(&rank(b))));
     let (told, rest) = differing.split_at(if stat { differing.len() } else { differing.len().min(TABLES) });
     text.push_str(&rival_words(rivals));
     text.push('\n');
@@ -55,6 +55,12 @@ pub fn run_diff(diff: &RunDiff, rivals: &[RivalChange], stat: bool) -> String {
         text.push_str(&format!("same: {}\n", counted(same, "table")));
     }
     text
+}
+
+/// The largest change of a column in mm, 0 where none changed.
+fn largest_mm(table: &TableChange) -> f64 {
+    let columns = table.diff.iter().flat_map(|diff| &diff.columns).filter(|column| column.unit == "mm" && column.changed > 0);
+    columns.filter_map(|column| column.statistics).map(|found| found.max).fold(0.0, f64::max)
 }
 
 fn list(names: &[&str]) -> String {

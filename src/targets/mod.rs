@@ -4,12 +4,14 @@
 mod columns;
 mod decimal;
 mod fields;
+mod measured;
 pub mod parquet;
 mod row;
 pub mod text;
 mod whole;
 
 pub use columns::Units;
+pub use measured::{MeasuredTarget, measured};
 pub use whole::{unwritten, whole};
 
 use crate::description::RobotDescription;

@@ -176,7 +176,7 @@ fn split_ending(line: &str) -> (&str, &str) {
 }
 
 /// What separates most in the header.
-fn delimiter(header: &str) -> char {
+pub(super) fn delimiter(header: &str) -> char {
     let count = |c: char| header.matches(c).count();
     [';', '\t', ','].into_iter().filter(|c| count(*c) > 0).max_by_key(|c| count(*c)).unwrap_or(',')
 }
@@ -316,7 +316,7 @@ fn is_comma_number(text: &str) -> bool {
 }
 
 /// A number, or none where the field is empty.
-fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
+pub(super) fn parse(text: &str, delimiter: char) -> Result<Option<f64>, ()> {
     if text.is_empty() {
         return Ok(None);
     }

@@ -49,9 +49,15 @@ const ARM: &str = "id,q1,q2\nA,1,2\n";
 const POINTS: &str = "id,x,y,z\nA,1,2,3\n";
 
 #[test]
-fn a_sound_pipeline_passes_and_shows_its_graph() {
+fn a_sound_pipeline_is_ready_and_shows_its_graph_on_demand() {
     let (code, out, err) = checked(ROBOT, PIPELINE, ARM, POINTS);
-    assert_eq!((code, err.as_str()), (0, ""));
+    assert_eq!((code, err.as_str(), out.as_str()), (0, "", "ready     2 stages can run: calib run pipeline.yaml\n"));
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in [("robot.yaml", ROBOT), ("pipeline.yaml", PIPELINE), ("arm.csv", ARM), ("points.csv", POINTS)] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let out = calib(folder.path(), &["check", "pipeline.yaml", "--details"], "").stdout;
+    let out = String::from_utf8_lossy(&out).into_owned();
     assert!(out.contains("reads   robot  <- robot.robot"), "{out}");
 }
 
@@ -93,11 +99,16 @@ fn lines_that_init_marked_are_listed_and_are_no_faults() {
     );
     let (code, out, err) = checked(&robot, &pipeline, ARM, POINTS);
     assert_eq!((code, err.as_str()), (0, ""));
-    assert!(out.contains("\nwarning: robot.yaml: a line is still marked REPLACE"), "{out}");
-    assert!(out.contains("  2: name: arm   # REPLACE\n"), "{out}");
-    assert!(out.contains("\nwarning: pipeline.yaml: 2 lines are still marked CHECK"), "{out}");
-    assert!(out.contains("  20: join: {by: id}   # CHECK: the points' names\n"), "{out}");
-    assert!(!out.contains("pipeline.yaml: a line is still marked REPLACE"), "{out}");
+    let lines: Vec<&str> = out.lines().collect();
+    let told = [
+        "replace   1 line: put your own there and delete the mark",
+        "          robot.yaml:2: name: arm   # REPLACE",
+        "check     2 lines: check that it is right and delete the mark",
+        "          pipeline.yaml:12: q: {column: \"q{j}\", unit: deg}   # CHECK: no value is beyond 6.5",
+        "          pipeline.yaml:20: join: {by: id}   # CHECK: the points' names",
+        "not yet   a line is left to fill in; 2 stages are wired",
+    ];
+    assert_eq!(lines, told, "{out}");
 }
 
 /// Exit code and stderr of a command on the pipeline, with a good robot and data of two days.
@@ -168,4 +179,44 @@ fn a_name_that_is_too_long_says_how_long_it_may_be() {
     let (code, err) = told("check", &pipeline, POINTS);
     assert!(code == 2 && err.contains(&format!("name: `{name}`: 65 letters; allowed: up to 64")), "{err}");
     assert!(err.contains(&format!("stages[0].id: `{id}`: 70 letters; allowed: up to 64")), "{err}");
+}
+
+#[test]
+fn check_of_the_data_fits_base_and_geometry_and_names_rows_that_have_no_partner() {
+    use std::fmt::Write;
+    let (mut arm, mut points) = (String::from("id,q1,q2\n"), String::from("id,x,y,z\n"));
+    for k in 0..40_i32 {
+        let q = [f64::from(k * 37 % 120 - 60), f64::from(k * 53 % 80 - 20)];
+        let (s, c) = q[0].to_radians().sin_cos();
+        let (t, d) = q[1].to_radians().sin_cos();
+        let (along, up) = (800.0 * d, 400.0 - 800.0 * t);
+        writeln!(arm, "P{k},{},{}", q[0], q[1]).expect("text");
+        // The last five were measured under other names.
+        let name = if k < 35 { format!("P{k}") } else { format!("Q{k}") };
+        writeln!(points, "{name},{:.4},{:.4},{:.4}", along * c - 50.0 * s, along * s + 50.0 * c, up).expect("text");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let fits = "  - uses: split\n    with: {by: every, n: 4}\n  - id: nominal\n    uses: identify\n    with: {effects: [base_frame]}\n\
+                \x20 - id: geometry\n    uses: identify\n    with: {effects: [base_frame, tool_offset, joint_offset, link_geometry]}\n";
+    let pipeline = format!("{PIPELINE}{fits}");
+    for (name, text) in [("robot.yaml", ROBOT), ("pipeline.yaml", &pipeline), ("arm.csv", &arm), ("points.csv", &points)] {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    }
+    let output = calib(folder.path(), &["check", "pipeline.yaml", "--data", "--store", "kept"], "");
+    let out = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{out}{}", String::from_utf8_lossy(&output.stderr));
+    for part in [
+        "rows      35 used, of 35 points\n",
+        "ranges    J1 -60.0 deg to 53.0 deg\n",
+        "rejected  10 rows, unmatched: P35 (arm.csv: ",
+        "after `nominal`, 35 points\n",
+        "after `geometry`, 35 points\n",
+        "parameters can be estimated\n",
+    ] {
+        assert!(out.contains(part), "{part} in\n{out}");
+    }
+    assert!(folder.path().join("kept").exists() && !folder.path().join(".calib").exists());
+    let run = calib(folder.path(), &["run", "pipeline.yaml", "--store", "kept"], "");
+    let told = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(told.contains("geometry  cached"), "{told}");
 }

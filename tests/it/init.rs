@@ -2,6 +2,7 @@
 
 mod foreign;
 mod layouts;
+mod lists;
 
 use crate::compensate::calib;
 use std::fmt::Write;
@@ -71,7 +72,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
     assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(said.contains("robot.yaml: 5 lines are still marked REPLACE"), "{said}");
+    assert!(said.contains("replace   5 lines: ") && said.contains("          robot.yaml:"), "{said}");
     let identified = pipeline.replace("# limits:", "limits:").replace("# identity:", "identity:");
     std::fs::write(folder.path().join("pipeline.yaml"), identified).expect("a file");
     let check = calib(folder.path(), &["check", "pipeline.yaml"], "");
@@ -82,7 +83,7 @@ fn a_foreign_table_is_understood_as_it_stands_and_what_is_left_to_do_is_said() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("name columns of joints and the measured point where it says REPLACE"), "{said}");
     let check = calib(folder.path(), &["check", "bare/pipeline.yaml"], "");
-    assert!(String::from_utf8_lossy(&check.stdout).contains("pipeline.yaml: 4 lines are still marked REPLACE"));
+    assert!(String::from_utf8_lossy(&check.stdout).contains("replace   9 lines: "));
 }
 
 #[test]

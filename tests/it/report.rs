@@ -257,3 +257,29 @@ fn one_point_without_error_still_draws() {
     assert!(pictures(&page) >= 6);
     assert!(page.contains("The mean position error is 0.000 mm on one point of the set"));
 }
+
+#[test]
+fn the_certificate_is_green_only_where_the_error_is_explained_and_within_the_limits() {
+    let card = |said: &str, mean_mm: Option<f64>| {
+        let mut reads = tables("Heavy 6R, cell 4");
+        reads.verdict[0].table.0[0].verdict = said.into();
+        let limits = calib::stage::Accepted { mean_mm, ..Default::default() };
+        let identity = [("robot serial".to_string(), "4711".to_string())].into();
+        let page = html(Report { limits, identity, ..Report::default() }, reads);
+        let card =
+            page.split("id=\"verdict\"").next().and_then(|head| head.rsplit("<section class=\"verdict ").next()).expect("a card");
+        assert!(page.contains("<dt>robot serial</dt><dd>4711</dd>") && page.matches("signature</span>").count() == 1);
+        assert!(page.contains("expanded uncertainty of the corrected robot"));
+        // What is not explained is not called accepted.
+        assert_eq!(page.contains("Accepted: within"), ["explained", "nothing_missing"].contains(&said) && mean_mm == Some(100.0));
+        card.trim_end_matches(['"', ' ']).to_string()
+    };
+    assert_eq!(card("explained", Some(100.0)), "better");
+    assert_eq!(card("nothing_missing", Some(100.0)), "better");
+    assert_eq!(card("unexplained", Some(100.0)), "open");
+    assert_eq!(card("not_asked", Some(100.0)), "open");
+    assert_eq!(card("explained", Some(1e-6)), "worse");
+    assert_eq!(card("unexplained", Some(1e-6)), "worse");
+    assert_eq!(card("explained", None), "unknown");
+    assert_eq!(card("unexplained", None), "open");
+}

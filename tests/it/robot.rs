@@ -183,7 +183,7 @@ fn a_practice_robot_is_read_in_its_units() {
     let text = r#"{"name": "two", "axes": [[0, 0, 1], [0, -2, 0]], "points": [[0, 0, 0], [312.0, 0, 0]], "tool": [1854, 0, 1310],
 	"mass": [350, null], "com": [[150, 0, -120], null], "ratio": [213, 214], "kt": [1.3, 1.3], "payload": 210.0,
 	"payload_com": [180, 40, 60], "coupling": [[1, 0]], "colour": "orange"}"#;
-    let Imported { robot, notes } = read_case(RobotFileText { label: "robot.json", text }).expect("readable");
+    let Imported { robot, notes, .. } = read_case(RobotFileText { label: "robot.json", text }).expect("readable");
     assert_eq!(robot.joints[1].axis, [0.0, -1.0, 0.0]);
     assert_eq!(robot.joints[1].point, [0.312, 0.0, 0.0]);
     assert_eq!((robot.joints[0].mass, robot.joints[1].mass, robot.joints[1].centre), (Some(350.0), None, None));

@@ -8,10 +8,10 @@ mod twins;
 
 use crate::fixture;
 use crate::identify::{GEOMETRY, model, normal};
+use calib::description::RobotDescription;
 use calib::effect::AnchorShift;
 use calib::error::Result;
 use calib::estimate::{FitOptions, Fitted, Known, KnownLength, Model, ParameterStatus, Prior, fit, gauge};
-use calib::description::RobotDescription;
 use calib::robot::{Measurements, Named, RobotModel};
 use calib::stage::{Context, OpenedInput, RawFile, Services, Simulate, SimulateReads, Sink, Stage};
 use calib::table::{Recording, Robot};

@@ -33,7 +33,8 @@ mkdir cell7
 cp own/recordings/c0001/controller.csv own/recordings/c0001/tracker.csv cell7/
 "$CALIB" init cell7 --data cell7/controller.csv cell7/tracker.csv --robot spherical6
 grep -q REPLACE cell7/robot.yaml
-cp pipelines/sr210d/robot.yaml cell7/robot.yaml
+# The data sheet, and where the reflector of this recording sits.
+sed 's/^tool: .*/tool: {point: [1835, 53, 1263]}/' pipelines/sr210d/robot.yaml > cell7/robot.yaml
 sed -e 's/^ *# instrument: REPLACE.*/      instrument: {constant_um: 10, per_metre_um: 2.5, coverage: 2}/' \
     -e 's/^ *# limits: .*/      limits: {mean_mm: 0.3, max_mm: 0.8}/' \
     -e 's/^ *# identity: .*/      identity: {operator: A. Newcomer, robot serial: "7", tracker: AT960, date: 2026-10-01}/' \

@@ -37,8 +37,8 @@ pub use types::{
 };
 pub use words::other_means;
 
-use judge::{ModelComparison, judge};
 use crate::effect::Form;
+use judge::{ModelComparison, judge};
 use locate::locate;
 use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};

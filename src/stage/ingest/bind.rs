@@ -4,7 +4,7 @@ use super::arm::RobotJoints;
 use super::clock::CLOCK;
 use super::columns::Columns;
 use super::layout::FileLayout;
-use super::mapped::{ColumnRef, JointColumns, ScalarColumn};
+use super::mapped::{ColumnRef, JointColumns, NameRule, ScalarColumn};
 use super::wide::WideTargets;
 use crate::error::{Error, Fault, Result, counted, nearest};
 use crate::observation::{Convention, DeclaredColumn};
@@ -40,7 +40,7 @@ pub(super) struct Binding {
 
 /// Text from a column, or for every row the same.
 pub(super) enum TextBinding {
-    Column { column: usize, optional: bool },
+    Column { column: usize, optional: bool, rule: NameRule },
     Value(String),
 }
 
@@ -119,7 +119,7 @@ pub(super) fn bind(layout: &FileLayout, head: &FileHeader, arm: &RobotJoints) ->
         let value = text.value.clone().map(TextBinding::Value);
         let bound = value.or_else(|| {
             let column = binder.column(text.column.as_ref()?, declared.setting, text.optional)?;
-            Some(TextBinding::Column { column, optional: text.optional })
+            Some(TextBinding::Column { column, optional: text.optional, rule: text.rule() })
         });
         match arm.slots.texts().iter().position(|name| *name == declared.setting) {
             Some(at) => binder.binding.texts[at] = bound,

@@ -69,6 +69,11 @@ fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
         if declared.setting == "point_id" && text.value.is_some() {
             faults.push(Fault::new(format!("{place}.value"), "points cannot all have the same id; name a `column`"));
         }
+        for (key, given) in [("match", text.matching.is_some()), ("strip", text.strip.is_some())] {
+            if given && declared.setting != "point_id" {
+                faults.push(Fault::new(format!("{place}.{key}"), "a rule for names of points; allowed for `point_id` alone"));
+            }
+        }
         column(text.column.as_ref(), file, &place, faults);
     }
     for (declared, counted) in columns.counts() {

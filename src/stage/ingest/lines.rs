@@ -86,9 +86,6 @@ impl TextReader {
     }
     fn byte_order_mark(&mut self) -> Result<()> {
         let head = self.reader.fill_buf().map_err(|error| failed(&self.label, &error))?;
-        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-            return Err(Error::data(&self.label, "is UTF-16; allowed: UTF-8 (with or without a byte-order mark), Windows-1252"));
-        }
         // Old Macintosh; one at the end may be a CRLF that was cut.
         let lone = head.iter().position(|byte| *byte == b'\r').is_some_and(|at| at + 1 < head.len());
         if lone && !head.contains(&b'\n') {

@@ -68,6 +68,51 @@ pub struct TextColumn {
     /// The column may be missing from the file, and its cells may be blank.
     #[serde(default)]
     pub optional: bool,
+    /// What of a name counts, for `point_id`: `number` for its last whole number, so that `Pose 17` and `pt_017` are one point; without
+    /// it, the whole name.
+    #[serde(default, rename = "match", skip_serializing_if = "Option::is_none")]
+    pub matching: Option<NameMatch>,
+    /// What is taken off the beginning of every name, for `point_id`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strip: Option<String>,
+}
+
+/// What of a point's name counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum NameMatch {
+    /// Its last whole number, without zeros in front.
+    Number,
+}
+
+/// What of a name counts, of the column that holds it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct NameRule {
+    matching: Option<NameMatch>,
+    strip: Option<String>,
+}
+
+impl NameRule {
+    /// The name that counts; none where it has no number, and one is asked for.
+    pub(super) fn applied<'a>(&self, name: &'a str) -> Option<&'a str> {
+        let rest = self.strip.as_deref().and_then(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
+        if self.matching.is_none() { Some(rest) } else { last_number(rest) }
+    }
+}
+
+/// The last whole number in a name, without zeros in front.
+pub fn last_number(name: &str) -> Option<&str> {
+    let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = name[..end].trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let digits = name[start..end].trim_start_matches('0');
+    Some(if digits.is_empty() { "0" } else { digits })
+}
+
+impl TextColumn {
+    /// What of its names counts.
+    pub(super) fn rule(&self) -> NameRule {
+        NameRule { matching: self.matching, strip: self.strip.clone() }
+    }
 }
 
 /// A column of whole numbers.
@@ -216,5 +261,22 @@ impl ScalarColumn {
     /// The column that is added to `column`, or taken off (-1).
     pub(super) fn difference(&self) -> Option<(&ColumnRef, f64)> {
         self.minus.as_ref().map(|column| (column, -1.0)).or_else(|| self.plus.as_ref().map(|column| (column, 1.0)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NameMatch, NameRule};
+
+    #[test]
+    fn names_count_by_their_last_number_or_without_a_prefix() {
+        let number = NameRule { matching: Some(NameMatch::Number), strip: None };
+        for (name, counts) in
+            [("Pose 17", Some("17")), ("pt_017", Some("17")), ("A1-008b", Some("8")), ("P\u{e4}000", Some("0")), ("home", None)]
+        {
+            assert_eq!(number.applied(name), counts, "{name}");
+        }
+        let strip = NameRule { matching: None, strip: Some("pt_".into()) };
+        assert_eq!([strip.applied("pt_17"), strip.applied("17")], [Some("17"), Some("17")]);
     }
 }

@@ -20,6 +20,9 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Result<f64, NumberFault> {
     if cell.is_empty() {
         return Err(NumberFault::Blank);
     }
+    if let Some(plain) = ungrouped(cell, decimal) {
+        return read(&plain);
+    }
     match decimal {
         Decimal::Point => read(cell).map_err(|fault| if with_point(cell).is_some() { NumberFault::Comma } else { fault }),
         Decimal::Comma if cell.contains(&b'.') => Err(read(cell).map_or(NumberFault::Text, |_| NumberFault::Point)),
@@ -33,6 +36,21 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Result<f64, NumberFault> {
             read(copy)
         }
     }
+}
+
+/// The number without its marks of thousands, with a decimal point, where it has both marks and every group is one: `1.234,56` with a decimal
+/// comma, `1,234.56` with a point.
+fn ungrouped(cell: &[u8], decimal: Decimal) -> Option<Vec<u8>> {
+    let (group, mark) = if decimal == Decimal::Comma { (b'.', b',') } else { (b',', b'.') };
+    if !cell.contains(&group) || cell.iter().filter(|byte| **byte == mark).count() != 1 {
+        return None;
+    }
+    let (whole, rest) = cell.split_at(cell.iter().position(|byte| *byte == mark)?);
+    let mut groups = whole.strip_prefix(b"-").unwrap_or(whole).split(|byte| *byte == group);
+    let first = groups.next().is_some_and(|digits| (1..=3).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit));
+    let others = groups.all(|digits| digits.len() == 3 && digits.iter().all(u8::is_ascii_digit));
+    let digits = whole.iter().filter(|byte| **byte != group).copied();
+    (first && others).then(|| digits.chain([b'.']).chain(rest[1..].iter().copied()).collect())
 }
 
 fn read(cell: &[u8]) -> Result<f64, NumberFault> {
@@ -60,10 +78,21 @@ mod tests {
         assert_eq!(parse(b"2,02011E+13", Decimal::Comma), Ok(2.02011e13));
         assert_eq!(parse(b"17", Decimal::Comma), Ok(17.0));
         assert_eq!(parse(b"0.365", Decimal::Comma), Err(NumberFault::Point));
-        assert_eq!(parse(b"1.234,5", Decimal::Comma), Err(NumberFault::Text));
         assert_eq!(parse(b"+1.5e-3", Decimal::Point), Ok(1.5e-3));
         assert_eq!(parse(b"0,365", Decimal::Point), Err(NumberFault::Comma));
         assert_eq!(parse(b"1,234,5", Decimal::Point), Err(NumberFault::Text));
+    }
+
+    #[test]
+    fn marks_of_thousands_are_read_where_both_marks_stand_and_every_group_has_three_digits() {
+        assert_eq!(parse(b"1.234,56", Decimal::Comma), Ok(1234.56));
+        assert_eq!(parse(b"-12.345.678,5", Decimal::Comma), Ok(-12_345_678.5));
+        assert_eq!(parse(b"1,234.56", Decimal::Point), Ok(1234.56));
+        // One mark alone may be either.
+        assert_eq!(parse(b"1.234", Decimal::Comma), Err(NumberFault::Point));
+        for cell in ["1.23,4", "1.2345,6", "1234.567,8", ".123,4", "1.234,5,6"] {
+            assert_eq!(parse(cell.as_bytes(), Decimal::Comma), Err(NumberFault::Text), "{cell}");
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::parquet::ParquetReader;
 use super::row::{RecordedRow, RowReader, RowRefusal};
 use crate::error::{Error, Result, counted};
 use crate::program::listing;
-use crate::raw::{self, Workbook, is_workbook};
+use crate::raw::{self, Utf16Reader, Workbook, is_utf16, is_workbook};
 use crate::stage::{Context, OpenedInput};
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
@@ -43,6 +43,10 @@ impl FileReader {
         }
         if head.starts_with(b"PAR1") {
             return Ok(Self::Parquet(Box::new(ParquetReader::open(reader, &source.label)?)));
+        }
+        if is_utf16(head) {
+            let text: Box<dyn Read + Send> = Box::new(Utf16Reader::new(reader));
+            return Ok(Self::Text(TextReader::open(BufReader::with_capacity(1 << 16, text), &source.label, layout)?));
         }
         Ok(Self::Text(TextReader::open(reader, &source.label, layout)?))
     }

@@ -355,11 +355,20 @@ fn text(
 ) -> Result<(), RowRefusal> {
     match source {
         Some(TextBinding::Value(value)) => into.push_str(value),
-        Some(TextBinding::Column { column, optional }) => {
+        Some(TextBinding::Column { column, optional, rule }) => {
             let bytes = record.field(*column).unwrap_or_default();
             match encoding::text(bytes).as_deref() {
                 Some("") if !optional && complete => return refuse(Reason::Blank, format!("{name} is blank")),
-                Some(text) => into.push_str(text),
+                Some("") => {}
+                Some(text) => match rule.applied(text) {
+                    Some(counts) => into.push_str(counts),
+                    None => {
+                        return refuse(
+                            Reason::NotANumber,
+                            format!("{name}: `{text}` holds no number, and `match: number` asks for one"),
+                        );
+                    }
+                },
                 None => return refuse(Reason::NotText, format!("{name} is neither UTF-8 nor Windows-1252 text")),
             }
         }

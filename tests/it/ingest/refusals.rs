@@ -21,11 +21,6 @@ fn a_file_that_is_none_says_what_it_is() {
     assert_eq!(with("", TWO), "a.csv: is empty; allowed: a header and at least one data row");
     assert_eq!(with(HEAD, TWO), "a.csv: has a header but no data row; allowed: at least one");
     assert_eq!(with("\n\n", TWO), "a.csv: has no header: 2 lines, all empty, comments or skipped");
-    let utf16 = Desk::default().with("a.csv", [0xff, 0xfe, b'i', 0]);
-    assert_eq!(
-        refusal(&utf16, TWO, robot("rr", 1.0)),
-        "a.csv: is UTF-16; allowed: UTF-8 (with or without a byte-order mark), Windows-1252"
-    );
     let open = with(&format!("{HEAD}P1,1,2,3,4,5\n\"P2,1,2,3,4,5\nP3,1,2,3,4,5\n"), TWO);
     assert_eq!(open, "a.csv:3: a quoted field is not closed");
     let endless = with(&format!("{HEAD}P1,1,2,3,4,{}", "5".repeat(1 << 21)), TWO);

@@ -57,7 +57,8 @@ pub(super) fn made(files: &[(&str, Vec<u8>)]) -> Made {
     }
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     let output = calib(folder.path(), &[&["init", ".", "--data"], names.as_slice()].concat(), "");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // 1 where nothing was understood: the files to fill in are written all the same.
+    assert!(output.status.code().is_some_and(|code| code <= 1), "{}", String::from_utf8_lossy(&output.stderr));
     let pipeline = std::fs::read_to_string(folder.path().join("pipeline.yaml")).expect("a pipeline");
     assert!(folder.path().join("robot.yaml").is_file());
     Made { folder, pipeline, said: String::from_utf8_lossy(&output.stdout).into_owned() }
@@ -381,5 +382,5 @@ fn the_identity_that_init_comments_out_is_nobodys() {
     let check = calib(made.path(), &["check", "pipeline.yaml"], "");
     assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));
     let said = String::from_utf8_lossy(&check.stdout).into_owned();
-    assert!(said.contains("pipeline.yaml: a line is still marked REPLACE"), "{said}");
+    assert!(said.contains("replace   ") && said.contains("          pipeline.yaml:"), "{said}");
 }

@@ -2,8 +2,8 @@
 
 use super::{fixture, plane, socket, sphere, touched, truth};
 use crate::desk::{self, Desk};
-use calib::observation::{KINDS, Weight};
 use calib::description::RobotDescription;
+use calib::observation::{KINDS, Weight};
 use calib::stage::{Identify, IdentifyReads};
 use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
 use nalgebra::Vector3;

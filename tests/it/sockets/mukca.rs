@@ -3,8 +3,8 @@
 
 use super::{Named, fitted_with, places_of, priors};
 use crate::desk;
-use calib::estimate::{Model, scale};
 use calib::description::RobotDescription;
+use calib::estimate::{Model, scale};
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::robot::{Measurements, Readings};
 use nalgebra::Vector3;

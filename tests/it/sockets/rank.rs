@@ -1,8 +1,8 @@
 //! What such data show is what theory says, counted at joints that close; the volume term is the derivative that it claims to be.
 
 use super::{Length, calibrated, fixture, free, plane, socket, sphere, touched, truth};
-use calib::observation::rank;
 use calib::description::RobotDescription;
+use calib::observation::rank;
 use calib::twin::touch::Fixture;
 
 /// Geometry of an arm with its ball that a fit sees beside the numbers of the fixtures themselves.

@@ -2,7 +2,7 @@
 
 use super::dh::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
-use super::{FrameChain, Imported, RobotFileText, screws, urdf};
+use super::{FrameChain, Imported, RobotFileText, about, screws, urdf};
 use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
 use crate::error::Result;
 use crate::robot::Bound;
@@ -27,6 +27,7 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
     let root = DocumentNode::root(&node, &faults).map(&[
         "calib_robot",
         "name",
+        "about",
         "units",
         "kinematics",
         "tool",
@@ -44,9 +45,10 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
     let units = units(root.get("units").map(&["length", "angle"]));
     let chain = chain(root.get("kinematics").map(&FORMATS), units, urdf, &faults)?;
     let robot = chain.map(|chain| describe(&root, chain, units));
+    let about = about::read(root.get("about"), robot.as_ref().map_or(0, |robot| robot.joints.len()), units.length);
     faults.finish()?;
     match robot {
-        Some(robot) => Ok(Imported { robot, notes: Vec::new() }),
+        Some(robot) => Ok(Imported { robot, notes: Vec::new(), about }),
         None => Err(crate::error::Error::Bug("a robot file without kinematics had no fault".into())),
     }
 }

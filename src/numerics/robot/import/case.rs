@@ -53,7 +53,7 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
     let unused = root.keys().filter(|key| !KEYS.contains(key));
     let notes = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();
     faults.finish()?;
-    Ok(Imported { robot, notes })
+    Ok(Imported { robot, notes, about: super::About::default() })
 }
 
 fn metres(value: &DocumentNode) -> Point3<f64> {

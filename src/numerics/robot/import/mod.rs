@@ -3,10 +3,13 @@
 //! Every format ends in one chain at the zero pose in the base frame. All faults of a file are reported at once, each with
 //! its line and its path (`robot.yaml:12:5: joints[2].limits`, counted from 0 as in the YAML), a URDF with its line alone.
 
+pub use about::About;
+
 use crate::description::{JointKind, RobotDescription};
 use crate::error::Result;
 use nalgebra::{Isometry3, Point3, Vector3};
 
+mod about;
 mod calib;
 mod case;
 mod dh;
@@ -30,6 +33,8 @@ pub struct Imported {
     pub robot: RobotDescription,
     /// What a person should know of how it was read, a sentence each.
     pub notes: Vec<String>,
+    /// What the file says of itself.
+    pub about: About,
 }
 
 /// Reads calib's robot file; `urdf` is the file that `kinematics.urdf` refers to. Fails with every fault of the file.

@@ -1,0 +1,143 @@
+//! `calib verify-robot`: what compensation achieved, from points that were measured at corrected targets.
+
+use super::model_arguments::ModelArguments;
+use super::{emit_json, emit_lines};
+use crate::compensate::{CorrectionOptions, Corrector, Gate, IdentifiedArm, load_matters};
+use crate::error::{Error, Result, counted};
+use crate::identified::{Achieved, achieved};
+use crate::pipeline::Purpose;
+use crate::raw;
+use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::summary::labelled;
+use crate::targets::{Layout, Units, measured};
+use clap::Args;
+use serde_json::json;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Say what compensation achieved: before, predicted and achieved errors of points that were measured at corrected targets.
+///
+/// The table holds the targets as they were before correction, in the columns that `calib compensate` knows (q1_deg ..., payload_kg, dir1),
+/// and in x_mm, y_mm, z_mm what the tracker measured when the robot was sent to the corrected ones. The wanted point of a row is the one that
+/// the nominal robot reaches with its target. Where the same target stands 30 times or more, accuracy and repeatability of that pose are
+/// those of ISO 9283; no other figure is.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  calib verify-robot cell7/pipeline.yaml second.csv
+  calib verify-robot latest second.csv --new-base --json")]
+pub(super) struct VerifyRobotArguments {
+    #[command(flatten)]
+    model: ModelArguments,
+    /// Targets before correction with the points measured after it: delimited text
+    #[arg(value_name = "SECOND")]
+    second: PathBuf,
+    /// Finds the tracker's place anew from these points: it was moved since the model was identified
+    #[arg(long)]
+    new_base: bool,
+    /// kg at the tool, of targets without a column `payload_kg`
+    #[arg(long, value_name = "KG")]
+    payload: Option<f64>,
+    /// Prints one JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn main(arguments: &VerifyRobotArguments, command_line: &[OsString]) -> Result<()> {
+    let place = arguments.second.display().to_string();
+    let text = raw::text(&arguments.second).map_err(|error| Error::spec(&place, format!("cannot be read: {error}")))?;
+    let identified = arguments.model.load(Purpose::Compensate, command_line)?;
+    let arm = IdentifiedArm::new(identified.model.clone(), identified.correction.clone());
+    // As `compensate`: what depends on load is not predicted without one.
+    let load = if arguments.payload.is_some() { None } else { identified.heaviest().filter(|load| load_matters(&arm, *load)) };
+    let layout = Layout {
+        place: &place,
+        robot: &identified.robot,
+        units: Units::default(),
+        plain: false,
+        cartesian: false,
+        load,
+        force: true,
+    };
+    let rows = measured(&text, &layout)?;
+    if rows.is_empty() {
+        return Err(Error::data(&place, "has no row below its header"));
+    }
+    let nominal = RobotModel::new(identified.robot.clone());
+    let convention = identified.convention.clone().unwrap_or_else(|| JointConvention::of_the_robot_file(nominal.joints()));
+    let clock = identified.data.as_ref().is_none_or(Measurements::has_clock);
+    let options = CorrectionOptions {
+        convention,
+        cartesian: false,
+        oriented: false,
+        one_step: false,
+        payload: arguments.payload.unwrap_or(0.0),
+        temperature: None,
+        time: None,
+        clock,
+        direction: None,
+        start: None,
+        uncertainty: true,
+        gate: Gate::default(),
+    };
+    let mut corrector = Corrector::new(&arm, identified.coverage(), identified.uncertainty(&arm), options);
+    let found = achieved(&arm, &nominal, &mut corrector, &rows, arguments.new_base)?;
+    if arguments.json {
+        return emit_json(&document(&identified.origin, &found));
+    }
+    emit_lines(&told(&identified.origin, &found, arguments.new_base))
+}
+
+/// Mean, 95th percentile and largest, mm.
+fn figures(lengths: &[f64]) -> [f64; 3] {
+    let mut sorted = lengths.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mean = sorted.iter().sum::<f64>() / sorted.len().max(1) as f64;
+    [mean, crate::statistics::quantile(&sorted, 0.95).unwrap_or_default(), sorted.last().copied().unwrap_or_default()]
+        .map(|length| length * 1e3)
+}
+
+fn told(origin: &str, found: &Achieved, new_base: bool) -> String {
+    let line = |label: &str, lengths: &[f64], what: &str| {
+        let [mean, p95, max] = figures(lengths);
+        labelled(label, &format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}"))
+    };
+    let mut text = labelled("model", origin);
+    text.push_str(&line("before", &found.before, "of the uncorrected targets, by the model"));
+    if !found.predicted.is_empty() {
+        text.push_str(&line("predicted", &found.predicted, "within which 95 % of corrected targets were to be"));
+    }
+    let base = if new_base { ", the tracker's place found anew" } else { "" };
+    text.push_str(&line("achieved", &found.achieved, &format!("measured, {}{base}", counted(found.achieved.len(), "point"))));
+    if !found.predicted.is_empty() {
+        let beyond = found.achieved.iter().zip(&found.predicted).filter(|(achieved, predicted)| achieved > predicted).count();
+        text.push_str(&labelled("", &format!("{beyond} of {} points are farther off than predicted", found.achieved.len())));
+    }
+    if found.unreached > 0 {
+        text.push_str(&labelled(
+            "warning",
+            &format!("{} cannot be reached by the model and had no correction", counted(found.unreached, "target")),
+        ));
+    }
+    for (k, pose) in (1..).zip(&found.poses) {
+        let (accuracy, repeatability) = (1e3 * pose.accuracy, 1e3 * pose.repeatability);
+        let text_of =
+            format!("pose {k}, {} cycles: accuracy AP {accuracy:.4} mm, repeatability RP {repeatability:.4} mm", pose.cycles);
+        text.push_str(&labelled("ISO 9283", &text_of));
+    }
+    text
+}
+
+fn document(origin: &str, found: &Achieved) -> serde_json::Value {
+    let of = |lengths: &[f64]| {
+        let [mean, p95, max] = figures(lengths);
+        json!({ "mean_mm": mean, "p95_mm": p95, "max_mm": max })
+    };
+    let poses = found.poses.iter().map(|pose| {
+        json!({ "cycles": pose.cycles, "accuracy_ap_mm": 1e3 * pose.accuracy, "repeatability_rp_mm": 1e3 * pose.repeatability })
+    });
+    json!({
+        "model": origin, "points": found.achieved.len(), "before": of(&found.before),
+        "predicted_u95": if found.predicted.is_empty() { serde_json::Value::Null } else { of(&found.predicted) },
+        "achieved": of(&found.achieved), "unreached": found.unreached, "iso_9283": poses.collect::<Vec<_>>(),
+    })
+}

@@ -1,0 +1,169 @@
+//! The first page: what was calibrated with what, how accurate it is, whether that is accepted, under which conditions, and what was not seen.
+
+use super::Tables;
+use super::errors::before;
+use super::findings::wrong_setup;
+use super::limits::{Judgement, judged};
+use super::number::{count, fixed, mm};
+use crate::table::{StatisticsRow, VerdictRow};
+use crate::units::Unit;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Standard deviations of an expanded uncertainty (VIM: coverage factor).
+const COVERAGE: f64 = 2.0;
+
+#[derive(Serialize)]
+pub(super) struct Certificate {
+    /// `better` (accepted and explained), `open` (not explained, or not asked), `worse` (not accepted), `unknown`: the class of its colour.
+    kind: &'static str,
+    verdict: String,
+    /// What was calibrated, by whom, with what: name and value.
+    subject: Vec<(String, String)>,
+    /// Model, points, mean, 95 %, largest.
+    figures: Vec<[String; 5]>,
+    /// Figures that stand beside the table.
+    uncertainty: Vec<(&'static str, String)>,
+    /// Figure, found, allowed, whether it is kept.
+    limits: Vec<(&'static str, String, String, bool)>,
+    conditions: Vec<(&'static str, String)>,
+    not_observable: Vec<String>,
+}
+
+impl Certificate {
+    pub fn new(
+        tables: &Tables,
+        robot: &str,
+        identity: &BTreeMap<String, String>,
+        judgement: Option<&Judgement>,
+        set: Option<&str>,
+    ) -> Self {
+        let after = judged(tables, set).filter(|_| wrong_setup(tables).is_none());
+        let first = after.and_then(|after| before(&tables.statistics.0, after));
+        let diagnosis = tables.verdict.iter().flat_map(|table| &table.0).next_back();
+        let (kind, verdict) = standing(tables, judgement, diagnosis, first.zip(after));
+        let subject = [("robot".to_string(), robot.to_string())];
+        let given = identity.iter().map(|(name, value)| (name.clone(), value.clone()));
+        Self {
+            kind,
+            verdict,
+            subject: subject.into_iter().chain(given).chain(files(tables)).collect(),
+            figures: first
+                .map(|row| ("before", row))
+                .into_iter()
+                .chain(after.map(|row| ("after", row)))
+                .flat_map(figures)
+                .collect(),
+            uncertainty: after.map(uncertainty).unwrap_or_default(),
+            limits: judgement.map(|judgement| judgement.lines.clone()).unwrap_or_default(),
+            conditions: conditions(tables),
+            not_observable: diagnosis.map(|row| row.not_observable.lines().map(str::to_owned).collect()).unwrap_or_default(),
+        }
+    }
+}
+
+/// Colour and sentence. Green is what is within the limits and explained; nothing else.
+fn standing(
+    tables: &Tables,
+    judgement: Option<&Judgement>,
+    diagnosis: Option<&VerdictRow>,
+    course: Option<(&StatisticsRow, &StatisticsRow)>,
+) -> (&'static str, String) {
+    if wrong_setup(tables).is_some() {
+        return ("worse", judgement.map(|judged| judged.sentence.clone()).unwrap_or_default());
+    }
+    if let Some(judged) = judgement.filter(|judged| !judged.kept) {
+        return ("worse", judged.sentence.clone());
+    }
+    if course.is_some_and(|(before, after)| after.mean_mm >= before.mean_mm) {
+        return ("worse", "The calibration did not make the robot more accurate.".into());
+    }
+    let within = judgement.map(|judged| judged.sentence.trim_end_matches('.').to_string());
+    let cause = match diagnosis.map(|row| row.verdict.as_str()) {
+        Some("explained" | "nothing_missing") => None,
+        Some("unexplained") => Some("unexplained: a part of the error has no known cause"),
+        Some(_) => Some("too few points were fitted to say what the error consists of"),
+        None => Some("what the error consists of was not asked"),
+    };
+    match (within, cause) {
+        (Some(within), None) => ("better", format!("{within}. The error is explained.")),
+        (Some(within), Some(cause)) => ("open", format!("{}, but {cause}.", within.replacen("Accepted: within", "Within", 1))),
+        (None, None) => ("unknown", "Explained. No limits were stated, so that nothing is accepted or refused.".into()),
+        (None, Some(cause)) => ("open", format!("Not judged, as no limits were stated; {cause}.")),
+    }
+}
+
+/// Files that were read, and their rows.
+fn files(tables: &Tables) -> Option<(String, String)> {
+    let files: Vec<String> = tables
+        .intake
+        .iter()
+        .flat_map(|table| &table.0)
+        .map(|row| format!("{} ({} of {} rows used)", row.file, count(row.accepted), count(row.read)))
+        .collect();
+    (!files.is_empty()).then(|| ("recording".to_string(), files.join("; ")))
+}
+
+/// A row with all points, and one without suspects where there are any.
+fn figures((when, row): (&str, &StatisticsRow)) -> Vec<[String; 5]> {
+    let none = || "\u{2013}".to_string();
+    let name = format!("{when} ({})", row.step);
+    let mut rows = vec![[name, count(row.points), mm(row.mean_mm), mm(row.p95_mm), mm(row.max_mm)]];
+    if let Some(mean) = row.mean_without_mm {
+        let name = format!(
+            "{when}, without {}",
+            if row.suspects == 1 { "a suspect".into() } else { format!("{} suspects", row.suspects) }
+        );
+        rows.push([name, count(row.points - row.suspects), mm(mean), none(), row.max_without_mm.map_or_else(none, mm)]);
+    }
+    rows
+}
+
+fn uncertainty(after: &StatisticsRow) -> Vec<(&'static str, String)> {
+    let axis = after.rms_x_mm.max(after.rms_y_mm).max(after.rms_z_mm);
+    let basis = match after.noise_basis.as_deref() {
+        _ if after.is_inferred() => " (assumed: none is recorded, no instrument is stated)".into(),
+        Some(basis) => format!(" (by {basis})"),
+        None => String::new(),
+    };
+    vec![
+        (
+            "expanded uncertainty of the corrected robot in the measured region, along an axis (k = 2, from the held-out points)",
+            format!("\u{b1}\u{a0}{}\u{a0}mm", mm(COVERAGE * axis)),
+        ),
+        ("standard uncertainty of a measured point, rms length", format!("{} mm{basis}", mm(after.noise_rms_mm))),
+    ]
+}
+
+/// Temperature, payload and region, as recorded.
+fn conditions(tables: &Tables) -> Vec<(&'static str, String)> {
+    let recording = &tables.recording;
+    let range = |values: &Option<Vec<f64>>, unit: &str, decimals: usize| {
+        let finite = values.iter().flatten().copied().filter(|value| value.is_finite());
+        let (lower, upper) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        match (lower <= upper, lower == upper) {
+            (false, _) => "not recorded".into(),
+            (_, true) => format!("{} {unit}", fixed(lower, decimals)),
+            _ => format!("{} to {} {unit}", fixed(lower, decimals), fixed(upper, decimals)),
+        }
+    };
+    let joint = |k: usize| {
+        let values = (0..recording.rows()).map(|row| recording.q(row)[k]);
+        let (lower, upper) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), q| (a.min(q), b.max(q)));
+        let unit = if recording.prismatic.get(k).copied().unwrap_or(false) { Unit::Millimetre } else { Unit::Degree };
+        format!("J{} {} to {}", k + 1, fixed(unit.from_si(lower), 0), fixed(unit.from_si(upper), 0))
+    };
+    let region: Vec<String> = if recording.rows() == 0 { Vec::new() } else { (0..recording.joints).map(joint).collect() };
+    let sliding = recording.prismatic.iter().any(|prismatic| *prismatic);
+    let region = if region.is_empty() {
+        "no point was measured".into()
+    } else {
+        format!("{} {}", region.join(", "), if sliding { "deg, mm" } else { "deg" })
+    };
+    vec![
+        ("temperature", range(&recording.temperature, "\u{b0}C", 1)),
+        ("payload", range(&recording.payload, "kg", 1)),
+        ("region, by joints", region),
+        ("measured points", count(recording.rows() as i64)),
+    ]
+}
