@@ -2,13 +2,12 @@
 
 use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
-use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
+use super::noise::{JointSpread, REPEATS, RepeatPairs, by_residual};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
-use nalgebra::Matrix3;
 use std::ops::Range;
 
 /// A model with causes, fitted.
@@ -91,8 +90,8 @@ pub(crate) struct Fitter<'a> {
     /// Base parameters to estimate, all of them if `None`.
     free: Option<Vec<usize>>,
     pub repeatability: JointRepeatability,
-    /// Covariance of every row's point per squared joint deviation.
-    spread: Vec<Matrix3<f64>>,
+    /// What a deviation of the joints makes of every row's readings.
+    spread: JointSpread,
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
     asked: bool,
     /// Autocorrelated noise of standing points; none where it is white.
@@ -118,7 +117,7 @@ impl<'a> Fitter<'a> {
             scale: ErrorScale::of(question.data, question.fit),
             free: None,
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
-            spread: Vec::new(),
+            spread: JointSpread::default(),
             asked: false,
             correlated: None,
             estimated: 0,
@@ -127,11 +126,11 @@ impl<'a> Fitter<'a> {
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
         let mut now = fitter.fit(&base, Vec::new());
         fitter.free = Some(now.fitted.free());
-        fitter.spread = spreads(&now.model, &fitter.data);
+        fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
         fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
         if fitter.repeatability.sigma > 0.0 {
-            fitter.data.spread = Some(scaled(&fitter.spread, fitter.repeatability.sigma));
+            fitter.spread.put(&mut fitter.data, fitter.repeatability.sigma);
             now = fitter.fit(&base, Vec::new());
         }
         (fitter, now)
@@ -162,7 +161,7 @@ impl<'a> Fitter<'a> {
     pub fn learn(&mut self, sigma: f64) {
         self.asked = true;
         self.repeatability.sigma = sigma;
-        self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
+        self.spread.put(&mut self.data, sigma);
     }
 
     /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.
