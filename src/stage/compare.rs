@@ -42,7 +42,7 @@ writes! {
 impl Stage for Compare {
     const NAME: &'static str = "compare";
     const SUMMARY: &'static str = "tests which parameters changed since an earlier recording of the same robot";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = CompareReads;
     type Writes = CompareWrites;
 

@@ -233,7 +233,13 @@ impl Stage for Learn {
         let arm = arm.transpose()?.filter(|arm| arm.hinges.len() == recording.joints);
         let mut rows = split.rows(&recording, &self.on)?;
         // What is learnt are displacements of points: rows of fewer axes or of distances have none.
+        let asked = rows.len();
         rows.retain(|row| recording.is_whole(*row));
+        if rows.is_empty() && asked > 0 {
+            let message =
+                format!("learn corrects points: none of the {asked} rows to learn from measured a whole point (x, y, z)");
+            return Err(Error::data("table recording", message));
+        }
         let sources = self.sources(&recording, &rows)?;
         let near = within_reach(&prediction, &rows, context);
         let samples = TrainingSamples {

@@ -49,7 +49,7 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 9;
+    const IMPLEMENTATION: u32 = 10;
     type Reads = TransferReads;
     type Writes = Identified;
 

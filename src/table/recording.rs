@@ -104,6 +104,7 @@ impl Recording {
             velocity: self.velocity.clone(),
             noise_basis: if is_inferred { NoiseBasis::Inferred } else { NoiseBasis::Instrument },
             spread: None,
+            reading_spread: BTreeMap::new(),
             target: self.target.as_ref().map(|names| named(names)),
             readings: KINDS
                 .iter()

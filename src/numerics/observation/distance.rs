@@ -66,6 +66,12 @@ impl MeasurementKind for Distance {
         Sensitivity::FromAnchor(Weight::Along(weight.apply(&along)), reach)
     }
 
+    /// With a third of what the joints' repeatability moves the point by, squared: its share along a line in the mean over directions.
+    fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
+        let joints = data.spread.as_ref().map_or(0.0, |all| all[row].trace() / 3.0);
+        self.reading(data, row).map(|reading| if joints > 0.0 { reading.sigma.hypot(joints.sqrt()) } else { reading.sigma })
+    }
+
     /// Each from d2 - p2 = a2 - 2 p a over its rows, linear in a and a2.
     fn anchors(&self, robot: &RobotModel, data: &Measurements, rows: &[usize], base: &Pose) -> Result<Vec<Anchor>, String> {
         let mut by_name: BTreeMap<&str, Vec<(Vector3<f64>, f64)>> = BTreeMap::new();

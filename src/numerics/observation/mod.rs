@@ -141,8 +141,13 @@ pub trait MeasurementKind: Sync {
     }
 
     /// Turns its residual into standard deviations, with `excess` (m or rad) beside its own variance.
-    fn weight(&self, _data: &Measurements, _row: usize, variance: f64, excess: f64) -> Weight {
-        Weight::uniform((variance + excess * excess).sqrt())
+    fn weight(&self, data: &Measurements, row: usize, variance: f64, excess: f64) -> Weight {
+        Weight::uniform((variance + self.joint_variance(data, row) + excess * excess).sqrt())
+    }
+
+    /// What the joints' repeatability adds to the variance of each number of a row.
+    fn joint_variance(&self, data: &Measurements, row: usize) -> f64 {
+        data.reading_spread.get(self.about().name).map_or(0.0, |all| all[row])
     }
 
     /// Lines of its residual that hold what a row measured, ascending.
@@ -152,7 +157,8 @@ pub trait MeasurementKind: Sync {
 
     /// Length of one sigma of what a row measured, m or rad.
     fn noise(&self, data: &Measurements, row: usize) -> Option<f64> {
-        self.instrument(data, row)
+        let joints = self.about().axes as f64 * self.joint_variance(data, row);
+        self.instrument(data, row).map(|sigma| if joints > 0.0 { (sigma * sigma + joints).sqrt() } else { sigma })
     }
 
     /// Length of one sigma of the instrument alone, m or rad.

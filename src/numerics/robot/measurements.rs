@@ -6,6 +6,7 @@ use crate::robot::pose_groups::{NEAR, SAME, near};
 use crate::robot::readings::{Named, Reading, Readings};
 use crate::robot::sequence::Sequence;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
 /// Measured points, struct of arrays; per-joint quantities row-major (`row * joints + joint`). SI; NaN where a row lacks a quantity.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +35,8 @@ pub struct Measurements {
     pub noise_basis: NoiseBasis,
     /// Covariance (m2) of each point beyond the instrument's, e.g. from the joints' repeatability.
     pub spread: Option<Vec<Matrix3<f64>>>,
+    /// By kind beside points and row: variance of each number beyond the instrument's, from the joints' repeatability, in the kind's unit squared.
+    pub reading_spread: BTreeMap<&'static str, Vec<f64>>,
     /// The target that each row measured; the tool point where rows name none.
     pub target: Option<Named>,
     /// What was measured beside points; one entry a kind.

@@ -25,6 +25,9 @@ const SIGMA_POINT: f64 = 4e-5;
 /// m: how far points stand apart that show how the last body is turned.
 const APART: f64 = 0.5;
 
+/// deg: where a level on the tool stands upright more often than not.
+const UPRIGHT: [[f64; 2]; 6] = [[-90.0, 90.0], [-60.0, 40.0], [-50.0, 60.0], [-90.0, 90.0], [-90.0, 90.0], [-120.0, 120.0]];
+
 fn gear(joint: usize, order: f64, amplitude_arcsec: f64, phase_deg: f64) -> Physical {
     Physical::GearCyclic(GearCyclic { joint, order, amplitude_arcsec, arcsec_per_nm: 0.0, phase_deg })
 }
@@ -53,7 +56,7 @@ struct Recorded {
 }
 
 /// Poses under two payloads, with the arm off nominal as it is made.
-fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]]) -> Recorded {
+fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]], repeatability_arcsec: f64) -> Recorded {
     let robot = sr210d();
     let joints = robot.joints.len();
     let link = |link: usize| LinkError {
@@ -76,7 +79,7 @@ fn recorded(effects: &[Physical], points: usize, range_deg: &[[f64; 2]]) -> Reco
             effects,
             tracker: &tracker,
             motors: &motors,
-            repeatability_arcsec: &[],
+            repeatability_arcsec: &vec![repeatability_arcsec; joints],
             poses: &poses,
             blocks,
             climate: &climate,
@@ -207,18 +210,26 @@ fn explains(said: &Diagnosis, concealed: &Named) {
 
 #[test]
 fn causes_are_named_from_inclinations_alone() {
-    let upright = [[-90.0, 90.0], [-60.0, 40.0], [-50.0, 60.0], [-90.0, 90.0], [-90.0, 90.0], [-120.0, 120.0]];
     let concealed = [gear(2, 3.0, 60.0, 25.0), spring(3, 2.5e-7), play(5, 70.0)];
-    let said = recorded(&concealed, 700, &upright).with_a_level().diagnosed();
+    let said = recorded(&concealed, 700, &UPRIGHT, 0.0).with_a_level().diagnosed();
     explains(&said, &named(&[("gear_cyclic", "joint 2"), ("joint_compliance", "joint 3"), ("backlash", "joint 5")]));
     assert_eq!(said.dimension, Dimension::Angle);
     assert!(said.statement.contains("arcsec") && !said.statement.contains(" um"), "{}", said.statement);
 }
 
 #[test]
+fn a_level_shows_how_well_joints_repeat_beside_the_causes() {
+    let concealed = [gear(3, 2.0, 60.0, 80.0), spring(2, 2.5e-7), play(4, 70.0)];
+    let said = recorded(&concealed, 700, &UPRIGHT, 4.0).with_a_level().diagnosed();
+    explains(&said, &named(&[("gear_cyclic", "joint 3"), ("joint_compliance", "joint 2"), ("backlash", "joint 4")]));
+    let repeatability = said.repeatability.sigma.to_degrees() * 3600.0;
+    assert!((3.0..5.2).contains(&repeatability), "{repeatability} arcsec");
+}
+
+#[test]
 fn causes_are_named_from_distances_alone() {
     let concealed = [gear(1, 2.0, 40.0, 70.0), spring(2, 2e-7), play(3, 60.0)];
-    let said = recorded(&concealed, 480, &[]).with_wires().diagnosed();
+    let said = recorded(&concealed, 480, &[], 1.5).with_wires().diagnosed();
     explains(&said, &named(&[("gear_cyclic", "joint 1"), ("joint_compliance", "joint 2"), ("backlash", "joint 3")]));
     assert_eq!(said.dimension, Dimension::Length);
 }
@@ -226,6 +237,6 @@ fn causes_are_named_from_distances_alone() {
 #[test]
 fn causes_are_named_from_points_and_distances() {
     let concealed = [gear(4, 2.0, 60.0, 10.0), spring(2, 2e-7), play(1, 50.0)];
-    let said = recorded(&concealed, 240, &[]).with_wires().with_some_points().diagnosed();
+    let said = recorded(&concealed, 240, &[], 2.0).with_wires().with_some_points().diagnosed();
     explains(&said, &named(&[("gear_cyclic", "joint 4"), ("joint_compliance", "joint 2"), ("backlash", "joint 1")]));
 }

@@ -206,7 +206,7 @@ fn against_holes(model: &Model) -> f64 {
     let pairs = places.iter().flat_map(|a| places.iter().map(move |b| (a, b))).filter(|(a, b)| a.0 < b.0);
     let (mut cross, mut square) = (0.0, 0.0);
     for ((a, p), (b, q)) in pairs {
-        let (own, table) = ((p - q).norm(), (hole(a) - hole(b)).norm());
+        let (own, table): (f64, f64) = ((p - q).norm(), (hole(a) - hole(b)).norm());
         assert!((own - table).abs() < 5e-3, "{a} and {b} are {own:.4} m apart, their holes {table:.4} m");
         (cross, square) = (cross + own * table, square + table * table);
     }

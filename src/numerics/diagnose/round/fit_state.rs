@@ -2,13 +2,12 @@
 
 use super::along_path::{CorrelationChange, PathCorrelation, follow_a_path};
 use super::base_model::base_model;
-use super::noise::{REPEATS, RepeatPairs, by_residual, scaled, spreads};
+use super::noise::{JointSpread, REPEATS, RepeatPairs, by_residual};
 use crate::diagnose::types::{JointRepeatability, Question};
 use crate::diagnose::whitened::{AutocorrelatedNoise, WhitenedProblem};
 use crate::effect::{BaseFrame, Effect, EffectContext, EffectStack, Form, Load, ParameterSpec, Variable, whole};
 use crate::estimate::{ErrorScale, FitOptions, Fitted, Known, Model, Prior, Screening, Session, fit_screened};
 use crate::robot::{Measurements, RobotModel};
-use nalgebra::Matrix3;
 use std::ops::Range;
 
 /// A model with causes, fitted.
@@ -91,8 +90,8 @@ pub(crate) struct Fitter<'a> {
     /// Base parameters to estimate, all of them if `None`.
     free: Option<Vec<usize>>,
     pub repeatability: JointRepeatability,
-    /// Covariance of every row's point per squared joint deviation.
-    spread: Vec<Matrix3<f64>>,
+    /// What a deviation of the joints makes of every row's readings.
+    spread: JointSpread,
     /// What repeats show of the joints' repeatability, rad: nothing of it rests on a residual.
     repeated: f64,
     /// Whether the repeatability is that of a residual, or of what a settled model leaves between returns.
@@ -120,7 +119,7 @@ impl<'a> Fitter<'a> {
             scale: ErrorScale::of(question.data, question.fit),
             free: None,
             repeatability: JointRepeatability { sigma: 0.0, repeats: 0 },
-            spread: Vec::new(),
+            spread: JointSpread::default(),
             repeated: 0.0,
             asked: false,
             correlated: None,
@@ -130,12 +129,12 @@ impl<'a> Fitter<'a> {
         let base = base_model(question.robot, &fitter.data, question.fit, question.without);
         let mut now = fitter.fit(&base, Vec::new());
         fitter.free = Some(now.fitted.free());
-        fitter.spread = spreads(&now.model, &fitter.data);
+        fitter.spread = JointSpread::of(&now.model, &fitter.data);
         let pairs = RepeatPairs::of(&fitter.data, &now.screening.kept);
         fitter.repeatability = pairs.repeatability(&now.model, &fitter.data, &fitter.spread);
         fitter.repeated = fitter.repeatability.sigma;
         if fitter.repeatability.sigma > 0.0 {
-            fitter.data.spread = Some(scaled(&fitter.spread, fitter.repeatability.sigma));
+            fitter.spread.put(&mut fitter.data, fitter.repeatability.sigma);
             now = fitter.fit(&base, Vec::new());
         }
         (fitter, now)
@@ -164,15 +163,16 @@ impl<'a> Fitter<'a> {
 
     /// The recording with the noise that its statement and repeats show, whatever a residual was said to be.
     pub fn without_inferred_noise(&self) -> Measurements {
-        let spread = (self.repeated > 0.0).then(|| scaled(&self.spread, self.repeated));
-        Measurements { spread, ..self.data.clone() }
+        let mut data = self.data.clone();
+        self.spread.put(&mut data, self.repeated);
+        data
     }
 
     /// Takes the noise that a residual showed.
     pub fn learn(&mut self, sigma: f64) {
         self.asked = true;
         self.repeatability.sigma = sigma;
-        self.data.spread = (sigma > 0.0).then(|| scaled(&self.spread, sigma));
+        self.spread.put(&mut self.data, sigma);
     }
 
     /// Whether the autocorrelation may still be estimated: not of a moving arm, and not for ever.

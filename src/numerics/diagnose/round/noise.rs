@@ -3,7 +3,7 @@
 use crate::diagnose::types::JointRepeatability;
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::estimate::{Fitted, Model, Poses};
-use crate::observation::values;
+use crate::observation::{MeasurementKind, PointKind, Residual, kinds, values};
 use crate::robot::Measurements;
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,16 +18,82 @@ const STEPS: usize = 60;
 /// A squared whitened error counts at most this much.
 const CAP: f64 = 30.0;
 
-/// Covariance (m2) of every row's point per squared joint deviation.
-pub(super) fn spreads(model: &Model, data: &Measurements) -> Vec<Matrix3<f64>> {
-    let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
-    let by_all = |row| problem.by_joint(row).iter().map(|motion| motion * motion.transpose()).sum();
-    (0..data.rows()).map(by_all).collect()
+/// Covariances per squared deviation of every joint, by row.
+#[derive(Default)]
+pub(super) struct JointSpread {
+    /// Of the point, m2 per rad2.
+    points: Vec<Matrix3<f64>>,
+    /// Of what rows measured beside points, on the lines of the kind's residual; zero where a row measured none.
+    others: Vec<(&'static dyn MeasurementKind, Vec<Matrix3<f64>>)>,
 }
 
-/// Covariance (m2) of every row's point with this deviation (rad) of every joint.
-pub(super) fn scaled(spread: &[Matrix3<f64>], sigma: f64) -> Vec<Matrix3<f64>> {
-    spread.iter().map(|matrix| matrix * (sigma * sigma)).collect()
+impl JointSpread {
+    /// As a model moves; the joints' repeatability has no part in `data` yet.
+    pub fn of(model: &Model, data: &Measurements) -> Self {
+        let problem = WhitenedProblem::new(model, data, (0..data.rows()).collect());
+        let summed =
+            |motions: &[Vector3<f64>]| -> Matrix3<f64> { motions.iter().map(|motion| motion * motion.transpose()).sum() };
+        let of_kind = |kind: &'static dyn MeasurementKind| {
+            let name = kind.about().name;
+            let by_row = |row: usize| {
+                let variance = kind.reading(data, row).map_or(0.0, |reading| reading.sigma * reading.sigma);
+                problem.reading_by_joint(row, name).map_or_else(Matrix3::zeros, |motions| summed(&motions) * variance)
+            };
+            (kind, (0..data.rows()).map(by_row).collect())
+        };
+        let others = kinds(data).into_iter().filter(|kind| kind.about().name != PointKind.about().name);
+        Self {
+            points: (0..data.rows()).map(|row| summed(problem.by_joint(row))).collect(),
+            others: others.map(of_kind).collect(),
+        }
+    }
+
+    /// Gives every row what this deviation (rad) of every joint makes of its readings.
+    pub fn put(&self, data: &mut Measurements, sigma: f64) {
+        let square = sigma * sigma;
+        data.spread = (sigma > 0.0).then(|| self.points.iter().map(|matrix| matrix * square).collect());
+        // What sees places has its part by the point's own.
+        let turns = self.others.iter().filter(|(kind, _)| sigma > 0.0 && kind.about().rank.rotations);
+        data.reading_spread = turns
+            .map(|(kind, all)| {
+                let about = kind.about();
+                (about.name, all.iter().map(|matrix| matrix.trace() * square / about.axes as f64).collect())
+            })
+            .collect();
+    }
+
+    /// What is left of rows beside points, with the covariance of the instrument and that by the joints.
+    fn beside_points(&self, model: &Model, data: &Measurements, rows: &[usize]) -> Vec<LeftBySpread> {
+        let mut scratch = model.stack.scratch(&model.robot);
+        let mut left = Vec::new();
+        for row in rows {
+            let placed = model.stack.place(&model.robot, data, *row, &model.x, &mut scratch);
+            for (kind, spread) in &self.others {
+                let seen = Residual::of(*kind, data, *row, &placed).zip(kind.reading(data, *row));
+                left.extend(seen.map(|(residual, reading)| LeftBySpread {
+                    kind: kind.about().name,
+                    error: residual.error,
+                    fixed: Matrix3::from_fn(|i, j| match (i == j, i < residual.axes) {
+                        (true, true) => reading.sigma * reading.sigma,
+                        (true, false) => 1.0,
+                        (false, _) => 0.0,
+                    }),
+                    varying: spread[*row],
+                }));
+            }
+        }
+        left
+    }
+}
+
+/// What is left of one kind in a row.
+struct LeftBySpread {
+    kind: &'static str,
+    error: Vector3<f64>,
+    /// Covariance of the instrument; 1 on lines that hold nothing.
+    fixed: Matrix3<f64>,
+    /// Covariance per squared joint deviation.
+    varying: Matrix3<f64>,
 }
 
 /// Pairs of rows that measured one target in one pose again.
@@ -45,7 +111,9 @@ impl RepeatPairs {
             return Self { pairs: Vec::new(), are_returns: false };
         }
         let poses = Poses::of(data, rows);
-        let pairs = poses.repeated().flat_map(|rows| rows.windows(2).map(|pair| [pair[0], pair[1]]));
+        let others = without_points(data, &poses);
+        let repeated = poses.repeated().chain(&others);
+        let pairs = repeated.flat_map(|rows| rows.windows(2).map(|pair| [pair[0], pair[1]]));
         let at_once = |[a, b]: &[usize; 2]| {
             let [from, to] = [data.place(*a), data.place(*b)];
             let mut between = (from.min(to) + 1..from.max(to)).map(|place| data.at_place(place));
@@ -63,8 +131,8 @@ impl RepeatPairs {
         Self { pairs, are_returns: true }
     }
 
-    /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them. `spread` as of [`spreads`].
-    pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &[Matrix3<f64>]) -> JointRepeatability {
+    /// The joints' repeatability by what the pairs differ beyond the motion that `model` knows between them.
+    pub fn repeatability(&self, model: &Model, data: &Measurements, spread: &JointSpread) -> JointRepeatability {
         let repeats = self.pairs.len();
         if repeats < FEW {
             return JointRepeatability { sigma: 0.0, repeats };
@@ -74,22 +142,51 @@ impl RepeatPairs {
             let variance = |row: usize| Matrix3::from_diagonal(&data.sigma[row].map(|s| s * s));
             let known =
                 if self.are_returns || !data.same_pose(*a, *b) { predicted[*b] - predicted[*a] } else { Vector3::zeros() };
-            (data.position[*b] - data.position[*a] - known, variance(*a) + variance(*b), spread[*b] * 2.0)
+            (data.position[*b] - data.position[*a] - known, variance(*a) + variance(*b), spread.points[*b] * 2.0)
         };
-        JointRepeatability { sigma: likeliest(&self.pairs.iter().map(one).collect::<Vec<_>>(), 2.0), repeats }
+        let whole = |[a, b]: &&[usize; 2]| data.whole(*a) && data.whole(*b);
+        let mut samples: Vec<_> = self.pairs.iter().filter(whole).map(one).collect();
+        for [a, b] in self.pairs.iter().filter(|[a, b]| data.anchor(*a) == data.anchor(*b)) {
+            let [from, to] = [a, b].map(|row| spread.beside_points(model, data, &[*row]));
+            let both = to.iter().filter_map(|to| Some((from.iter().find(|from| from.kind == to.kind)?, to)));
+            // On lines that hold nothing the error is none and the variance a constant.
+            samples.extend(both.map(|(from, to)| (to.error - from.error, from.fixed + to.fixed, from.varying + to.varying)));
+        }
+        JointRepeatability { sigma: likeliest(&samples, 2.0), repeats }
     }
 }
 
-/// The joints' repeatability (rad) by what a fit leaves of the whole points of `rows` that holds no structure any more; 0 without any.
-pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: &Measurements, spread: &[Matrix3<f64>]) -> f64 {
+/// The rows of a pose that measured other than whole points of one target, from one anchor, where there are several.
+fn without_points(data: &Measurements, poses: &Poses) -> Vec<Vec<usize>> {
+    let measured = |row: &usize| !data.whole(*row) && values(data, *row) > data.axes(*row);
+    let same = |a: usize, b: usize| data.target(a) == data.target(b) && data.anchor(a) == data.anchor(b);
+    let mut out: Vec<Vec<usize>> = Vec::new();
+    for pose in poses.all() {
+        let first = out.len();
+        for row in pose.iter().filter(|row| measured(row)) {
+            match out[first..].iter_mut().find(|rows| same(rows[0], *row)) {
+                Some(rows) => rows.push(*row),
+                None => out.push(vec![*row]),
+            }
+        }
+    }
+    out.retain(|rows| rows.len() > 1);
+    out
+}
+
+/// The joints' repeatability (rad) by what a fit leaves of `rows` that holds no structure any more.
+pub(super) fn by_residual(model: &Model, fitted: &Fitted, rows: &[usize], data: &Measurements, spread: &JointSpread) -> f64 {
     let predicted = model.predict(data);
     let numbers: usize = rows.iter().map(|row| values(data, *row)).sum();
     let freedom = (numbers as f64 / numbers.saturating_sub(fitted.singular.len()).max(1) as f64).sqrt();
     let one = |row: &usize| {
         let residual = data.position[*row] - predicted[*row];
-        (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread[*row])
+        (residual * freedom, Matrix3::from_diagonal(&data.sigma[*row].map(|s| s * s)), spread.points[*row])
     };
-    likeliest(&rows.iter().filter(|row| data.whole(**row)).map(one).collect::<Vec<_>>(), 6.0)
+    let mut samples: Vec<_> = rows.iter().filter(|row| data.whole(**row)).map(one).collect();
+    let others = spread.beside_points(model, data, rows).into_iter();
+    samples.extend(others.map(|left| (left.error * freedom, left.fixed, left.varying)));
+    likeliest(&samples, 6.0)
 }
 
 /// The likeliest deviation; none unless it is better than none by `evidence`.

@@ -9,7 +9,7 @@ mod reading_lines;
 mod travel;
 
 use crate::effect::{
-    Basis, Deflection, Effect, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
+    Basis, Deflection, Direction, Effect, EffectStack, Form, Law, Motion, PlacementBuffers, PointMotion, Term, Unknown, Variable,
 };
 use crate::estimate::{Model, Prior};
 use crate::observation::{MeasurementKind, Residual, kinds};
@@ -55,14 +55,14 @@ impl<'a> WhitenedProblem<'a> {
                 let residual = Residual::of(*kind, data, *row, &placed)?;
                 let weight = residual.weight(data, 0.0);
                 let (error, lines) = (weight.apply(&residual.error), kind.lines(data, *row));
-                Some((SeenReading { lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
+                Some((SeenReading { kind: *kind, lines, sensitivity: residual.sensitivity(data, &placed, weight) }, error))
             };
             let seen: Vec<(SeenReading, Vector3<f64>)> = kinds.iter().filter_map(seen).collect();
             let motion = if turns { EffectStack::target_motion } else { EffectStack::point_motion };
             (motion(&model.stack, &model.robot, data, *row, &model.x, scratch), seen)
         };
         let scratch = || model.stack.scratch(&model.robot);
-        let looked: Vec<(PointMotion, Vec<(SeenReading, Vector3<f64>)>)> = rows.par_iter().map_init(scratch, look).collect();
+        let looked: Vec<_> = rows.par_iter().map_init(scratch, look).collect();
         let (mut motions, mut residual) = (Vec::with_capacity(rows.len()), Vec::with_capacity(3 * rows.len()));
         let mut readings = ReadingLines::default();
         for (motion, seen) in looked {
@@ -152,6 +152,13 @@ impl<'a> WhitenedProblem<'a> {
     /// Motion of each row's point by each joint, m/rad; row-major.
     pub fn by_joint(&self, row: usize) -> &[Vector3<f64>] {
         &self.motions[row].by_joint
+    }
+
+    /// How far each joint moves what a row (by its place) measured of a kind, in standard deviations per rad or m; none where it measured none.
+    pub fn reading_by_joint(&self, place: usize, kind: &str) -> Option<Vec<Vector3<f64>>> {
+        let (_, reading) = self.readings.seen(place).find(|(_, reading)| reading.kind.about().name == kind)?;
+        let along = |joint| reading.sensitivity.along(&self.motions[place], &Direction::Joint(joint, 1.0));
+        Some((0..self.robot.joints()).map(along).collect())
     }
 
     /// The largest motion of the point by each joint, m/rad.

@@ -1,10 +1,11 @@
 //! Which residual rows hold what a row of the recording measured: as many as its kinds have numbers there.
 
-use crate::observation::Sensitivity;
+use crate::observation::{MeasurementKind, Sensitivity};
 use std::ops::Range;
 
 /// What a row measured of one kind, as the present model sees it.
 pub(super) struct SeenReading {
+    pub kind: &'static dyn MeasurementKind,
     /// Lines of the kind's residual that were measured.
     pub lines: &'static [usize],
     /// How it follows the target's motion, in standard deviations.
