@@ -61,7 +61,7 @@ fn pairs(data: &Measurements) -> Vec<[String; 2]> {
 }
 
 fn calibrate(data: &Measurements, rows: &[usize], effects: &[&str]) -> (Model, calib::estimate::Fitted) {
-    fitted_with(&panda(), data, rows, effects, &pairs(data), |name| priors(name))
+    fitted_with(&panda(), data, rows, effects, &pairs(data), priors)
 }
 
 /// Mean and largest distance, mm.
