@@ -1,7 +1,6 @@
 //! A simulated recording as the files that a user of that robot would have, and beside them every true number.
 
 use crate::description::RobotDescription;
-use crate::observation::KINDS;
 use crate::table::{Recording, Truth};
 use crate::twin::folder::{self, Decimals, Log};
 use std::collections::BTreeMap;
@@ -39,8 +38,7 @@ pub fn recorded(
 fn touched(recording: &Recording) -> BTreeMap<String, String> {
     let mut files: BTreeMap<String, String> = BTreeMap::new();
     for row in 0..recording.rows() {
-        let name = KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| kind.telling());
-        if let Some(name) = name.filter_map(|column| recording.names.get(column.setting)?[row].as_deref()).next() {
+        if let Some(name) = recording.brought(row) {
             let joints: Vec<String> = recording.q(row).iter().map(|q| format!("{q:.12}")).collect();
             files.entry(format!("{name}.csv")).or_default().push_str(&(joints.join(",") + "\n"));
         }

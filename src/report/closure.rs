@@ -4,7 +4,6 @@ use super::Tables;
 use super::axis::{Area, Scale, baseline, name_x};
 use super::number::mm;
 use super::svg::Svg;
-use crate::observation::KINDS;
 use crate::table::{Prediction, PredictionRow};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -21,7 +20,7 @@ pub(super) struct ClosureSection {
 }
 
 /// What one fixture has, mm.
-struct Closing {
+struct FixtureFigures {
     name: String,
     count: usize,
     before: [f64; 2],
@@ -61,13 +60,11 @@ fn standing(tables: &Tables) -> Option<&Prediction> {
 }
 
 /// By the order of names, which is that of the recording's table.
-fn closings(tables: &Tables) -> Option<Vec<Closing>> {
-    let settings = KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| kind.telling());
-    let names: Vec<&Vec<Option<String>>> = settings.filter_map(|column| tables.recording.names.get(column.setting)).collect();
+fn closings(tables: &Tables) -> Option<Vec<FixtureFigures>> {
     let (first, last) = (tables.prediction.first()?, standing(tables)?);
     let mut rows: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     for row in 0..tables.recording.rows() {
-        if let Some(name) = names.iter().find_map(|names| names.get(row)?.as_deref()) {
+        if let Some(name) = tables.recording.brought(row) {
             rows.entry(name).or_default().push(row);
         }
     }
@@ -75,9 +72,9 @@ fn closings(tables: &Tables) -> Option<Vec<Closing>> {
         let errors: Vec<f64> = rows.iter().filter_map(|row| table.0.get(*row)).map(|row: &PredictionRow| row.error_mm).collect();
         [errors.iter().sum::<f64>() / errors.len().max(1) as f64, errors.iter().copied().fold(0.0, f64::max)]
     };
-    let all: Vec<Closing> = rows
+    let all: Vec<FixtureFigures> = rows
         .into_iter()
-        .map(|(name, rows)| Closing {
+        .map(|(name, rows)| FixtureFigures {
             name: name.into(),
             count: rows.len(),
             before: figures(first, &rows),
@@ -87,7 +84,7 @@ fn closings(tables: &Tables) -> Option<Vec<Closing>> {
     (!all.is_empty()).then_some(all)
 }
 
-fn picture(all: &[Closing]) -> String {
+fn picture(all: &[FixtureFigures]) -> String {
     let area = Area { left: LEFT, top: 8.0, right: WIDTH - 12.0, bottom: 8.0 + ROW * all.len() as f64 };
     let means = || all.iter().flat_map(|own| [own.before[0], own.after[0]]).filter(|mean| *mean > 0.0);
     let (lower, upper) = (means().fold(f64::INFINITY, f64::min), means().fold(0.0, f64::max));

@@ -15,7 +15,8 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KnownDistance {
-    /// Their names in the recording, of spheres for their centres; a `*` stands in both for the same text: `["*/0", "*/1"]`.
+    /// Their names in the recording, of spheres for their centres; a `*` stands in both for the same text, as of one
+    /// print at several places, whose error is the same everywhere: `["*/0", "*/1"]`.
     pub between: [String; 2],
     /// The distance, mm.
     pub mm: f64,
@@ -85,7 +86,8 @@ pub(super) fn apply(
         if pairs.is_empty() || pairs.as_flattened().contains(&usize::MAX) {
             return Err(wrong(format!("distances[{index}].between"), format!("no `{from}` and `{to}`")));
         }
-        let (length, sigma) = (1e-3 * known.mm, 1e-3 * known.sigma);
+        // One print at several places has one error: all pairs of a pattern together know the length as well as one.
+        let (length, sigma) = (1e-3 * known.mm, 1e-3 * known.sigma * (pairs.len() as f64).sqrt());
         model.lengths.extend(pairs.into_iter().map(|between| KnownLength { between, length, sigma }));
     }
     for (name, known) in spheres {

@@ -103,7 +103,8 @@ impl Stage for Simulate {
                 fault(&format!("fixtures[{index}].name"), "another one has this name");
             }
         }
-        if !self.fixtures.is_empty() && !(self.blocks.is_empty() && self.motion.is_none()) {
+        let measured = !self.blocks.is_empty() || self.motion.is_some();
+        if !self.fixtures.is_empty() && measured {
             fault("fixtures", "nothing but joints is recorded at fixtures; leave out `blocks` and `motion`");
         }
         if self.fixtures.is_empty() && self.blocks.iter().all(|block| block.count() == 0) {

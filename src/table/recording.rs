@@ -120,6 +120,12 @@ impl Recording {
         data
     }
 
+    /// The name of what a row's target was brought to, where that is what was measured.
+    pub fn brought(&self, row: usize) -> Option<&str> {
+        let settings = KINDS.iter().filter(|kind| kind.is_brought()).flat_map(|kind| kind.telling());
+        settings.filter_map(|column| self.names.get(column.setting)?.get(row)?.as_deref()).next()
+    }
+
     /// Whether all three axes of a row's point were measured.
     pub fn is_whole(&self, row: usize) -> bool {
         self.position.get(row).is_some_and(|point| point.iter().all(|axis| axis.is_finite()))

@@ -133,9 +133,11 @@ fn fitted_with(
     }
     let seen = |name: &String| rows.iter().any(|row| data.anchor(*row) == Some(name.as_str()));
     let number = |name: &String| robot.setup().anchor(name).expect("a socket");
-    let there = pairs.iter().filter(|[from, to]| seen(from) && seen(to));
+    let there: Vec<&[String; 2]> = pairs.iter().filter(|[from, to]| seen(from) && seen(to)).collect();
+    // One print, of 0.1 mm, at all positions.
+    let sigma = 1e-4 * (there.len() as f64).sqrt();
     model.lengths =
-        there.map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma: 1e-4 }).collect();
+        there.into_iter().map(|[from, to]| KnownLength { between: [number(from), number(to)], length: 0.05, sigma }).collect();
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     fit(&model, data, &FitOptions { rows, candidates: &candidates })
 }

@@ -27,6 +27,17 @@ pub struct Bounds {
     pub high: f64,
 }
 
+/// A distance between two sockets, planes, spheres (their centres) or ends of distances.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownLength {
+    /// By their numbers in the robot's setup, two different ones.
+    pub between: [usize; 2],
+    /// m
+    pub length: f64,
+    /// m, above zero.
+    pub sigma: f64,
+}
+
 /// What a prior and the data say of one parameter, after a fit with both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PriorCheck {

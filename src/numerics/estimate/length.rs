@@ -1,20 +1,10 @@
 //! Lengths between anchors that are known from elsewhere: of a print, a gauge block, a ball bar; each with its standard deviation.
 
+use super::known::KnownLength;
 use super::model::Model;
 use crate::effect::AnchorShift;
 use crate::robot::{Anchor, Shape};
 use nalgebra::Vector3;
-
-/// A distance between two sockets, planes, spheres (their centres) or ends of distances.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KnownLength {
-    /// By their numbers in the robot's setup, two different ones.
-    pub between: [usize; 2],
-    /// m
-    pub length: f64,
-    /// m, above zero.
-    pub sigma: f64,
-}
 
 /// What a known length says of a model, in standard deviations.
 pub(crate) struct LengthTerm {
@@ -25,7 +15,7 @@ pub(crate) struct LengthTerm {
 }
 
 /// An anchor as the model has it.
-struct Standing<'a> {
+struct StandingAnchor<'a> {
     place: Vector3<f64>,
     shape: Shape,
     anchor: &'a Anchor,
@@ -50,7 +40,7 @@ impl Model {
         })
     }
 
-    fn standing_anchor(&self, number: usize) -> Option<Standing<'_>> {
+    fn standing_anchor(&self, number: usize) -> Option<StandingAnchor<'_>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(number)?;
         let range = self.stack.effects().find(|(effect, _)| effect.name() == AnchorShift::NAME)?.1;
@@ -60,15 +50,17 @@ impl Model {
             Shape::Plane(normal) => {
                 let across = Anchor::across(&normal);
                 let shape = Shape::Plane((normal + across[0] * x[1] + across[1] * x[2]).normalize());
-                Standing { place: anchor.place + normal * x[0], shape, anchor, first, tilt: [x[1], x[2]] }
+                StandingAnchor { place: anchor.place + normal * x[0], shape, anchor, first, tilt: [x[1], x[2]] }
             }
-            shape => Standing { place: anchor.place + Vector3::new(x[0], x[1], x[2]), shape, anchor, first, tilt: [0.0; 2] },
+            shape => {
+                StandingAnchor { place: anchor.place + Vector3::new(x[0], x[1], x[2]), shape, anchor, first, tilt: [0.0; 2] }
+            }
         })
     }
 }
 
 /// The length and its derivatives. Of two planes the mean of how far each is from the other's place.
-fn between(from: &Standing, to: &Standing) -> (f64, Vec<(usize, f64)>) {
+fn between(from: &StandingAnchor, to: &StandingAnchor) -> (f64, Vec<(usize, f64)>) {
     match (&from.shape, &to.shape) {
         (Shape::Plane(_), Shape::Plane(_)) => {
             let [(one, mut rates), (other, more)] = [off_plane(from, to), off_plane(to, from)];
@@ -87,7 +79,7 @@ fn between(from: &Standing, to: &Standing) -> (f64, Vec<(usize, f64)>) {
 }
 
 /// How far a place is from a plane.
-fn off_plane(plane: &Standing, other: &Standing) -> (f64, Vec<(usize, f64)>) {
+fn off_plane(plane: &StandingAnchor, other: &StandingAnchor) -> (f64, Vec<(usize, f64)>) {
     let Shape::Plane(normal) = plane.shape else { return (0.0, Vec::new()) };
     let reach = other.place - plane.place;
     let sign = if normal.dot(&reach) < 0.0 { -1.0 } else { 1.0 };
@@ -103,7 +95,7 @@ fn off_plane(plane: &Standing, other: &Standing) -> (f64, Vec<(usize, f64)>) {
 }
 
 /// Derivatives of the place of an anchor along a direction.
-fn moved(standing: &Standing, along: &Vector3<f64>) -> Vec<(usize, f64)> {
+fn moved(standing: &StandingAnchor, along: &Vector3<f64>) -> Vec<(usize, f64)> {
     match standing.anchor.shape {
         Shape::Plane(normal) => vec![(standing.first, normal.dot(along))],
         _ => (0..3).map(|axis| (standing.first + axis, along[axis])).collect(),

@@ -1,7 +1,6 @@
 //! A robot with effects and the values of their parameters: what is identified, predicts, and is compensated by.
 
-use super::known::Known;
-use super::length::KnownLength;
+use super::known::{Known, KnownLength};
 use crate::effect::{BaseFrame, BasePlacement, EffectStack, PlacedRow, PlacementBuffers};
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;

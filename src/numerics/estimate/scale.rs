@@ -12,7 +12,7 @@ const APART: f64 = 0.02;
 
 /// What is known of the scale of an arm that was brought to places, where nothing else was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
+pub struct ArmScale {
     /// Relative standard deviation of the distances between the places; none where all rows close at one.
     pub sigma: Option<f64>,
     /// Whether a length was given, or a radius.
@@ -24,7 +24,7 @@ pub struct Scale {
 }
 
 /// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
-pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<Scale> {
+pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
     let brought = |row: &usize| kinds(data).iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
@@ -50,7 +50,7 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
     let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
-    Some(Scale {
+    Some(ArmScale {
         sigma,
         by_length: !model.lengths.is_empty() || told(AnchorShift::NAME),
         by_priors: told("link_geometry") || told(ToolOffset::NAME),

@@ -97,7 +97,7 @@ fn names_that_the_recording_does_not_have_are_refused() {
     ] {
         let stage: Identify = serde_saphyr::from_str(more).expect("good settings");
         let reads = IdentifyReads { robot: Robot::from_description(&robot), recording: recording.clone(), split: split.clone() };
-        let message = Desk::default().run(&stage, reads).err().expect("refused").to_string();
+        let message = Desk::default().run(&stage, reads).expect_err("refused").to_string();
         assert!(message.contains(expected), "{message}");
     }
 }
