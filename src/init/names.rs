@@ -2,6 +2,7 @@
 
 use super::words;
 use crate::units::{Header, Unit};
+use std::collections::BTreeMap;
 
 /// A column's name taken apart.
 #[derive(Debug, Clone)]
@@ -90,15 +91,15 @@ pub(super) fn joints(names: &[Name], angle: impl Fn(usize) -> bool) -> Vec<Vec<u
     found.sort_by_key(|columns| std::cmp::Reverse(columns.len()));
     found.truncate(1);
     let parts: Vec<Option<(String, usize)>> = names.iter().map(Name::joint).collect();
-    let mut keys: Vec<&String> = parts.iter().flatten().map(|(key, _)| key).collect();
-    keys.sort();
-    keys.dedup();
-    let run = |key: &str| -> Vec<usize> {
-        let column = |n: usize| parts.iter().position(|part| part.as_ref().is_some_and(|(name, k)| name == key && *k == n));
-        let first = usize::from(column(0).is_none());
-        (first..).map_while(column).collect()
+    let mut numbered: BTreeMap<&str, BTreeMap<usize, usize>> = BTreeMap::new();
+    for (column, (key, number)) in parts.iter().enumerate().filter_map(|(column, part)| Some((column, part.as_ref()?))) {
+        numbered.entry(key).or_default().entry(*number).or_insert(column);
+    }
+    let run = |columns: &BTreeMap<usize, usize>| -> Vec<usize> {
+        let first = usize::from(!columns.contains_key(&0));
+        (first..).map_while(|n| columns.get(&n).copied()).collect()
     };
-    let runs: Vec<(&str, Vec<usize>)> = keys.iter().map(|key| (key.as_str(), run(key))).collect();
+    let runs: Vec<(&str, Vec<usize>)> = numbered.iter().map(|(key, columns)| (*key, run(columns))).collect();
     let mut usual: Vec<(usize, usize, Vec<usize>)> = Vec::new();
     for (key, columns) in runs.iter().filter(|(_, columns)| columns.len() > 1) {
         if let Some(rank) = usual_name(key) {

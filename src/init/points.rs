@@ -2,6 +2,7 @@
 
 use super::names::Name;
 use super::words;
+use std::collections::BTreeMap;
 
 /// Columns of x, y and z under one name, and what the name says of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,18 +46,11 @@ pub(super) struct Points {
 
 /// All coordinates that come in threes.
 pub(super) fn families(names: &[Name]) -> Vec<Family> {
-    let mut groups: Vec<(Vec<String>, [Vec<usize>; 3])> = Vec::new();
+    let mut groups: BTreeMap<Vec<String>, [Vec<usize>; 3]> = BTreeMap::new();
     for (column, name) in names.iter().enumerate() {
         let Some((axis, mut rest)) = name.axis() else { continue };
         rest.sort();
-        match groups.iter_mut().find(|(words, _)| *words == rest) {
-            Some((_, columns)) => columns[axis].push(column),
-            None => {
-                let mut columns: [Vec<usize>; 3] = Default::default();
-                columns[axis].push(column);
-                groups.push((rest, columns));
-            }
-        }
+        groups.entry(rest).or_default()[axis].push(column);
     }
     let mut found = Vec::new();
     for (words, [x, y, z]) in groups {
