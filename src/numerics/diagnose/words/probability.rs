@@ -51,6 +51,7 @@ fn weigh_nameless(finding: &mut Finding, odds: &NameOdds) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::types::Evidence;
     use crate::effect::Place;
 
     fn finding(delta_bic: f64, rivals: &[(&'static str, usize, f64)]) -> Finding {
