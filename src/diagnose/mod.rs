@@ -36,8 +36,8 @@ pub use types::{
 };
 pub use words::other_means;
 
-use judge::{ModelComparison, judge};
 use crate::effect::Form;
+use judge::{ModelComparison, judge};
 use locate::locate;
 use round::{EstimatedCause, Fitter, RoundHistory, RoundOutcome, RoundView, correlation_left_by};
 use search::{CauseSearch, SIGNIFICANT, SearchOptions};
@@ -91,8 +91,10 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         let next = fitter.held_to_a_common_size(next);
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
+        tell(words::of_the_judgement(&next));
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
+        tell(words::of_the_conclusions(&judged.state));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let without = question.without;

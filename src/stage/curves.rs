@@ -56,11 +56,9 @@ pub(super) fn curves(
         for (finding, out) in traced.iter().zip(&mut rows) {
             let Some((direction, scale)) = finding.direction(row, &motion, model) else { continue };
             let along = |v: &Vector3<f64>| direction.dot(v) * scale;
-            let variance: Option<f64> = (finding.own.iter())
-                .map(|k| Some((sigma.get(specs[*k].name.as_str())? * along(&derivatives[*k])).powi(2)))
-                .sum();
-            let (over, x_unit, x) =
-                abscissa((&finding.forms, finding.joint), data, row, &motion.posture.torque, &model.robot);
+            let variance: Option<f64> =
+                (finding.own.iter()).map(|k| Some((sigma.get(specs[*k].name.as_str())? * along(&derivatives[*k])).powi(2))).sum();
+            let (over, x_unit, x) = abscissa((&finding.forms, finding.joint), data, row, &motion.posture.torque, &model.robot);
             let fitted = along(&finding.shift[row]);
             out.push(CurveRow {
                 rank: finding.rank,

@@ -92,7 +92,8 @@ impl<'p, 'a> Beside<'p, 'a> {
         let mut all: Vec<f64> = travels.iter().flat_map(|(_, values)| values).copied().collect();
         let mut squared = Vec::with_capacity(all.len());
         for values in all.chunks_mut(rows.max(1)) {
-            let square = |values: &[f64]| values.iter().zip(&along.square).map(|(value, square)| value * square).collect::<Vec<_>>();
+            let square =
+                |values: &[f64]| values.iter().zip(&along.square).map(|(value, square)| value * square).collect::<Vec<_>>();
             let norm = dot(values, &square(values)).sqrt().max(1e-300);
             values.iter_mut().for_each(|value| *value /= norm);
             squared.extend(square(values));

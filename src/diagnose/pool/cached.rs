@@ -158,9 +158,8 @@ impl<'a> CachedHypotheses<'a> {
     /// Makes the problems of a set without each of some parts of it known: all of them follow from that of the whole set.
     pub fn leave_out(&self, set: &[usize], parts: &BTreeSet<Vec<usize>>) {
         let rest = |gone: &[usize]| -> Vec<usize> { set.iter().copied().filter(|h| !gone.contains(h)).collect() };
-        let unknown: Vec<&Vec<usize>> = (parts.iter())
-            .filter(|gone| gone.len() < set.len() && !lock(&self.conditionals).contains_key(&rest(gone)))
-            .collect();
+        let unknown: Vec<&Vec<usize>> =
+            (parts.iter()).filter(|gone| gone.len() < set.len() && !lock(&self.conditionals).contains_key(&rest(gone))).collect();
         if unknown.len() < 2 {
             return;
         }

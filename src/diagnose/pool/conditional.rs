@@ -105,7 +105,13 @@ impl SetShares {
     ///
     /// With A the inverse of the set's Gram matrix and W the coefficients, without the columns G the Gram matrix of what is left grows by
     /// W_G' A_GG^-1 W_G (block elimination).
-    pub fn without(&self, pool: &HypothesisSet, whole: &Conditional, coefficients: &[f64], gone: &[usize]) -> Option<Conditional> {
+    pub fn without(
+        &self,
+        pool: &HypothesisSet,
+        whole: &Conditional,
+        coefficients: &[f64],
+        gone: &[usize],
+    ) -> Option<Conditional> {
         let rank = self.factor.rank();
         let of_gone = |column: usize| gone.iter().any(|h| (pool.first[*h]..pool.first[h + 1]).contains(&column));
         let out: Vec<usize> = (0..rank).filter(|a| of_gone(self.own[self.factor.order[*a]])).collect();

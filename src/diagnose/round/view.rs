@@ -39,13 +39,7 @@ impl<'a> RoundView<'a> {
     }
 
     /// The pool of all causes around the present model, or around that of an `earlier` round: the residual is that without them.
-    pub fn pool(
-        &self,
-        now: &FitState,
-        fitter: &Fitter,
-        survey: &Survey,
-        earlier: Option<EarlierPool>,
-    ) -> CachedHypotheses<'_> {
+    pub fn pool(&self, now: &FitState, fitter: &Fitter, survey: &Survey, earlier: Option<EarlierPool>) -> CachedHypotheses<'_> {
         let problem = &self.problem;
         let mut residual = problem.residual.clone();
         for EstimatedCause { form, coefficients, .. } in &now.causes {

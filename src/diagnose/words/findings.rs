@@ -24,6 +24,8 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let set = last.set();
     let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
     let groups = groups(state, &last.judged.set, last.pool, last.survey);
+    let own = |members: &Vec<usize>| members.iter().map(|i| last.judged.set[*i]).collect();
+    last.pool.leave_out(&whole.set, &groups.iter().map(|(_, members)| own(members)).collect());
     let mut out: Vec<Finding> = groups.into_iter().map(|(key, members)| finding(last, &whole, key, &members)).collect();
     let data = last.survey.data;
     let by_the_way_there = |form: &Form| match form.variables().first() {
