@@ -181,7 +181,7 @@ impl Stage for Learn {
     const NAME: &'static str = "learn";
     const SUMMARY: &'static str =
         "learns the residual of the model: compares several corrections, and keeps the best only where it helps";
-    const IMPLEMENTATION: u32 = 7;
+    const IMPLEMENTATION: u32 = 8;
     type Reads = LearnReads;
     type Writes = LearnWrites;
 

@@ -92,10 +92,12 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         }
         let next = fitter.held_to_a_common_size(next);
         let comparison = ModelComparison { pool: search.pool, survey: &survey, fitter: &fitter };
+        tell(words::of_the_judgement(&next));
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
         let settled = open_world::settle(judged, search.pool, &survey, &fitter, &mut tell);
         let (judged, odds) = (settled.judged, settled.odds);
+        tell(words::of_the_conclusions(&judged.state));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };
         let (first, located) = (first.unwrap_or(1.0), located.unwrap_or_default());
         let without = question.without;

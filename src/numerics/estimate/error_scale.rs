@@ -2,8 +2,8 @@
 //! have no common size.
 
 use super::model::Model;
-use super::row_error::row_error;
-use crate::effect::PlacementBuffers;
+use super::row_error::placed_row_error;
+use crate::effect::{PlacedRow, PlacementBuffers};
 use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, values};
 use crate::robot::Measurements;
 use rayon::prelude::*;
@@ -63,9 +63,13 @@ impl ErrorScale {
 
     /// The error of a row under a model, m or rad.
     pub(crate) fn error(&self, model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> f64 {
-        let Self::Noise { size, .. } = self else { return row_error(model, data, row, scratch).length };
-        let placed = model.place(data, row, scratch);
-        let of_row = kinds(data).into_iter().filter_map(|kind| Residual::of(kind, data, row, &placed));
+        self.of_placed(data, row, &model.place(data, row, scratch))
+    }
+
+    /// The error of a row that was placed, m or rad.
+    pub(crate) fn of_placed(&self, data: &Measurements, row: usize, placed: &PlacedRow) -> f64 {
+        let Self::Noise { size, .. } = self else { return placed_row_error(data, row, placed).length };
+        let of_row = kinds(data).into_iter().filter_map(|kind| Residual::of(kind, data, row, placed));
         let (square, count) = of_row.fold((0.0, 0), |(square, count), residual| {
             (square + residual.whitened(data, 0.0).norm_squared(), count + residual.axes)
         });

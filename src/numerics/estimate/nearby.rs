@@ -11,8 +11,9 @@ use super::session::Session;
 use super::term::{ObservationTerm, share};
 use crate::observation::{ExcessSigma, KINDS};
 use crate::robot::Measurements;
-use faer::Mat;
-use nalgebra::{DMatrix, DVector};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::solvers::Solve;
+use faer::{Accum, Mat, Par, Side};
 use rayon::prelude::*;
 
 /// Least share of what is known in any direction that must be left without a part: with less, other parameters may be seen.
@@ -87,15 +88,19 @@ impl<'a> NearbyFits<'a> {
     fn without(&self, part: &LeftOutRows, beside: &FitOfAll, factor: &TriangularFactor) -> Option<Vec<f64>> {
         let FitOfAll { whole, inverse, model, open } = beside;
         let p = open.len();
-        let seen = Mat::from_fn(p, p, |i, j| factor.entry(i, j)) * inverse;
-        let taken = seen.transpose() * &seen;
-        let left = DMatrix::from_fn(p, p, |i, j| f64::from(u8::from(i == j)) - taken[(i, j)]).cholesky()?;
-        if left.l_dirty().diagonal().iter().any(|pivot| pivot * pivot < LEFT) {
+        let own = Mat::from_fn(p, p, |i, j| if i <= j { factor.entry(i, j) } else { 0.0 });
+        let (mut seen, mut left) = (Mat::zeros(p, p), Mat::identity(p, p));
+        let (upper, lower) = (BlockStructure::TriangularUpper, BlockStructure::TriangularLower);
+        matmul(seen.as_mut(), upper, Accum::Replace, own.as_ref(), upper, inverse.as_ref(), upper, 1.0, Par::Seq);
+        matmul(left.as_mut(), lower, Accum::Add, seen.transpose(), lower, seen.as_ref(), upper, -1.0, Par::Seq);
+        let left = left.llt(Side::Lower).ok()?;
+        if left.L().diagonal().column_vector().iter().any(|pivot| pivot * pivot < LEFT) {
             return None;
         }
         let errors: Vec<f64> = (0..=p).map(|i| factor.entry(i, p)).collect();
         let gradient = |j: usize| errors.iter().zip(seen.col_as_slice(j)).map(|(error, seen)| error * seen).sum::<f64>();
-        let along = left.solve(&DVector::from_fn(p, |j, _| whole.entry(j, p) - gradient(j)));
+        let along = left.solve(&Mat::from_fn(p, 1, |j, _| whole.entry(j, p) - gradient(j)));
+        let along = along.col_as_slice(0);
         let mut other = model.clone();
         for (i, parameter) in open.iter().enumerate() {
             other.x[*parameter] += (i..p).map(|j| inverse[(i, j)] * along[j]).sum::<f64>();
@@ -117,7 +122,7 @@ impl<'a> NearbyFits<'a> {
             for ((term, _), share) in terms.zip(&mut shares) {
                 square += (term.error * *share).norm_squared();
             }
-            lengths.push(self.scale.error(model, self.data, *row, &mut scratch));
+            lengths.push(self.scale.of_placed(self.data, *row, &placed));
         }
         (lengths, square.sqrt())
     }

@@ -1,7 +1,7 @@
 //! How far off a row is under a model, in the units of people: a length and an angle.
 
 use super::model::Model;
-use crate::effect::PlacementBuffers;
+use crate::effect::{PlacedRow, PlacementBuffers};
 use crate::observation::{Dimension, KINDS, Residual};
 use crate::robot::Measurements;
 use nalgebra::Vector3;
@@ -20,9 +20,13 @@ pub struct RowError {
 
 /// How far off a row is under a model.
 pub(crate) fn row_error(model: &Model, data: &Measurements, row: usize, scratch: &mut PlacementBuffers) -> RowError {
-    let placed = model.place(data, row, scratch);
+    placed_row_error(data, row, &model.place(data, row, scratch))
+}
+
+/// The same of a row whose arm was placed.
+pub(crate) fn placed_row_error(data: &Measurements, row: usize, placed: &PlacedRow) -> RowError {
     let (mut length, mut angle) = (None, None);
-    for residual in KINDS.iter().filter_map(|kind| Residual::of(*kind, data, row, &placed)) {
+    for residual in KINDS.iter().filter_map(|kind| Residual::of(*kind, data, row, placed)) {
         let first = match residual.dimension() {
             Dimension::Length => &mut length,
             Dimension::Angle => &mut angle,

@@ -8,7 +8,7 @@ use crate::diagnose::round::{EstimatedCause, FitState};
 use crate::effect::{Effect, Place, Unknown, follows};
 
 /// Rivals that are tried in place of a cause.
-const RIVALS: usize = 4;
+pub(crate) const RIVALS: usize = 4;
 
 /// Exchanges or drops causes that make the folds worse; `set` holds the causes' positions in the pool, in their order.
 pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &ModelComparison) -> (FitState, Vec<FoldGain>) {
@@ -18,6 +18,13 @@ pub(super) fn exchange(mut now: FitState, set: &mut Vec<usize>, comparison: &Mod
     let mut done: Vec<(&'static str, Place)> = Vec::new();
     let mut at = 0;
     while at < set.len() {
+        if at == 0 {
+            // All that are asked about are left out of the same set.
+            let mut all = set.clone();
+            all.sort_unstable();
+            let of = |k: &usize| Contested::of(named(pool, *k), &all, pool).own;
+            pool.leave_out(&all, &all.iter().map(of).collect());
+        }
         let (effect, place) = named(pool, set[at]);
         if done.contains(&(effect, place)) {
             at += 1;

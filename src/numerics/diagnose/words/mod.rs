@@ -16,6 +16,7 @@ pub(crate) use groups::{FindingGroups, FindingKey, groups};
 pub(crate) use last_round::LastRound;
 pub use statement::other_means;
 
+use super::judge::RIVALS;
 use super::pool::CachedHypotheses;
 use super::round::{FitState, Fitter};
 use super::whitened::AutocorrelatedNoise;
@@ -60,4 +61,15 @@ pub(crate) fn of_a_round<'f>(round: usize, pool: &CachedHypotheses, forms: impl 
     }
     let shown = if shown.is_empty() { shown } else { format!(" ({shown})") };
     format!("round {round}: {tried} hypotheses, {causes}{shown}; p = {rest:.3} of such a residual from noise alone")
+}
+
+/// What follows the last round in a line: folds judge what it found.
+pub(crate) fn of_the_judgement(found: &FitState) -> String {
+    let causes = counted(found.causes.len(), "cause");
+    format!("rounds end; {causes} judged at poses that a fit did not see, each against at most {RIVALS} others in its place")
+}
+
+/// What follows the judgement in a line.
+pub(crate) fn of_the_conclusions(judged: &FitState) -> String {
+    format!("{} kept; rivals, probabilities and formulas follow, the last step", counted(judged.causes.len(), "cause"))
 }

@@ -7,8 +7,9 @@
 use super::arm::ScrewArm;
 use super::basis::{BasisFunctions, BasisTerm};
 use super::samples::TrainingSamples;
-use faer::linalg::matmul::matmul;
-use faer::linalg::solvers::{DenseSolveCore, Llt};
+use faer::linalg::matmul::triangular::{self, BlockStructure};
+use faer::linalg::solvers::{Llt, Solve};
+use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::{Accum, Mat, Par, Side};
 use rand::rngs::ChaCha8Rng;
@@ -58,12 +59,13 @@ impl Linear {
             for _ in 0..PRIORS {
                 let posterior = Mat::from_fn(p, p, |i, j| beta * sums.h[(i, j)] + if i == j { alpha[group[i]] } else { 0.0 });
                 let llt = Llt::new(posterior.as_ref(), Side::Lower).ok()?;
-                let covariance = llt.inverse();
-                x = (0..p).map(|i| (0..p).map(|j| covariance[(j, i)] * sums.g[j]).sum::<f64>() * beta).collect();
+                let right = Mat::from_fn(p, 1, |i, _| beta * sums.g[i]);
+                x = llt.solve(&right).col_as_slice(0).to_vec();
+                let variances = variances(&llt);
                 let mut determined = 0.0;
                 for (g, alpha) in alpha.iter_mut().enumerate() {
                     let own = (0..p).filter(|i| group[*i] == g);
-                    let (trace, squares) = own.fold((0.0, 0.0), |sum, i| (sum.0 + covariance[(i, i)], sum.1 + x[i] * x[i]));
+                    let (trace, squares) = own.fold((0.0, 0.0), |sum, i| (sum.0 + variances[i], sum.1 + x[i] * x[i]));
                     let gamma = (counts[g] - *alpha * trace).clamp(1e-3, counts[g].max(1e-3));
                     determined += gamma;
                     *alpha = (gamma / squares.max(1e-12)).clamp(1e-2, 1e10);
@@ -177,7 +179,23 @@ impl<'a> Sums<'a> {
             for (t, g) in self.g.iter_mut().enumerate() {
                 *g += residual.iter().enumerate().map(|(r, value)| columns[(r, t)] * value).sum::<f64>();
             }
-            matmul(self.h.as_mut(), Accum::Add, columns.transpose(), columns.as_ref(), 1.0, Par::Seq);
+            let whole = BlockStructure::Rectangular;
+            triangular::matmul(
+                self.h.as_mut(),
+                BlockStructure::TriangularLower,
+                Accum::Add,
+                columns.transpose(),
+                whole,
+                columns.as_ref(),
+                whole,
+                1.0,
+                Par::Seq,
+            );
+        }
+        for j in 0..self.terms.len() {
+            for i in 0..j {
+                self.h[(i, j)] = self.h[(j, i)];
+            }
         }
     }
 
@@ -202,6 +220,14 @@ impl<'a> Sums<'a> {
         };
         self.rows.iter().map(weight).collect()
     }
+}
+
+/// The diagonal of the inverse of a matrix with this factor.
+fn variances(llt: &Llt<f64>) -> Vec<f64> {
+    let lower = llt.L();
+    let mut inverse = Mat::zeros(lower.nrows(), lower.ncols());
+    invert_lower_triangular(inverse.as_mut(), lower, Par::Seq);
+    (0..inverse.ncols()).map(|j| inverse.col_as_slice(j)[j..].iter().map(|value| value * value).sum()).collect()
 }
 
 /// A standard normal number (Box and Muller).
