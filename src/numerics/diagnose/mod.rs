@@ -95,7 +95,7 @@ pub fn diagnose(question: &Question, mut tell: impl FnMut(String)) -> Diagnosis 
         tell(words::of_the_judgement(&next));
         let judged = judge(next, found.set.clone(), &comparison);
         judged.withdrawn.iter().for_each(|sentence| tell(format!("withdrawn: {sentence}")));
-        let settled = open_world::settle(judged, search.pool, &survey, &fitter, &mut tell);
+        let settled = open_world::settle(judged, found.last <= SIGNIFICANT, search.pool, &survey, &fitter, &mut tell);
         let (judged, odds) = (settled.judged, settled.odds);
         tell(words::of_the_conclusions(&judged.state));
         let last = if judged.set == found.set { found.last } else { search.gate(&judged.set) };

@@ -8,23 +8,23 @@ use faer::{Accum, Mat, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 /// Columns of a group, projected, with their products among each other and with the residual.
-pub(super) struct Block {
+pub(super) struct ProjectedColumns {
     /// Residual rows x columns.
     pub columns: Mat<f64>,
     /// Mean squared change (m2 or rad2) of what was measured by a unit of each column's coefficient.
     pub square: Vec<f64>,
-    pub products: Products,
+    pub products: GroupProducts,
 }
 
 /// What the evidence of a group needs.
 #[derive(Clone)]
-pub(super) struct Products {
+pub(super) struct GroupProducts {
     pub gram: DMatrix<f64>,
     pub gradient: DVector<f64>,
 }
 
 /// The last model's rows.
-pub(super) struct Frame<'a> {
+pub(super) struct ProjectedRows<'a> {
     pub view: &'a RoundView<'a>,
     base: Mat<f64>,
     /// Without the causes of the model.
@@ -33,7 +33,7 @@ pub(super) struct Frame<'a> {
     variance: Vec<f64>,
 }
 
-impl<'a> Frame<'a> {
+impl<'a> ProjectedRows<'a> {
     pub fn of(view: &'a RoundView<'a>, now: &FitState, fitter: &Fitter) -> Self {
         let problem = &view.problem;
         let base = orthonormal(&problem.jacobian(fitter.free()));
@@ -65,19 +65,19 @@ impl<'a> Frame<'a> {
         self.residual.iter().map(|value| value * value).sum()
     }
 
-    /// Products of some columns with the residual.
+    /// GroupProducts of some columns with the residual.
     pub fn along(&self, columns: MatRef<'_, f64>) -> DVector<f64> {
         let residual = MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1);
         dense(product(columns, residual).as_ref()).column(0).into_owned()
     }
 
     /// A form of the list or of the model.
-    pub fn block(&self, form: &Form) -> Block {
+    pub fn block(&self, form: &Form) -> ProjectedColumns {
         self.of_columns(self.view.problem.motions_by(form))
     }
 
     /// A motion along the functions of a row in `values`, one after another: all products of a direction and a function.
-    pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> Block {
+    pub fn free(&self, directions: &[Vec<f64>], values: &[Vec<f64>]) -> ProjectedColumns {
         let rows = self.residual.len();
         let mut raw = vec![0.0; rows * directions.len() * values.len()];
         for ((direction, value), column) in
@@ -100,7 +100,7 @@ impl<'a> Frame<'a> {
         self.view.problem.values(of)
     }
 
-    fn of_columns(&self, mut raw: Vec<f64>) -> Block {
+    fn of_columns(&self, mut raw: Vec<f64>) -> ProjectedColumns {
         let rows = self.residual.len();
         let square = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
         raw.chunks_mut(rows).for_each(|column| self.view.problem.innovate(column));
@@ -108,7 +108,7 @@ impl<'a> Frame<'a> {
         let columns = MatRef::from_column_major_slice(&raw, rows, raw.len() / rows).to_owned();
         let gram = dense(product(columns.as_ref(), columns.as_ref()).as_ref());
         let gradient = self.along(columns.as_ref());
-        Block { columns, square, products: Products { gram, gradient } }
+        ProjectedColumns { columns, square, products: GroupProducts { gram, gradient } }
     }
 
     fn mean_square(&self, column: &[f64]) -> f64 {

@@ -1,9 +1,9 @@
 //! The free form of a place: groups that join one after another while each pays for itself.
 
-use super::evidence::{GroupEvidence, evidence, log_mean};
-use super::frame::{Block, Frame, dense, product};
+use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
+use super::frame::{ProjectedColumns, ProjectedRows, dense, product};
 use super::groups::{FreeGroup, GroupColumns, name_of};
-use super::state::State;
+use super::state::KnownCauses;
 use crate::effect::{Place, Survey};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
@@ -38,15 +38,15 @@ pub(super) struct FreeForm {
 pub(super) struct PlaceGroups {
     pub place: Place,
     groups: Vec<FreeGroup>,
-    blocks: Vec<Block>,
+    blocks: Vec<ProjectedColumns>,
     variances: Vec<Vec<Vec<f64>>>,
-    /// Products of the columns of the model's causes with those of each.
+    /// GroupProducts of the columns of the model's causes with those of each.
     known: Vec<DMatrix<f64>>,
 }
 
 /// What the model's causes and the list are, beside which free forms are asked.
 pub(super) struct Surroundings<'f, 'a> {
-    pub frame: &'f Frame<'a>,
+    pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
     /// Columns of all causes of the model.
     pub causes: MatRef<'f, f64>,
@@ -76,7 +76,7 @@ impl PlaceGroups {
     }
 
     /// The evidence of every group beside a state, with its best length.
-    fn scan(&self, state: &State) -> Vec<(GroupEvidence, usize)> {
+    fn scan(&self, state: &KnownCauses) -> Vec<(GroupEvidence, usize)> {
         let seen: Vec<_> = self.blocks.iter().zip(&self.known).map(|(block, known)| state.beside(block, known)).collect();
         let of = |g: usize, length: usize| evidence(&seen[g].gram, &seen[g].gradient, &self.variances[g][length]);
         // Two lengths of all, every length of the best ones.
@@ -102,14 +102,19 @@ impl PlaceGroups {
         choices.max(1.0).ln() + (self.groups[g].of as f64).ln()
     }
 
-    /// The best group alone, and the evidence of them all as alternatives.
-    pub fn first(&self, state: &State) -> f64 {
-        let logs: Vec<f64> = self.scan(state).iter().enumerate().map(|(g, (found, _))| found.log - self.price(g)).collect();
-        if logs.is_empty() { f64::NEG_INFINITY } else { super::evidence::log_sum(&logs) }
+    /// ln of the evidence of all groups as alternatives, each with its price; none whose amplitude no arm can have.
+    fn alternatives(&self, scan: &[(GroupEvidence, usize)]) -> f64 {
+        let sound = scan.iter().enumerate().filter(|(_, (found, _))| !found.is_off_the_grid());
+        log_sum(&sound.map(|(g, (found, _))| found.log - self.price(g)).collect::<Vec<_>>())
+    }
+
+    /// The same beside a state.
+    pub fn first(&self, state: &KnownCauses) -> f64 {
+        self.alternatives(&self.scan(state))
     }
 
     /// The free form beside a state.
-    pub fn greedy(&mut self, state: &State, around: &Surroundings) -> FreeForm {
+    pub fn greedy(&mut self, state: &KnownCauses, around: &Surroundings) -> FreeForm {
         let (mut now, mut log, mut terms) = (state.clone(), f64::NEG_INFINITY, Vec::new());
         let mut columns = GroupColumns::new(around.frame);
         for step in 0..GROUPS {
@@ -118,7 +123,7 @@ impl PlaceGroups {
             let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
             let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
             if step == 0 {
-                log = super::evidence::log_sum(&(0..scan.len()).map(paid).collect::<Vec<_>>());
+                log = self.alternatives(&scan);
                 if paid(best) < 0.0 {
                     break;
                 }
@@ -149,7 +154,7 @@ fn mixed(all: &[GroupEvidence]) -> GroupEvidence {
 }
 
 /// Columns one after another as one matrix.
-pub(super) fn side_by_side(blocks: &[Block], rows: usize) -> Mat<f64> {
+pub(super) fn side_by_side(blocks: &[ProjectedColumns], rows: usize) -> Mat<f64> {
     let count = blocks.iter().map(|block| block.columns.ncols()).sum();
     let mut out = Mat::zeros(rows, count);
     let mut at = 0;

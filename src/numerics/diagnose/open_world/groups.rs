@@ -1,6 +1,6 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
-use super::frame::{Block, Frame};
+use super::frame::{ProjectedColumns, ProjectedRows};
 use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
 use std::f64::consts::PI;
 
@@ -55,7 +55,7 @@ impl FreeGroup {
     }
 
     /// Prior variances of the block's columns, of unit mean square at the tool; a list a length.
-    pub fn variances(&self, block: &Block) -> Vec<Vec<f64>> {
+    pub fn variances(&self, block: &ProjectedColumns) -> Vec<Vec<f64>> {
         let functions = self.law.count();
         let one = |spectrum: Vec<f64>| {
             let all: Vec<f64> = (0..block.square.len()).map(|k| spectrum[k % functions]).collect();
@@ -89,13 +89,13 @@ fn spectra(basis: &Basis) -> Vec<Vec<f64>> {
 
 /// Directions of motions and values of variables at every row, computed once.
 pub(super) struct GroupColumns<'f, 'a> {
-    frame: &'f Frame<'a>,
+    frame: &'f ProjectedRows<'a>,
     directions: Vec<(Motion, Vec<Vec<f64>>)>,
     values: Vec<(Variable, Option<Vec<f64>>)>,
 }
 
 impl<'f, 'a> GroupColumns<'f, 'a> {
-    pub fn new(frame: &'f Frame<'a>) -> Self {
+    pub fn new(frame: &'f ProjectedRows<'a>) -> Self {
         Self { frame, directions: Vec::new(), values: Vec::new() }
     }
 
@@ -107,7 +107,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         self.values.iter().find(|(other, _)| *other == of).and_then(|(_, values)| values.as_deref())
     }
 
-    pub fn block(&mut self, group: &FreeGroup) -> Option<Block> {
+    pub fn block(&mut self, group: &FreeGroup) -> Option<ProjectedColumns> {
         let mut functions: Vec<Vec<f64>> = vec![vec![1.0; self.frame.view.problem.rows.len()]];
         for factor in group.law.factors() {
             let values = self.values(factor.of)?;
@@ -162,7 +162,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         out
     }
 
-    /// Products of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
+    /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
     pub fn products(&mut self, group: &FreeGroup, survey: &Survey) -> Vec<FreeGroup> {
         if group.law.times.is_some() || group.of > 1 {
             return Vec::new();

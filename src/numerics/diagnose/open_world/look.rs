@@ -1,10 +1,10 @@
 //! A look at a judged model: free forms of all places beside it, instead of it, and instead of each of its findings.
 
-use super::frame::{Block, Frame};
+use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{FreeForm, Surroundings, side_by_side};
-use super::names::{Case, Contested, Named, fitted_variances, survey_places};
-use super::state::State;
-use super::step::{Change, Step};
+use super::names::{ContestedName, NameCase, NamedFinding, fitted_variances, survey_places};
+use super::state::KnownCauses;
+use super::step::{ModelChange, ModelStep};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
@@ -26,10 +26,10 @@ const LOUDER: f64 = 1.05;
 
 /// A judged model with its rows, projected.
 pub(super) struct Sighted<'v> {
-    frame: Frame<'v>,
+    frame: ProjectedRows<'v>,
     judged: &'v JudgedCauses,
     fitter: &'v Fitter<'v>,
-    blocks: Vec<Block>,
+    blocks: Vec<ProjectedColumns>,
     /// Columns of all causes, and which are each one's.
     all: Mat<f64>,
     ranges: Vec<Range<usize>>,
@@ -37,11 +37,11 @@ pub(super) struct Sighted<'v> {
 
 impl<'v> Sighted<'v> {
     pub fn of(view: &'v RoundView<'v>, judged: &'v JudgedCauses, fitter: &'v Fitter<'v>) -> Self {
-        let frame = Frame::of(view, &judged.state, fitter);
-        let blocks: Vec<Block> = judged.state.causes.iter().map(|cause| frame.block(&cause.form)).collect();
+        let frame = ProjectedRows::of(view, &judged.state, fitter);
+        let blocks: Vec<ProjectedColumns> = judged.state.causes.iter().map(|cause| frame.block(&cause.form)).collect();
         let all = side_by_side(&blocks, frame.residual_rows());
         let mut at = 0;
-        let range = |block: &Block| {
+        let range = |block: &ProjectedColumns| {
             at += block.square.len();
             at - block.square.len()..at
         };
@@ -56,23 +56,23 @@ impl<'v> Sighted<'v> {
         (0..self.blocks.len()).filter(|i| is_in(*i)).flat_map(of).map(|(k, variance)| (k, variance.sqrt())).collect()
     }
 
-    fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> State {
-        State::of(&self.frame, self.all.as_ref(), self.picked(is_in), scale)
+    fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> KnownCauses {
+        KnownCauses::of(&self.frame, self.all.as_ref(), self.picked(is_in), scale)
     }
 }
 
 /// Free forms beside a judged model.
-pub(super) struct Look<'l, 'v, 'a> {
+pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     sight: &'l Sighted<'v>,
     pool: &'l CachedHypotheses<'a>,
     around: Surroundings<'l, 'v>,
     scale: f64,
-    whole: State,
+    whole: KnownCauses,
     beside: (Vec<(Place, f64)>, Vec<FreeForm>),
     findings: FindingGroups,
 }
 
-impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
+impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
         let around = Surroundings { frame: &sight.frame, survey, causes: sight.all.as_ref(), without };
@@ -80,7 +80,8 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
         let louder = louder(&sight.frame, &whole, beside.1.first(), scale, sight.fitter);
-        if louder > LOUDER {
+        let louder = louder.max(sight.fitter.least_of_the_noise());
+        if louder > LOUDER || louder < 1.0 / LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
             scale /= louder;
             whole = sight.state(&|_| true, scale);
             beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
@@ -89,8 +90,8 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
         Self { sight, pool, around, scale, whole, beside, findings }
     }
 
-    fn case(&self) -> Case<'_, 'l, 'v, 'a> {
-        Case {
+    fn case(&self) -> NameCase<'_, 'l, 'v, 'a> {
+        NameCase {
             around: &self.around,
             pool: self.pool,
             judged: self.sight.judged,
@@ -98,12 +99,12 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
         }
     }
 
-    fn change<'c>(&'c self, without: &'c [usize], worse: f64) -> Change<'c, 'a> {
-        Change { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
+    fn change<'c>(&'c self, without: &'c [usize], worse: f64) -> ModelChange<'c, 'a> {
+        ModelChange { judged: self.sight.judged, pool: self.pool, fitter: self.sight.fitter, without, worse }
     }
 
     /// The free form of one place instead of all causes, where it says more than they do together.
-    pub fn alone(&self) -> Option<Step> {
+    pub fn alone(&self) -> Option<ModelStep> {
         let set = &self.sight.judged.set;
         if self.findings.len() < 2 {
             return None;
@@ -120,7 +121,7 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
     }
 
     /// A law of the list or the free form of a place beside everything.
-    pub fn joining(&self, refused: &mut Vec<Place>) -> Option<Step> {
+    pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
         let price = (self.beside.0.len().max(1) as f64).ln();
         let form = self.beside.1.iter().find(|form| form.log - price > STRONG && !refused.contains(&form.place))?;
         let case = self.case();
@@ -144,16 +145,16 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
     }
 
     /// The odds of every finding.
-    pub fn contested(&self) -> BTreeMap<FindingKey, Contested> {
+    pub fn contested(&self) -> BTreeMap<FindingKey, ContestedName> {
         let blocks = &self.sight.blocks;
         let size = |i: usize, of: usize| 1.0 / (of as f64 * blocks[i].square.iter().sum::<f64>()).max(f64::MIN_POSITIVE);
         let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| {
             let own = members.iter().flat_map(|i| self.sight.ranges[*i].clone().map(|k| (k, size(*i, members.len()))));
-            Named { key: *key, members: members.clone(), own: own.collect() }
+            NamedFinding { key: *key, members: members.clone(), own: own.collect() }
         };
-        let named: Vec<Named> = self.findings.iter().map(named).collect();
-        let rest = |own: &Named| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));
-        let rests: Vec<(State, Option<Place>)> = named.iter().map(rest).collect();
+        let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();
+        let rest = |own: &NamedFinding| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));
+        let rests: Vec<(KnownCauses, Option<Place>)> = named.iter().map(rest).collect();
         let instead = survey_places(&rests, &self.around);
         let case = self.case();
         let odds = named.iter().zip(&rests).zip(&instead);
@@ -161,7 +162,7 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
     }
 
     /// What stands in the place of a finding: a law of the list for what has no name, a free form for a name, or nothing.
-    pub fn exchange(&self, contested: &BTreeMap<FindingKey, Contested>) -> Option<Step> {
+    pub fn exchange(&self, contested: &BTreeMap<FindingKey, ContestedName>) -> Option<ModelStep> {
         let christened = contested.values().find_map(|own| {
             let law = self.pool.hypotheses[own.named?].clone();
             let sentence = format!("{} at {} says more than a law without a name", law.form.name(), law.form.place());
@@ -185,7 +186,7 @@ impl<'l, 'v, 'a> Look<'l, 'v, 'a> {
 }
 
 /// By how much the noise is larger, in squares, than what repeats and statements say: what the richest model leaves, repeats weighing in.
-fn louder(frame: &Frame, whole: &State, richest: Option<&FreeForm>, scale: f64, fitter: &Fitter) -> f64 {
+fn louder(frame: &ProjectedRows, whole: &KnownCauses, richest: Option<&FreeForm>, scale: f64, fitter: &Fitter) -> f64 {
     let left = frame.square() * scale - whole.gain() - richest.map_or(0.0, |form| form.gain);
     let repeats = 3.0 * fitter.repeatability.repeats as f64;
     let freedom = (frame.residual_rows().saturating_sub(frame.rank())) as f64 * scale;

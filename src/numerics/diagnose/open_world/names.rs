@@ -3,7 +3,7 @@
 use super::evidence::{evidence, log_sum};
 use super::free_form::{FreeForm, PlaceGroups, Surroundings};
 use super::groups::places;
-use super::state::State;
+use super::state::KnownCauses;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::FitState;
@@ -19,6 +19,9 @@ const RIVALS: usize = 12;
 const FINER: f64 = 0.1;
 /// ln of the evidence by which a free form must be better than a name with a free form beside it, to stand in its place.
 const CLEARLY: f64 = 3.0;
+/// That evidence misleads: its groups, priors and noise are a model, too, in which no odds are better than the share of names that were wrong
+/// where it was sure of them.
+const MISLED: f64 = 0.02;
 /// Places at which a free form is asked with more than one group.
 const CLOSER: usize = 2;
 
@@ -36,7 +39,7 @@ pub(crate) struct NameOdds {
 }
 
 /// A finding's odds, and what would stand in its place.
-pub(super) struct Contested {
+pub(super) struct ContestedName {
     pub members: Vec<usize>,
     pub odds: NameOdds,
     /// The best free form instead of it, where it says more than the finding with a free form beside it.
@@ -46,7 +49,10 @@ pub(super) struct Contested {
 }
 
 /// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
-pub(super) fn survey_places(states: &[(State, Option<Place>)], around: &Surroundings) -> Vec<(Vec<(Place, f64)>, Vec<FreeForm>)> {
+pub(super) fn survey_places(
+    states: &[(KnownCauses, Option<Place>)],
+    around: &Surroundings,
+) -> Vec<(Vec<(Place, f64)>, Vec<FreeForm>)> {
     let all = places(around.survey);
     let firsts: Vec<Vec<f64>> = all
         .par_iter()
@@ -83,7 +89,7 @@ pub(super) fn survey_places(states: &[(State, Option<Place>)], around: &Surround
 }
 
 /// A finding's part of the model.
-pub(super) struct Named {
+pub(super) struct NamedFinding {
     pub key: FindingKey,
     pub members: Vec<usize>,
     /// Columns of the model's causes that are its own, with the prior variances of their coefficients at 1 m.
@@ -91,7 +97,7 @@ pub(super) struct Named {
 }
 
 /// What the judgement of a finding rests on.
-pub(super) struct Case<'c, 'f, 'a, 'p> {
+pub(super) struct NameCase<'c, 'f, 'a, 'p> {
     pub around: &'c Surroundings<'f, 'a>,
     pub pool: &'c CachedHypotheses<'p>,
     pub judged: &'c JudgedCauses,
@@ -99,15 +105,15 @@ pub(super) struct Case<'c, 'f, 'a, 'p> {
     pub open_world: f64,
 }
 
-impl Case<'_, '_, '_, '_> {
+impl NameCase<'_, '_, '_, '_> {
     /// `rest` is the state without the finding, `instead` the free forms beside it; `beside` are those beside everything.
     pub fn odds(
         &self,
-        named: &Named,
-        rest: &State,
+        named: &NamedFinding,
+        rest: &KnownCauses,
         instead: &(Vec<(Place, f64)>, Vec<FreeForm>),
         beside: &(Vec<(Place, f64)>, Vec<FreeForm>),
-    ) -> Contested {
+    ) -> ContestedName {
         let (effect, place) = named.key;
         let frame = self.around.frame;
         let set = &self.judged.set;
@@ -142,7 +148,7 @@ impl Case<'_, '_, '_, '_> {
             |of: &[(Place, f64)]| log_sum(&of.iter().filter(|(at, _)| *at == place).map(|(_, log)| *log).collect::<Vec<_>>());
         let all = log_sum(&[logs(&names), logs(&free), NOTHING.ln()]);
         let odds = NameOdds {
-            none: (logs(&free) - all).exp(),
+            none: (logs(&free) - all).exp().clamp(MISLED, 1.0 - MISLED),
             place: (log_sum(&[here(&names), here(&free)]) - all).exp(),
             log: own.log,
             share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
@@ -152,8 +158,8 @@ impl Case<'_, '_, '_, '_> {
         let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));
         let nameless = named.members.iter().all(|i| self.judged.state.causes[*i].form.cause().is_nameless());
-        let better = |rival: &&Listed| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
-        Contested { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
+        let better = |rival: &&LawOfTheList| nameless && !is_named && odds.none < 0.5 && rival.log + listed > open + own.log;
+        ContestedName { members: named.members.clone(), odds, instead, named: best.filter(better).map(|rival| rival.at) }
     }
 
     /// ln of a hypothesis' prior odds, negative; of what is called by a name only when it is fitted those of its kind and place.
@@ -177,7 +183,7 @@ impl Case<'_, '_, '_, '_> {
     }
 
     /// Evidence and fall of the squared residual of columns beside a state.
-    fn evidence_of(&self, rest: &State, columns: &faer::Mat<f64>, variances: &[f64]) -> Own {
+    fn evidence_of(&self, rest: &KnownCauses, columns: &faer::Mat<f64>, variances: &[f64]) -> Own {
         let with = |square: f64| {
             let scaled: Vec<f64> = variances.iter().map(|variance| variance * square).collect();
             rest.with(self.around.frame, columns.as_ref(), &scaled).gain() - rest.gain()
@@ -188,7 +194,7 @@ impl Case<'_, '_, '_, '_> {
     }
 
     /// Laws of the list beside all causes but some, the best of each name and place, with their prices.
-    pub fn listed(&self, without: &[usize], rest: &State) -> Vec<Listed> {
+    pub fn listed(&self, without: &[usize], rest: &KnownCauses) -> Vec<LawOfTheList> {
         let mut others: Vec<usize> =
             (0..self.judged.set.len()).filter(|i| !without.contains(i)).map(|i| self.judged.set[i]).collect();
         others.sort_unstable();
@@ -207,7 +213,7 @@ impl Case<'_, '_, '_, '_> {
             let variances = vec![1.0 / size.max(f64::MIN_POSITIVE); block.square.len()];
             let products = rest.of_columns(self.around.frame, block.columns.as_ref());
             let found = evidence(&products.gram, &products.gradient, &variances);
-            out.push(Listed { key, at: *h, log: found.log - self.price(*h) });
+            out.push(LawOfTheList { key, at: *h, log: found.log - self.price(*h) });
             if out.len() == RIVALS {
                 break;
             }
@@ -217,7 +223,7 @@ impl Case<'_, '_, '_, '_> {
 }
 
 /// A law of the list in the place of something.
-pub(super) struct Listed {
+pub(super) struct LawOfTheList {
     pub key: FindingKey,
     /// Its number among the hypotheses.
     pub at: usize,

@@ -1,8 +1,8 @@
 //! What free forms add to a judged model, or put in the place of its names, as far as folds agree; and the odds of what stands.
 
-use super::look::{Look, Sighted};
+use super::look::{OpenWorldLook, Sighted};
 use super::names::NameOdds;
-use super::step::Step;
+use super::step::ModelStep;
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
@@ -19,27 +19,30 @@ pub(crate) struct Settled {
     pub odds: BTreeMap<FindingKey, NameOdds>,
 }
 
-/// Asks free forms beside a judged model and instead of its findings. `survey` is that of the round before.
+/// Asks free forms beside a judged model and instead of its findings. `survey` is that of the round before. `structured` says whether the gate
+/// saw more than noise in what the findings leave: along a path noise that lasts looks like a smooth function, and only what the gate sees,
+/// which knows how long it lasts, may join there.
 pub(crate) fn settle(
     mut judged: JudgedCauses,
+    structured: bool,
     pool: &mut CachedHypotheses,
     survey: &Survey,
     fitter: &Fitter,
     tell: &mut dyn FnMut(String),
 ) -> Settled {
-    let data = fitter.without_inferred_noise();
+    let joins = structured || !fitter.data.in_motion(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
     let mut asked_alone = false;
     for round in 0..=ROUNDS {
-        let view = RoundView::on(&data, &judged.state, fitter);
+        let view = RoundView::of(&judged.state, fitter);
         let (mut odds, mut step) = (BTreeMap::new(), None);
         {
             let sight = Sighted::of(&view, &judged, fitter);
-            let look = Look::of(&sight, pool, survey);
+            let look = OpenWorldLook::of(&sight, pool, survey);
             if round < ROUNDS && !std::mem::replace(&mut asked_alone, true) {
                 step = look.alone();
             }
-            if round < ROUNDS && step.is_none() {
+            if round < ROUNDS && step.is_none() && joins {
                 step = look.joining(&mut refused);
             }
             if step.is_none() {
@@ -50,7 +53,7 @@ pub(crate) fn settle(
                 odds = contested.into_iter().map(|(key, own)| (key, own.odds)).collect();
             }
         }
-        let Some(Step { state, kept, new, sentence }) = step else { return Settled { judged, odds } };
+        let Some(ModelStep { state, kept, new, sentence }) = step else { return Settled { judged, odds } };
         tell(sentence);
         let mut set: Vec<usize> = kept.iter().map(|i| judged.set[*i]).collect();
         let first = pool.add(new);

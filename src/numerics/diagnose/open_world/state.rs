@@ -2,13 +2,13 @@
 //!
 //! With columns Z of unit prior variance and noise variance 1/s: X' C^-1 X = s X'X - Y'Y, Y = L^-1 s Z'X, L L' = 1 + s Z'Z.
 
-use super::frame::{Block, Frame, Products, dense, product};
+use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows, dense, product};
 use faer::{Mat, MatRef};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Causes and free forms under their priors.
 #[derive(Clone)]
-pub(super) struct State {
+pub(super) struct KnownCauses {
     /// The columns of the model's causes that are in it, by their numbers, with the roots of their prior variances.
     picked: Vec<(usize, f64)>,
     /// All of its columns times the roots of their prior variances, the picked ones first; residual rows x count.
@@ -19,9 +19,9 @@ pub(super) struct State {
     scale: f64,
 }
 
-impl State {
+impl KnownCauses {
     /// Of some of the model's causes, whose columns are `all`, and noise.
-    pub fn of(frame: &Frame, all: MatRef<'_, f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
+    pub fn of(frame: &ProjectedRows, all: MatRef<'_, f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
         let mut columns = Mat::zeros(frame.residual_rows(), picked.len());
         for (j, (k, root)) in picked.iter().enumerate() {
             let column = columns.col_as_slice_mut(j).iter_mut().zip(all.col(*k).iter());
@@ -31,7 +31,7 @@ impl State {
     }
 
     /// With more columns of these prior variances.
-    pub fn with(&self, frame: &Frame, columns: MatRef<'_, f64>, variances: &[f64]) -> Self {
+    pub fn with(&self, frame: &ProjectedRows, columns: MatRef<'_, f64>, variances: &[f64]) -> Self {
         let (old, new) = (self.columns.ncols(), columns.ncols());
         let mut all = Mat::zeros(frame.residual_rows(), old + new);
         for j in 0..old {
@@ -45,7 +45,7 @@ impl State {
         Self { columns, ..self.clone() }.factored(frame)
     }
 
-    fn factored(mut self, frame: &Frame) -> Self {
+    fn factored(mut self, frame: &ProjectedRows) -> Self {
         let count = self.columns.ncols();
         let gram = dense(product(self.columns.as_ref(), self.columns.as_ref()).as_ref());
         self.factor = Cholesky::new(DMatrix::identity(count, count) + gram * self.scale).filter(|_| count > 0);
@@ -57,7 +57,7 @@ impl State {
     }
 
     /// The products of any columns beside the state.
-    pub fn of_columns(&self, frame: &Frame, columns: MatRef<'_, f64>) -> Products {
+    pub fn of_columns(&self, frame: &ProjectedRows, columns: MatRef<'_, f64>) -> GroupProducts {
         let gradient = frame.along(columns);
         let (mut gram, mut gradient) = (dense(product(columns, columns).as_ref()) * self.scale, gradient * self.scale);
         if let Some(factor) = &self.factor {
@@ -66,7 +66,7 @@ impl State {
             gram.gemm_tr(-1.0, &share, &share, 1.0);
             gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
         }
-        Products { gram, gradient }
+        GroupProducts { gram, gradient }
     }
 
     /// ln of the evidence over that of noise alone.
@@ -82,9 +82,9 @@ impl State {
     }
 
     /// A group's products beside the state; `known` are those of the columns of all the model's causes with the group's.
-    pub fn beside(&self, block: &Block, known: &DMatrix<f64>) -> Products {
+    pub fn beside(&self, block: &ProjectedColumns, known: &DMatrix<f64>) -> GroupProducts {
         let (mut gram, mut gradient) = (&block.products.gram * self.scale, &block.products.gradient * self.scale);
-        let Some(factor) = &self.factor else { return Products { gram, gradient } };
+        let Some(factor) = &self.factor else { return GroupProducts { gram, gradient } };
         let (picked, count) = (self.picked.len(), self.columns.ncols());
         let mut share = DMatrix::zeros(count, gram.ncols());
         for (i, (k, root)) in self.picked.iter().enumerate() {
@@ -97,6 +97,6 @@ impl State {
         factor.l_dirty().solve_lower_triangular_mut(&mut share);
         gram.gemm_tr(-1.0, &share, &share, 1.0);
         gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
-        Products { gram, gradient }
+        GroupProducts { gram, gradient }
     }
 }

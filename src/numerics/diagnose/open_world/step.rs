@@ -8,7 +8,7 @@ use crate::effect::{Effect, Hypothesis};
 use crate::estimate::Prior;
 
 /// A changed model.
-pub(super) struct Step {
+pub(super) struct ModelStep {
     pub state: FitState,
     /// Causes that stay, by their positions.
     pub kept: Vec<usize>,
@@ -18,7 +18,7 @@ pub(super) struct Step {
 }
 
 /// What is changed of a judged model.
-pub(super) struct Change<'c, 'a> {
+pub(super) struct ModelChange<'c, 'a> {
     pub judged: &'c JudgedCauses,
     pub pool: &'c CachedHypotheses<'a>,
     pub fitter: &'c Fitter<'c>,
@@ -28,9 +28,9 @@ pub(super) struct Change<'c, 'a> {
     pub worse: f64,
 }
 
-impl Change<'_, '_> {
+impl ModelChange<'_, '_> {
     /// With a law of the list.
-    pub fn law(&self, law: Hypothesis, sentence: String) -> Option<Step> {
+    pub fn law(&self, law: Hypothesis, sentence: String) -> Option<ModelStep> {
         let robot = self.pool.problem.robot;
         let zeros = vec![0.0; law.form.parameters(robot).len()];
         let cause = EstimatedCause::shrunk(law.form.clone(), robot, zeros);
@@ -38,7 +38,7 @@ impl Change<'_, '_> {
     }
 
     /// With a free form, or nothing.
-    pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<Step> {
+    pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
         let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis()).collect();
         let prior = |variance: &f64| Prior { mean: 0.0, sigma: variance.sqrt() };
         let cause = |(hypothesis, term): (&Hypothesis, &FreeTerm)| EstimatedCause {
@@ -51,7 +51,7 @@ impl Change<'_, '_> {
     }
 
     /// Where folds are no worse by more than the share; causes of the same key go.
-    fn with(&self, new: Vec<Hypothesis>, causes: Vec<EstimatedCause>, sentence: String) -> Option<Step> {
+    fn with(&self, new: Vec<Hypothesis>, causes: Vec<EstimatedCause>, sentence: String) -> Option<ModelStep> {
         let Self { judged, pool, fitter, .. } = *self;
         let keys: Vec<String> = new.iter().map(|hypothesis| hypothesis.form.key()).collect();
         let stays = |i: &usize| !self.without.contains(i) && !keys.contains(&pool.keys[judged.set[*i]]);
@@ -59,6 +59,6 @@ impl Change<'_, '_> {
         let causes: Vec<EstimatedCause> = kept.iter().map(|i| judged.state.causes[*i].clone()).chain(causes).collect();
         let state = fitter.fit(&judged.state.model, causes);
         let (before, after) = (FoldErrors::of(&judged.state, fitter)?, FoldErrors::of(&state, fitter)?);
-        (after.gain_over(&before) > -self.worse * before.rms()).then_some(Step { state, kept, new, sentence })
+        (after.gain_over(&before) > -self.worse * before.rms()).then_some(ModelStep { state, kept, new, sentence })
     }
 }

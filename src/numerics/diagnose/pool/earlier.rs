@@ -3,7 +3,7 @@
 //! Effects are small, so that the directions in which they move a point change by thousandths from round to round; what is left changes
 //! much, and is looked at anew. What is chosen is fitted in the whole model.
 
-use crate::diagnose::round::RoundView;
+use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{Form, Hypothesis};
 use faer::Mat;
 use std::collections::HashMap;
@@ -42,9 +42,9 @@ pub(super) struct KnownForm {
 impl EarlierPool {
     /// Whether it may stand for the pool of another round: the same rows, no currents, whose weight is that of a residual, and joints that
     /// yield as before.
-    pub fn serves(&self, view: &RoundView) -> bool {
+    pub fn serves(&self, problem: &WhitenedProblem, compliance: &[f64]) -> bool {
         let same = |(now, before): (&f64, &f64)| (now - before).abs() <= SAME * before.abs();
-        let readings_alone = view.problem.residual_rows() == view.problem.of_readings().len();
-        readings_alone && self.rows == view.problem.rows && view.compliance.iter().zip(&self.compliance).all(same)
+        let readings_alone = problem.residual_rows() == problem.of_readings().len();
+        readings_alone && self.rows == problem.rows && compliance.iter().zip(&self.compliance).all(same)
     }
 }

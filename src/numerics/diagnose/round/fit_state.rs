@@ -161,11 +161,15 @@ impl<'a> Fitter<'a> {
         ((other - now).abs() > SETTLED * other.max(now)).then_some(other)
     }
 
-    /// The recording with the noise that its statement and repeats show, whatever a residual was said to be.
-    pub fn without_inferred_noise(&self) -> Measurements {
-        let mut data = self.data.clone();
-        self.spread.put(&mut data, self.repeated);
-        data
+    /// The share, in squares, of the noise that its statement and repeats show, whatever a residual was said to be.
+    pub fn least_of_the_noise(&self) -> f64 {
+        if self.repeatability.sigma <= self.repeated {
+            return 1.0;
+        }
+        let mut known = self.data.clone();
+        self.spread.put(&mut known, self.repeated);
+        let square = |data: &Measurements| self.question.fit.iter().map(|row| self.scale.noise(data, *row).powi(2)).sum::<f64>();
+        square(&known) / square(&self.data).max(f64::MIN_POSITIVE)
     }
 
     /// Takes the noise that a residual showed.

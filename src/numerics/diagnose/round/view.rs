@@ -6,7 +6,6 @@ use crate::diagnose::pool::{CachedHypotheses, EarlierPool, HypothesisSet};
 use crate::diagnose::whitened::WhitenedProblem;
 use crate::effect::{DeclaredForm, Hypothesis, Survey, Variable, hypotheses};
 use crate::estimate::Model;
-use crate::robot::Measurements;
 
 /// What is left of the rows that a search looks at, and what moves it.
 pub(crate) struct RoundView<'a> {
@@ -21,11 +20,7 @@ pub(crate) struct RoundView<'a> {
 
 impl<'a> RoundView<'a> {
     pub fn of(now: &'a FitState, fitter: &'a Fitter) -> Self {
-        Self::on(&fitter.data, now, fitter)
-    }
-
-    /// On the same rows with other noise.
-    pub fn on(data: &'a Measurements, now: &'a FitState, fitter: &Fitter) -> Self {
+        let data = &fitter.data;
         let compliance = compliance(&now.model);
         let mut problem = WhitenedProblem::new(&now.model, data, thinned(data, &now.screening.kept));
         if compliance.iter().any(|compliance| *compliance > 0.0) {
@@ -59,7 +54,7 @@ impl<'a> RoundView<'a> {
                 residual.iter_mut().zip(column).for_each(|(value, c)| *value += c * coefficient);
             }
         }
-        if let Some(earlier) = earlier.filter(|earlier| earlier.serves(self)) {
+        if let Some(earlier) = earlier.filter(|earlier| earlier.serves(&self.problem, &self.compliance)) {
             return CachedHypotheses::again(earlier, problem, &residual, self.autocorrelation_time);
         }
         let jacobian = problem.jacobian(fitter.free());
