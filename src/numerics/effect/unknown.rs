@@ -248,9 +248,25 @@ impl Cause for Unknown {
     }
 
     fn variant(&self, term: &Term) -> String {
-        let names: Vec<String> = term.law().variables().iter().map(|of| of.to_string().replace(' ', "_")).collect();
+        let label = |of: &Variable| match of {
+            Variable::Gravity { axis: Some(axis) } => format!("gravity_{}", ["x", "y", "z"][*axis]),
+            of => of.to_string().replace(' ', "_"),
+        };
+        let names: Vec<String> = term.law().variables().iter().map(label).collect();
         if let Motion::Instrument { of } = term.motion() {
             return format!("{of:?}_{}", names.join("_")).to_lowercase();
+        }
+        let curve = term.law().factors().any(|factor| factor.basis.is_curve());
+        let moves = match term.motion() {
+            Motion::Slide { along: true, .. } => "along_",
+            Motion::Slide { .. } => "across_",
+            Motion::Bend { .. } => "bent_",
+            Motion::Axis { .. } if curve => "axis_",
+            Motion::Base { axes: Axes::Rotation } if curve => "turned_",
+            _ => "",
+        };
+        if !moves.is_empty() || curve && term.law().times.is_some() {
+            return format!("{moves}{}", names.join("_"));
         }
         let frame = !matches!(term.motion(), Motion::Joint { .. });
         match (term.basis(), term.law().first.of) {
@@ -262,7 +278,7 @@ impl Cause for Unknown {
             }
             (Basis::Creep { .. }, _) => "creep".into(),
             (Basis::Sign, Variable::Gravity { .. }) => "side".into(),
-            (basis, Variable::Gravity { axis: Some(axis) }) if basis.is_curve() => format!("gravity_{}", ["x", "y", "z"][axis]),
+            (_, Variable::Gravity { .. }) if curve => names.join("_"),
             (_, Variable::Gravity { .. }) => "sag".into(),
             (Basis::After { at }, Variable::Time) => format!("after_{at:.0}"),
             (Basis::Cosines { .. }, Variable::Time) if term.law().times.is_none() => "time".into(),

@@ -45,7 +45,7 @@ pub(super) struct PlaceGroups {
 }
 
 /// What the model's causes and the list are, beside which free forms are asked.
-pub(super) struct Surroundings<'f, 'a> {
+pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
     /// Columns of all causes of the model.
@@ -55,7 +55,7 @@ pub(super) struct Surroundings<'f, 'a> {
 }
 
 impl PlaceGroups {
-    pub fn of(place: Place, around: &Surroundings) -> Self {
+    pub fn of(place: Place, around: &AroundGroups) -> Self {
         let mut columns = GroupColumns::new(around.frame);
         let all = columns.of(place, around.survey);
         let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
@@ -63,7 +63,7 @@ impl PlaceGroups {
         out
     }
 
-    fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &Surroundings) {
+    fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups) {
         let is_listed = |group: &FreeGroup| name_of(group).is_some_and(|name| around.without.iter().all(|out| out != name));
         let free: Vec<FreeGroup> = groups.into_iter().filter(|group| !is_listed(group)).collect();
         for group in free {
@@ -114,7 +114,7 @@ impl PlaceGroups {
     }
 
     /// The free form beside a state.
-    pub fn greedy(&mut self, state: &KnownCauses, around: &Surroundings) -> FreeForm {
+    pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
         let (mut now, mut log, mut terms) = (state.clone(), f64::NEG_INFINITY, Vec::new());
         let mut columns = GroupColumns::new(around.frame);
         for step in 0..GROUPS {

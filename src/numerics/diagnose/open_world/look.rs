@@ -1,7 +1,7 @@
 //! A look at a judged model: free forms of all places beside it, instead of it, and instead of each of its findings.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use super::free_form::{FreeForm, Surroundings, side_by_side};
+use super::free_form::{AroundGroups, FreeForm, side_by_side};
 use super::names::{ContestedName, NameCase, NamedFinding, fitted_variances, survey_places};
 use super::state::KnownCauses;
 use super::step::{ModelChange, ModelStep};
@@ -65,7 +65,7 @@ impl<'v> Sighted<'v> {
 pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     sight: &'l Sighted<'v>,
     pool: &'l CachedHypotheses<'a>,
-    around: Surroundings<'l, 'v>,
+    around: AroundGroups<'l, 'v>,
     scale: f64,
     whole: KnownCauses,
     beside: (Vec<(Place, f64)>, Vec<FreeForm>),
@@ -75,7 +75,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
-        let around = Surroundings { frame: &sight.frame, survey, causes: sight.all.as_ref(), without };
+        let around = AroundGroups { frame: &sight.frame, survey, causes: sight.all.as_ref(), without };
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);

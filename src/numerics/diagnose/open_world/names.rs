@@ -1,7 +1,7 @@
 //! The odds that a finding is none of the list: evidence of its name and of its rivals against that of free forms instead of it and beside it.
 
 use super::evidence::{evidence, log_sum};
-use super::free_form::{FreeForm, PlaceGroups, Surroundings};
+use super::free_form::{AroundGroups, FreeForm, PlaceGroups};
 use super::groups::places;
 use super::state::KnownCauses;
 use crate::diagnose::judge::JudgedCauses;
@@ -51,7 +51,7 @@ pub(super) struct ContestedName {
 /// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
 pub(super) fn survey_places(
     states: &[(KnownCauses, Option<Place>)],
-    around: &Surroundings,
+    around: &AroundGroups,
 ) -> Vec<(Vec<(Place, f64)>, Vec<FreeForm>)> {
     let all = places(around.survey);
     let firsts: Vec<Vec<f64>> = all
@@ -98,7 +98,7 @@ pub(super) struct NamedFinding {
 
 /// What the judgement of a finding rests on.
 pub(super) struct NameCase<'c, 'f, 'a, 'p> {
-    pub around: &'c Surroundings<'f, 'a>,
+    pub around: &'c AroundGroups<'f, 'a>,
     pub pool: &'c CachedHypotheses<'p>,
     pub judged: &'c JudgedCauses,
     /// Prior probability of a cause that is in no list.
