@@ -42,7 +42,7 @@ pub(super) fn evidence(gram: &DMatrix<f64>, gradient: &DVector<f64>, variances: 
     let count = roots.len();
     let scaled = DMatrix::from_fn(count, count, |i, j| roots[i] * gram[(kept[i], kept[j])] * roots[j]);
     let along = DVector::from_fn(count, |i, _| roots[i] * gradient[kept[i]]);
-    if !(scaled.trace() > 0.0) {
+    if scaled.trace().is_nan() || scaled.trace() <= 0.0 {
         return GroupEvidence::NONE;
     }
     let (diagonal, beside, along) = if count == 1 {

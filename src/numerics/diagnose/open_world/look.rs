@@ -2,7 +2,7 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{AroundGroups, FreeForm, side_by_side};
-use super::names::{ContestedName, NameCase, NamedFinding, fitted_variances, survey_places};
+use super::names::{ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, survey_places};
 use super::state::KnownCauses;
 use super::step::{ModelChange, ModelStep};
 use crate::diagnose::judge::JudgedCauses;
@@ -68,7 +68,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
     around: AroundGroups<'l, 'v>,
     scale: f64,
     whole: KnownCauses,
-    beside: (Vec<(Place, f64)>, Vec<FreeForm>),
+    beside: SurveyedPlaces,
     findings: FindingGroups,
 }
 
@@ -79,7 +79,7 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);
-        let louder = louder(&sight.frame, &whole, beside.1.first(), scale, sight.fitter);
+        let louder = louder(&sight.frame, &whole, beside.best.first(), scale, sight.fitter);
         let louder = louder.max(sight.fitter.least_of_the_noise());
         if louder > LOUDER || louder < 1.0 / LOUDER && sight.fitter.least_of_the_noise() < 1.0 {
             scale /= louder;
@@ -110,9 +110,9 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
             return None;
         }
         let none = self.sight.state(&|_| false, self.scale);
-        let best = survey_places(&[(none, None)], &self.around).remove(0).1.into_iter().next()?;
+        let best = survey_places(&[(none, None)], &self.around).remove(0).best.into_iter().next()?;
         let case = self.case();
-        let [open, listed] = case.priors(self.beside.0.len());
+        let [open, listed] = case.priors(self.beside.logs.len());
         let price: f64 = set.iter().map(|h| case.price(*h) - listed + SIZE).sum();
         let more = best.log + open - (self.whole.log() - price);
         let all: Vec<usize> = (0..set.len()).collect();
@@ -122,10 +122,10 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
 
     /// A law of the list or the free form of a place beside everything.
     pub fn joining(&self, refused: &mut Vec<Place>) -> Option<ModelStep> {
-        let price = (self.beside.0.len().max(1) as f64).ln();
-        let form = self.beside.1.iter().find(|form| form.log - price > STRONG && !refused.contains(&form.place))?;
+        let price = (self.beside.logs.len().max(1) as f64).ln();
+        let form = self.beside.best.iter().find(|form| form.log - price > STRONG && !refused.contains(&form.place))?;
         let case = self.case();
-        let [open, listed] = case.priors(self.beside.0.len());
+        let [open, listed] = case.priors(self.beside.logs.len());
         let laws = case.listed(&[], &self.whole);
         let law = laws.into_iter().max_by(|a, b| a.log.total_cmp(&b.log)).filter(|law| law.log + listed > form.log + open);
         let named = law.and_then(|law| {

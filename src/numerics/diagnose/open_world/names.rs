@@ -48,11 +48,16 @@ pub(super) struct ContestedName {
     pub named: Option<usize>,
 }
 
+/// What the free forms of all places say beside a state.
+pub(super) struct SurveyedPlaces {
+    /// ln of the evidence of each place's.
+    pub logs: Vec<(Place, f64)>,
+    /// The best ones with their terms, best first.
+    pub best: Vec<FreeForm>,
+}
+
 /// Free forms of all places beside some states: of each state the evidence by place, and the best ones with their terms.
-pub(super) fn survey_places(
-    states: &[(KnownCauses, Option<Place>)],
-    around: &AroundGroups,
-) -> Vec<(Vec<(Place, f64)>, Vec<FreeForm>)> {
+pub(super) fn survey_places(states: &[(KnownCauses, Option<Place>)], around: &AroundGroups) -> Vec<SurveyedPlaces> {
     let all = places(around.survey);
     let firsts: Vec<Vec<f64>> = all
         .par_iter()
@@ -83,7 +88,8 @@ pub(super) fn survey_places(
             let mut own: Vec<FreeForm> = forms.iter().filter(|(of, _)| *of == s).map(|(_, form)| form.clone()).collect();
             own.sort_by(|a, b| b.log.total_cmp(&a.log));
             let log = |p: usize| own.iter().find(|form| form.place == all[p]).map_or(firsts[p][s], |form| form.log);
-            ((0..all.len()).map(|p| (all[p], log(p))).collect(), own)
+            let logs = (0..all.len()).map(|p| (all[p], log(p))).collect();
+            SurveyedPlaces { logs, best: own }
         })
         .collect()
 }
@@ -111,8 +117,8 @@ impl NameCase<'_, '_, '_, '_> {
         &self,
         named: &NamedFinding,
         rest: &KnownCauses,
-        instead: &(Vec<(Place, f64)>, Vec<FreeForm>),
-        beside: &(Vec<(Place, f64)>, Vec<FreeForm>),
+        instead: &SurveyedPlaces,
+        beside: &SurveyedPlaces,
     ) -> ContestedName {
         let (effect, place) = named.key;
         let frame = self.around.frame;
@@ -124,12 +130,12 @@ impl NameCase<'_, '_, '_, '_> {
             self.evidence_of(rest, &picked, &variances)
         };
         let price = |members: &[usize]| -> f64 { members.iter().map(|i| self.price(set[*i])).sum() };
-        let [open, listed] = self.priors(instead.0.len());
+        let [open, listed] = self.priors(instead.logs.len());
         let is_named = effect != Unknown::NAME && self.around.without.iter().all(|name| name != effect);
         let mine = listed + own.log - price(&named.members);
-        let best_beside = beside.1.first();
+        let best_beside = beside.best.first();
         let more = |form: &FreeForm| form.gain / (form.gain + own.gain).max(f64::MIN_POSITIVE);
-        let refined = beside.1.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
+        let refined = beside.best.iter().find(|form| form.place == place && more(form) < FINER && form.log > 0.0);
         let mut names: Vec<(Place, f64)> = Vec::new();
         if is_named {
             names.push((place, mine));
@@ -137,7 +143,7 @@ impl NameCase<'_, '_, '_, '_> {
         }
         let rivals = self.listed(&named.members, rest);
         names.extend(rivals.iter().filter(|rival| rival.key != named.key).map(|rival| (rival.key.1, rival.log + listed)));
-        let mut free: Vec<(Place, f64)> = instead.0.iter().map(|(place, log)| (*place, open + log)).collect();
+        let mut free: Vec<(Place, f64)> = instead.logs.iter().map(|(place, log)| (*place, open + log)).collect();
         if !is_named {
             free.push((place, open + own.log - price(&named.members)));
         } else if let Some(form) = best_beside.filter(|form| form.log > 0.0 && more(form) >= FINER) {
@@ -153,7 +159,7 @@ impl NameCase<'_, '_, '_, '_> {
             log: own.log,
             share: best_beside.map_or(1.0, |form| 1.0 - more(form)),
         };
-        let alternative = instead.1.first().filter(|form| !form.terms.is_empty());
+        let alternative = instead.best.first().filter(|form| !form.terms.is_empty());
         let with_more = own.log + best_beside.map_or(0.0, |form| form.log.max(0.0));
         let instead = alternative.filter(|form| is_named && odds.none > 0.5 && form.log > with_more + CLEARLY).cloned();
         let best = rivals.iter().max_by(|a, b| a.log.total_cmp(&b.log));

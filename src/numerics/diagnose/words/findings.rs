@@ -30,7 +30,7 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     let whole = Whole { solution: last.pool.solve(&set), bic: last.pool.bic(&set), set };
     let groups = groups(state, &last.judged.set, last.pool, last.survey);
     let own = |members: &Vec<usize>| members.iter().map(|i| last.judged.set[*i]).collect();
-    last.pool.leave_out(&whole.set, &groups.iter().map(|(_, members)| own(members)).collect());
+    last.pool.leave_out(&whole.set, &groups.values().map(own).collect());
     let judged = |(key, members): (FindingKey, Vec<usize>)| {
         let mut own = finding(last, &whole, key, &members);
         if let Some(odds) = last.odds.get(&key) {
