@@ -125,7 +125,7 @@ fn without_small_rests(findings: Vec<Finding>) -> (Vec<Finding>, Vec<Finding>) {
 /// What has no name explains nothing where it is more than this share of what was found.
 const NAMELESS: f64 = 0.1;
 
-/// The share of findings without a name in what all findings gain.
+/// The share, in what all findings gain, of those without a name or with one that is more probably wrong.
 fn nameless_share(findings: &[Finding]) -> f64 {
     let gains = |of: &dyn Fn(&Finding) -> bool| -> f64 {
         findings
@@ -135,7 +135,8 @@ fn nameless_share(findings: &[Finding]) -> f64 {
             .map(|e| e.gain)
             .sum()
     };
-    gains(&|finding| finding.effect == Unknown::NAME) / gains(&|_| true).max(f64::MIN_POSITIVE)
+    let unnamed = |finding: &Finding| finding.effect == Unknown::NAME || finding.probabilities.none > 0.5;
+    gains(&unnamed) / gains(&|_| true).max(f64::MIN_POSITIVE)
 }
 
 /// Whether something was found, and none of it has a name.

@@ -56,15 +56,17 @@ pub(super) fn findings(last: &LastRound) -> Vec<Finding> {
     out
 }
 
-/// What is more probably none of the list than what it is called loses its name, which becomes a rival; the size of what has no law is told by
-/// the evidence of its free form.
+/// That none of the list is right, above which a name is rejected; below, it stands with a probability that says how little it is confirmed.
+const REJECTED: f64 = 0.95;
+
+/// What has a rejected name is unknown, and the name becomes a rival; the size of what has no law is told by the evidence of its free form.
 fn unnamed(finding: &mut Finding, odds: &NameOdds) {
     let has_no_law = finding.has_no_law();
     if let Some(evidence) = finding.evidence.as_mut().filter(|_| has_no_law) {
         evidence.delta_bic = 2.0 * odds.log;
     }
     let Probabilities { name, place, none } = finding.probabilities;
-    if finding.effect == Unknown::NAME || none <= 0.5 {
+    if finding.effect == Unknown::NAME || none <= REJECTED {
         return;
     }
     finding.statement = none_of_the_list(finding.place, &finding.statement, none, odds.share);
