@@ -185,6 +185,8 @@ fn abscissa(
             | Variable::Push { joint, .. }
             | Variable::Velocity { joint }
             | Variable::Slip { joint, .. }
+            | Variable::Stretch { joint, .. }
+            | Variable::Recent { joint, .. }
             | Variable::Work { joint, .. },
         ) => position(joint),
         // Links and the base bend with the load of the shoulder.

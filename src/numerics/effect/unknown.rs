@@ -250,6 +250,11 @@ impl Cause for Unknown {
     fn variant(&self, term: &Term) -> String {
         let label = |of: &Variable| match of {
             Variable::Gravity { axis: Some(axis) } => format!("gravity_{}", ["x", "y", "z"][*axis]),
+            Variable::Stretch { joint, .. } => format!("stretch_{}", joint + 1),
+            Variable::Recent { joint, .. } => format!("recent_{}", joint + 1),
+            Variable::Position { along } | Variable::Sighted { along } => {
+                format!("position_{}", along.map(|value| format!("{:.0}", 100.0 * value)).join("_"))
+            }
             of => of.to_string().replace(' ', "_"),
         };
         let names: Vec<String> = term.law().variables().iter().map(label).collect();

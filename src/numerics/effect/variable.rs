@@ -1,7 +1,8 @@
 //! What a row of a recording offers that an error may depend on.
 
-use super::ArmState;
+use super::{ArmState, figure};
 use crate::robot::{Memory, RobotModel};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -81,6 +82,30 @@ pub enum Variable {
         /// rad or m.
         travel: f64,
     },
+    /// How far what sticks beside a joint is stretched by its travel until it slips at a limit (rad or m), rad or m.
+    Stretch {
+        /// From 0.
+        joint: usize,
+        /// rad or m.
+        limit: f64,
+    },
+    /// Travel of a joint of late (rad or m), which fades with a time (s).
+    Recent {
+        /// From 0.
+        joint: usize,
+        /// s.
+        time: f64,
+    },
+    /// Where the tool is along a direction of the base frame, m.
+    Position {
+        /// Unit vector.
+        along: [f64; 3],
+    },
+    /// Where the target is along a direction of the instrument's frame, m.
+    Sighted {
+        /// Unit vector.
+        along: [f64; 3],
+    },
     /// How fast a joint has moved of late (rad/s or m/s), forgotten with a cooling time (s).
     Work {
         /// From 0.
@@ -120,6 +145,10 @@ impl Variable {
             Self::Elevation => Some(state.sight().elevation),
             Self::Range => Some(state.sight().range),
             Self::Slip { joint, travel } => Some(state.memory(Memory::Slip { joint, travel })),
+            Self::Stretch { joint, limit } => Some(state.memory(Memory::Stretch { joint, limit })),
+            Self::Recent { joint, time } => Some(state.memory(Memory::Recent { joint, time })),
+            Self::Position { along } => Some(Vector3::from(along).dot(&state.posture.tool(robot))),
+            Self::Sighted { along } => Some(Vector3::from(along).dot(&state.point)),
             Self::Work { joint, cooling } => Some(state.memory(Memory::Work { joint, cooling })),
             Self::Lagging { lag } => state.temperature().map(|_| state.memory(Memory::Temperature { lag })),
             Self::ArmLoad | Self::LastMove | Self::Speed => None,
@@ -128,12 +157,13 @@ impl Variable {
 
     /// Whether its value needs to know how the arm hangs.
     pub(super) fn needs_torque(self) -> bool {
-        matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad)
+        matches!(self, Self::Load { .. } | Self::Push { .. } | Self::Gravity { .. } | Self::ArmLoad | Self::Position { .. })
     }
 
     /// Whether it follows from the way to the row, which nobody knows for the first one.
     pub fn follows_the_way(self) -> bool {
-        matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove | Self::Slip { .. })
+        let last = matches!(self, Self::Push { .. } | Self::Approach { .. } | Self::Move { .. } | Self::LastMove);
+        last || matches!(self, Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. })
     }
 }
 
@@ -158,8 +188,22 @@ impl fmt::Display for Variable {
             Self::Elevation => f.write_str("elevation"),
             Self::Range => f.write_str("range"),
             Self::Slip { joint, .. } => write!(f, "travel of joint {} since it reversed", joint + 1),
+            Self::Stretch { joint, limit } => {
+                write!(f, "travel of joint {} that sticks up to {} deg", joint + 1, degrees(*limit))
+            }
+            Self::Recent { joint, time } => write!(f, "travel of joint {} in the last {time:.0} s", joint + 1),
+            Self::Position { along } => write!(f, "position of the tool along {}", arrow(along)),
+            Self::Sighted { along } => write!(f, "position of the target along {} of the instrument", arrow(along)),
             Self::Work { joint, .. } => write!(f, "work of joint {}", joint + 1),
             Self::Lagging { .. } => f.write_str("lagging temperature"),
         }
     }
+}
+
+fn degrees(limit: f64) -> String {
+    figure(limit.to_degrees(), 1)
+}
+
+fn arrow([x, y, z]: &[f64; 3]) -> String {
+    format!("({x:.2}, {y:.2}, {z:.2})")
 }

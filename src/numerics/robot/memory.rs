@@ -14,6 +14,20 @@ pub enum Memory {
         /// rad or m.
         travel: f64,
     },
+    /// How far what sticks beside a joint is stretched by its travel, until it slips at a limit (rad or m): a stop of Prandtl's.
+    Stretch {
+        /// From 0.
+        joint: usize,
+        /// rad or m.
+        limit: f64,
+    },
+    /// Travel of a joint of late (rad or m), which fades with a time (s), as what is viscous yields.
+    Recent {
+        /// From 0.
+        joint: usize,
+        /// s.
+        time: f64,
+    },
     /// Speed of a joint of late (rad/s or m/s), forgotten with a cooling time (s).
     Work {
         /// From 0.
@@ -34,6 +48,8 @@ impl Memory {
             Self::Slip { joint, travel } => (0, joint, travel.to_bits()),
             Self::Work { joint, cooling } => (1, joint, cooling.to_bits()),
             Self::Temperature { lag } => (2, 0, lag.to_bits()),
+            Self::Stretch { joint, limit } => (3, joint, limit.to_bits()),
+            Self::Recent { joint, time } => (4, joint, time.to_bits()),
         }
     }
 
@@ -44,7 +60,7 @@ impl Memory {
             _ if data.rows() == 0 => 0.0,
             Self::Temperature { .. } => data.temperature(data.at_place(0)).unwrap_or(0.0),
             Self::Slip { joint, .. } => data.recorded_direction(data.at_place(0), joint).unwrap_or(0.0),
-            Self::Work { .. } => 0.0,
+            Self::Work { .. } | Self::Stretch { .. } | Self::Recent { .. } => 0.0,
         };
         for place in 0..data.rows() {
             let row = data.at_place(place);
@@ -70,6 +86,12 @@ impl Memory {
                     _ => moved.signum() + (state - moved.signum()) * libm::exp(-moved.abs() / travel),
                 }
             }
+            Self::Stretch { joint, limit } => match (moved(joint), data.recorded_direction(to, joint)) {
+                // It came from elsewhere than the row before, far enough to slip.
+                (moved, Some(side)) if side * moved < 0.0 => side * limit,
+                (moved, _) => (state + moved).clamp(-limit, limit),
+            },
+            Self::Recent { joint, time: fades } => state * libm::exp(-time / fades) + moved(joint),
             Self::Work { .. } | Self::Temperature { .. } if time == 0.0 => state,
             Self::Work { joint, cooling } => {
                 let left = libm::exp(-time / cooling);

@@ -135,6 +135,12 @@ impl Posture {
         gravity.try_normalize(0.0)
     }
 
+    /// Where the tool is in the base frame, m.
+    pub fn tool(&self, robot: &RobotModel) -> Vector3<f64> {
+        let point = self.behind[robot.joints()].point(&robot.home().translation);
+        self.behind[0].inverse().point(&point)
+    }
+
     /// Moment (Nm) of all beyond station `station` about `point` (m), both in the station's zero-pose axes.
     pub fn moment(&self, station: usize, point: &Vector3<f64>) -> Vector3<f64> {
         let frame = &self.behind[station];

@@ -38,6 +38,8 @@ impl Dependence {
             | Variable::Move { joint }
             | Variable::Velocity { joint }
             | Variable::Slip { joint, .. }
+            | Variable::Stretch { joint, .. }
+            | Variable::Recent { joint, .. }
             | Variable::Work { joint, .. } => self.joints[joint] = true,
             // How an arm hangs follows from all of its joints.
             Variable::Load { .. } | Variable::Push { .. } | Variable::ArmLoad => {
@@ -50,6 +52,8 @@ impl Dependence {
             Variable::Gravity { .. }
             | Variable::LastMove
             | Variable::Speed
+            | Variable::Position { .. }
+            | Variable::Sighted { .. }
             | Variable::Azimuth
             | Variable::Elevation
             | Variable::Range => self.joints.fill(true),

@@ -2,7 +2,7 @@
 
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
 use super::frame::{ProjectedColumns, ProjectedRows, dense, product};
-use super::groups::{FreeGroup, GroupColumns, name_of};
+use super::groups::{FreeGroup, GroupColumns};
 use super::state::KnownCauses;
 use crate::effect::{Place, Survey};
 use faer::{Mat, MatRef};
@@ -12,6 +12,8 @@ use nalgebra::DMatrix;
 const GROUPS: usize = 4;
 /// ln of the evidence by which a further group must pay for itself, beyond the price of its choice.
 const PAYS: f64 = 1.0;
+/// How often the number of a group's variable is halved in its step.
+const LEVELS: i32 = 4;
 /// Groups whose shorter lengths are looked at.
 const CLOSER: usize = 10;
 
@@ -29,6 +31,8 @@ pub(super) struct FreeForm {
     pub place: Place,
     /// ln of its evidence over that of the state that it is beside; the choice among groups is in it.
     pub log: f64,
+    /// The same of what is in no list, whatever the joints' own curves say.
+    pub open: f64,
     pub terms: Vec<FreeTerm>,
     /// By how much the squared residual, over the noise, falls with it.
     pub gain: f64,
@@ -38,6 +42,8 @@ pub(super) struct FreeForm {
 pub(super) struct PlaceGroups {
     pub place: Place,
     groups: Vec<FreeGroup>,
+    /// Which of them the list has.
+    laws: Vec<bool>,
     blocks: Vec<ProjectedColumns>,
     variances: Vec<Vec<Vec<f64>>>,
     /// GroupProducts of the columns of the model's causes with those of each.
@@ -58,16 +64,20 @@ impl PlaceGroups {
     pub fn of(place: Place, around: &AroundGroups) -> Self {
         let mut columns = GroupColumns::new(around.frame);
         let all = columns.of(place, around.survey);
-        let mut out = Self { place, groups: Vec::new(), blocks: Vec::new(), variances: Vec::new(), known: Vec::new() };
+        let (groups, laws, blocks, variances, known) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut out = Self { place, groups, laws, blocks, variances, known };
         out.take(all, &mut columns, around);
         out
     }
 
     fn take(&mut self, groups: Vec<FreeGroup>, columns: &mut GroupColumns, around: &AroundGroups) {
-        let is_listed = |group: &FreeGroup| name_of(group).is_some_and(|name| around.without.iter().all(|out| out != name));
-        let free: Vec<FreeGroup> = groups.into_iter().filter(|group| !is_listed(group)).collect();
-        for group in free {
+        for group in groups {
+            let is_law = group.is_listed(around.without);
+            if is_law && !group.is_gear() {
+                continue;
+            }
             let Some(block) = columns.block(&group) else { continue };
+            self.laws.push(is_law);
             self.known.push(dense(product(around.causes, block.columns.as_ref()).as_ref()));
             self.variances.push(group.variances(&block));
             self.groups.push(group);
@@ -96,26 +106,72 @@ impl PlaceGroups {
         out
     }
 
+    /// The evidence of a group with its lengths mixed, and the best of them.
+    fn closest(&self, g: usize, state: &KnownCauses) -> (GroupEvidence, usize) {
+        let seen = state.beside(&self.blocks[g], &self.known[g]);
+        let all: Vec<GroupEvidence> =
+            self.variances[g].iter().map(|variances| evidence(&seen.gram, &seen.gradient, variances)).collect();
+        let best = (0..all.len()).max_by(|a, b| all[*a].log.total_cmp(&all[*b].log)).unwrap_or(0);
+        (GroupEvidence { log: log_mean(&all.iter().map(|one| one.log).collect::<Vec<_>>()), ..all[best] }, best)
+    }
+
+    /// Moves the number of a group's variable to where its evidence is largest.
+    fn refine(&mut self, g: usize, mut log: f64, state: &KnownCauses, columns: &mut GroupColumns, around: &AroundGroups) {
+        for level in 0..LEVELS {
+            let first = self.groups.len();
+            let near = columns.near(&self.groups[g], level);
+            self.take(near, columns, around);
+            let tried = (first..self.groups.len()).map(|other| (other, self.closest(other, state).0.log));
+            let best = tried.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, other)| *other > log);
+            if let Some((other, better)) = best {
+                log = better;
+                self.swap(g, other);
+            }
+            self.truncate(first);
+        }
+    }
+
+    fn swap(&mut self, g: usize, other: usize) {
+        self.groups.swap(g, other);
+        self.laws.swap(g, other);
+        self.blocks.swap(g, other);
+        self.variances.swap(g, other);
+        self.known.swap(g, other);
+    }
+
+    fn truncate(&mut self, count: usize) {
+        self.groups.truncate(count);
+        self.laws.truncate(count);
+        self.blocks.truncate(count);
+        self.variances.truncate(count);
+        self.known.truncate(count);
+    }
+
     /// The price of a group's choice: all motions and variables alike, and within a motion that steps all times.
     fn price(&self, g: usize) -> f64 {
         let choices: f64 = self.groups.iter().map(|group| 1.0 / group.of as f64).sum();
         choices.max(1.0).ln() + (self.groups[g].of as f64).ln()
     }
 
-    /// ln of the evidence of all groups as alternatives, each with its price; none whose amplitude no arm can have.
-    fn alternatives(&self, scan: &[(GroupEvidence, usize)]) -> f64 {
-        let sound = scan.iter().enumerate().filter(|(_, (found, _))| !found.is_off_the_grid());
-        log_sum(&sound.map(|(g, (found, _))| found.log - self.price(g)).collect::<Vec<_>>())
+    /// ln of the evidence of all groups as alternatives, each with its price, and of those that no list has; none whose amplitude no arm
+    /// can have.
+    fn alternatives(&self, scan: &[(GroupEvidence, usize)]) -> [f64; 2] {
+        let sound = |g: &usize| !scan[*g].0.is_off_the_grid();
+        let paid = |g: usize| scan[g].0.log - self.price(g);
+        let all = (0..scan.len()).filter(sound).map(paid).collect::<Vec<_>>();
+        let open = (0..scan.len()).filter(sound).filter(|g| !self.laws[*g]).map(paid).collect::<Vec<_>>();
+        [log_sum(&all), log_sum(&open)]
     }
 
     /// The same beside a state.
-    pub fn first(&self, state: &KnownCauses) -> f64 {
+    pub fn first(&self, state: &KnownCauses) -> [f64; 2] {
         self.alternatives(&self.scan(state))
     }
 
     /// The free form beside a state.
     pub fn greedy(&mut self, state: &KnownCauses, around: &AroundGroups) -> FreeForm {
-        let (mut now, mut log, mut terms) = (state.clone(), f64::NEG_INFINITY, Vec::new());
+        let (mut now, mut terms) = (state.clone(), Vec::new());
+        let (mut log, mut open) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         let mut columns = GroupColumns::new(around.frame);
         for step in 0..GROUPS {
             let scan = self.scan(&now);
@@ -123,7 +179,7 @@ impl PlaceGroups {
             let sound = (0..scan.len()).filter(|g| !scan[*g].0.is_off_the_grid());
             let Some(best) = sound.max_by(|a, b| paid(*a).total_cmp(&paid(*b))) else { break };
             if step == 0 {
-                log = self.alternatives(&scan);
+                [log, open] = self.alternatives(&scan);
                 if paid(best) < 0.0 {
                     break;
                 }
@@ -131,8 +187,10 @@ impl PlaceGroups {
                 break;
             } else {
                 log += paid(best);
+                open += paid(best);
             }
-            let (found, length) = scan[best];
+            self.refine(best, scan[best].0.log, &now, &mut columns, around);
+            let (found, length) = self.closest(best, &now);
             let square = found.amplitude * found.amplitude;
             let variances: Vec<f64> = self.variances[best][length].iter().map(|variance| variance * square).collect();
             now = now.with(around.frame, self.blocks[best].columns.as_ref(), &variances);
@@ -143,7 +201,7 @@ impl PlaceGroups {
                 self.take(products, &mut columns, around);
             }
         }
-        FreeForm { place: self.place, log, terms, gain: now.gain() - state.gain() }
+        FreeForm { place: self.place, log, open, terms, gain: now.gain() - state.gain() }
     }
 }
 

@@ -1,13 +1,13 @@
 //! The groups of the free form of a place: one motion there, smooth over one variable of the recording, or stepping once.
 
 use super::frame::{ProjectedColumns, ProjectedRows};
-use crate::effect::{Axes, Basis, Hypothesis, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use crate::effect::{Axes, Basis, Hypothesis, JointTable, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable};
+use nalgebra::Vector3;
 use std::f64::consts::PI;
 
 /// Correlation lengths of smooth functions, shares of their variable's range.
 const LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02];
-/// Cosines of the travel of a joint over its own angle, where gears turn; over another motion's own angle and over time; and over what
-/// else there is.
+/// Cosines of the turn of a joint over its own angle as gears make it; over a motion's own angle and over time; and over what else there is.
 const FINEST: usize = 48;
 const FINE: usize = 16;
 const COARSE: usize = 8;
@@ -19,6 +19,25 @@ const MARGIN: f64 = 0.1;
 const LEVELS: usize = 3;
 /// Steps in time that are tried.
 const STEPS: usize = 40;
+/// Directions of the tool's position that are tried: axes, diagonals of faces and of the cube.
+const ARROWS: [[i8; 3]; 13] = [
+    [1, 0, 0],
+    [0, 1, 0],
+    [0, 0, 1],
+    [1, 1, 0],
+    [1, -1, 0],
+    [1, 0, 1],
+    [1, 0, -1],
+    [0, 1, 1],
+    [0, 1, -1],
+    [1, 1, 1],
+    [1, 1, -1],
+    [1, -1, 1],
+    [-1, 1, 1],
+];
+/// Limits at which what sticks slips, shares of a joint's range, and times (s) in which a travel fades.
+const LIMITS: [f64; 3] = [0.07, 0.14, 0.28];
+const FADING: [f64; 3] = [15.0, 35.0, 80.0];
 /// Shorter links (m) have no free form of their own.
 const SHORT: f64 = 1e-3;
 
@@ -36,9 +55,23 @@ impl FreeGroup {
         self.motion.place()
     }
 
-    /// As what may join the model: a law without a name.
-    pub fn hypothesis(&self) -> Hypothesis {
+    /// As what may join the model: a law without a name, or the curve of a joint, where the list has that.
+    pub fn hypothesis(&self, without: &[String]) -> Hypothesis {
+        if self.is_gear() && self.is_listed(without) {
+            return Hypothesis::new(Term::new(&JointTable, self.motion, self.law), 1);
+        }
         Hypothesis::new(Term::new(&Unknown, self.motion, self.law), 1)
+    }
+
+    /// Whether it is the turn of a joint over its own angle as finely as gears make it.
+    pub fn is_gear(&self) -> bool {
+        let fine = self.law.times.is_none() && self.law.first.basis.count() >= FINEST;
+        matches!((self.motion, self.law.first.of), (Motion::Joint { joint }, Variable::Angle { joint: own }) if fine && own == joint)
+    }
+
+    /// Whether it is a law of the list, some names left out: no free form then.
+    pub fn is_listed(&self, without: &[String]) -> bool {
+        name_of(self).is_some_and(|name| without.iter().all(|out| out != name))
     }
 
     /// Prior variances of its functions, one list a length.
@@ -149,7 +182,7 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         for (motion, variables) in motions(place, survey) {
             for (of, count) in variables {
                 if let Some(basis) = self.basis(of, count) {
-                    out.push(FreeGroup { motion, law: Law::new(of, basis), of: 1 });
+                    out.push(FreeGroup { motion, law: Law::new(of, basis), of: alike(of) });
                 }
             }
             if steps(motion) {
@@ -162,21 +195,67 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
         out
     }
 
+    /// Groups like one whose variable has a number of its own, with others around it, closer with every level.
+    pub fn near(&mut self, group: &FreeGroup, level: i32) -> Vec<FreeGroup> {
+        if group.law.times.is_some() {
+            return Vec::new();
+        }
+        let step = libm::exp2(-f64::from(level));
+        let factors = [libm::exp2(0.5 * step), libm::exp2(-0.5 * step)];
+        let variables: Vec<Variable> = match group.law.first.of {
+            Variable::Position { along } => {
+                arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Position { along }).collect()
+            }
+            Variable::Sighted { along } => {
+                arrows_near(along, 0.3 * step).into_iter().map(|along| Variable::Sighted { along }).collect()
+            }
+            Variable::Stretch { joint, limit } => factors.map(|by| Variable::Stretch { joint, limit: limit * by }).to_vec(),
+            Variable::Recent { joint, time } => factors.map(|by| Variable::Recent { joint, time: time * by }).to_vec(),
+            _ => Vec::new(),
+        };
+        let one = |of: Variable| Some(FreeGroup { law: Law::new(of, self.basis(of, FINE)?), ..*group });
+        variables.into_iter().filter_map(one).collect()
+    }
+
     /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
     pub fn products(&mut self, group: &FreeGroup, survey: &Survey) -> Vec<FreeGroup> {
-        if group.law.times.is_some() || group.of > 1 {
+        if group.law.times.is_some() || matches!(group.law.first.basis, Basis::After { .. }) {
             return Vec::new();
         }
         let of = group.law.first.of;
         let Some(first) = self.basis(of, EACH) else { return Vec::new() };
         let all = motions(group.place(), survey);
         let others = all.into_iter().filter(|(motion, _)| *motion == group.motion).flat_map(|(_, variables)| variables);
-        let product = |(other, _): (Variable, usize)| {
-            let second = self.basis(other, EACH).filter(|_| other != of)?;
+        let product = |(other, count): (Variable, usize)| {
+            let second = self.basis(other, EACH).filter(|_| other != of && count < FINEST)?;
             Some(FreeGroup { law: Law::new(of, first).times(other, second), ..*group })
         };
         others.filter_map(product).collect()
     }
+}
+
+/// How many variables like this one are tried, one choice together.
+fn alike(of: Variable) -> usize {
+    match of {
+        Variable::Position { .. } | Variable::Sighted { .. } => ARROWS.len(),
+        Variable::Stretch { .. } => LIMITS.len(),
+        Variable::Recent { .. } => FADING.len(),
+        _ => 1,
+    }
+}
+
+/// Directions of the tool's position.
+fn arrows() -> impl Iterator<Item = [f64; 3]> {
+    ARROWS.iter().map(|arrow| Vector3::from(*arrow).map(f64::from).normalize().into())
+}
+
+/// Unit vectors off one by an angle, across it.
+fn arrows_near(along: [f64; 3], angle: f64) -> Vec<[f64; 3]> {
+    let along = Vector3::from(along);
+    let least = Vector3::ith(along.iamin(), 1.0);
+    let across = along.cross(&least).normalize();
+    let sides = [across, along.cross(&across)];
+    sides.iter().flat_map(|side| [1.0, -1.0].map(|sign| (along + side * (sign * libm::tan(angle))).normalize().into())).collect()
 }
 
 /// Whether what moves so may step at a time.
@@ -204,12 +283,21 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
     let passing = || [(Variable::Time, FINE), (Variable::Temperature, COARSE), (Variable::Payload, COARSE)].into_iter();
     let sides = || (0..joints).map(|joint| (Variable::Approach { joint }, 1));
     let load = |joint: usize| (joint < joints && survey.is_loaded(joint)).then_some((Variable::Load { joint }, COARSE));
-    let moved = |joint: usize| (Variable::Move { joint }, COARSE);
+    // What a joint's travel leaves behind.
+    let moved = |joint: usize| {
+        let sticks = LIMITS.map(|share| Variable::Stretch { joint, limit: share * survey.travel(joint) });
+        let fades = FADING.map(|time| Variable::Recent { joint, time });
+        let clocked = survey.data.has_clock();
+        let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
+        all.map(|of| (of, COARSE))
+    };
+    let space = || arrows().map(|along| (Variable::Position { along }, COARSE));
     match place {
         Place::Joint(joint) => {
-            let own: Vec<_> = angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain([moved(joint)]).collect();
-            let finest = own.iter().map(|(of, count)| (*of, if *of == (Variable::Angle { joint }) { FINEST } else { *count }));
-            let mut out = vec![(Motion::Joint { joint }, finest.collect())];
+            let own: Vec<_> =
+                angles(joint).chain(passing()).chain(sides()).chain(load(joint)).chain(moved(joint)).chain(space()).collect();
+            let finest = (Variable::Angle { joint }, FINEST);
+            let mut out = vec![(Motion::Joint { joint }, own.iter().copied().chain([finest]).collect::<Vec<_>>())];
             if survey.robot.is_revolute(joint) {
                 out.push((Motion::Axis { joint, about: None, turning: false }, own.clone()));
                 out.push((Motion::Slide { joint, along: true }, own.clone()));
@@ -218,33 +306,38 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
             out
         }
         Place::Links(link, _) => {
-            let own: Vec<_> = angles(joints).chain(passing()).chain(sides()).chain(load(link)).chain(load(link + 1)).collect();
+            let loads = load(link).into_iter().chain(load(link + 1));
+            let own: Vec<_> =
+                angles(joints).chain(passing()).chain(sides()).chain(loads).chain(moved(link)).chain(space()).collect();
             vec![(Motion::Links { first: link, last: link }, own.clone()), (Motion::Bend { link }, own)]
         }
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, FINE));
-            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).collect();
+            let space = arrows().map(|along| (Variable::Sighted { along }, COARSE));
+            let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
         Place::Tool => {
             let gravity = (0..3).map(|axis| (Variable::Gravity { axis: Some(axis) }, COARSE));
             let last = joints.saturating_sub(1);
-            let own: Vec<_> = angles(last).chain(passing()).chain(sides()).chain(gravity).chain([moved(last)]).collect();
+            let own: Vec<_> =
+                angles(last).chain(passing()).chain(sides()).chain(gravity).chain(moved(last)).chain(space()).collect();
             vec![(Motion::Tool { axes: Axes::Place }, own)]
         }
         _ => {
             let loads = (0..joints.min(3)).filter_map(load);
-            let own: Vec<_> = angles(0).chain(passing()).chain(sides()).chain(loads).chain([moved(0)]).collect();
+            let own: Vec<_> = angles(0).chain(passing()).chain(sides()).chain(loads).chain(moved(0)).chain(space()).collect();
             [Axes::Place, Axes::Rotation].map(|axes| (Motion::Base { axes }, own.clone())).to_vec()
         }
     }
 }
 
 /// The cause of the list that a group of the free form is: while it is in the list, the group is that law and no free form.
-pub(super) fn name_of(group: &FreeGroup) -> Option<&'static str> {
+fn name_of(group: &FreeGroup) -> Option<&'static str> {
     let first = group.law.first;
     match (group.motion, first.of, group.law.times) {
         (Motion::Joint { joint }, Variable::Approach { joint: by }, None) if by == joint => Some("backlash"),
+        _ if group.is_gear() => Some(JointTable::NAME),
         (Motion::Joint { .. }, Variable::Time, None) if group.of > 1 => Some("zero_shift"),
         (Motion::Base { .. }, Variable::Time, None) if group.of > 1 => Some("base_shift"),
         (Motion::Tool { .. }, Variable::Time, None) if group.of > 1 => Some("tool_shift"),

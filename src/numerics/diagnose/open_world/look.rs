@@ -2,14 +2,14 @@
 
 use super::frame::{ProjectedColumns, ProjectedRows};
 use super::free_form::{AroundGroups, FreeForm, side_by_side};
-use super::names::{ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, survey_places};
+use super::names::{ContestedName, NameCase, NamedFinding, SurveyedPlaces, fitted_variances, survey_places, unit_variances};
 use super::state::KnownCauses;
 use super::step::{ModelChange, ModelStep};
 use crate::diagnose::judge::JudgedCauses;
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
 use crate::diagnose::words::{FindingGroups, FindingKey, groups};
-use crate::effect::{Effect, Place, Survey};
+use crate::effect::{Effect, GearCyclic, JointTable, Place, Survey};
 use faer::Mat;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -147,10 +147,16 @@ impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     /// The odds of every finding.
     pub fn contested(&self) -> BTreeMap<FindingKey, ContestedName> {
         let blocks = &self.sight.blocks;
-        let size = |i: usize, of: usize| 1.0 / (of as f64 * blocks[i].square.iter().sum::<f64>()).max(f64::MIN_POSITIVE);
-        let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| {
-            let own = members.iter().flat_map(|i| self.sight.ranges[*i].clone().map(|k| (k, size(*i, members.len()))));
-            NamedFinding { key: *key, members: members.clone(), own: own.collect() }
+        let causes = &self.sight.judged.state.causes;
+        let own = |i: usize, of: usize| {
+            let sizes = unit_variances(&causes[i], &blocks[i].square);
+            self.sight.ranges[i].clone().zip(sizes.into_iter().map(move |variance| variance / of as f64))
+        };
+        let named = |(key, members): (&FindingKey, &'_ Vec<usize>)| NamedFinding {
+            key: *key,
+            members: members.clone(),
+            is_of_gears: members.iter().all(|i| causes[*i].form.is(&GearCyclic) || causes[*i].form.is(&JointTable)),
+            own: members.iter().flat_map(|i| own(*i, members.len())).collect(),
         };
         let named: Vec<NamedFinding> = self.findings.iter().map(named).collect();
         let rest = |own: &NamedFinding| (self.sight.state(&|i| !own.members.contains(&i), self.scale), Some(own.key.1));

@@ -39,7 +39,8 @@ impl ModelChange<'_, '_> {
 
     /// With a free form, or nothing.
     pub fn free(&self, terms: &[FreeTerm], sentence: String) -> Option<ModelStep> {
-        let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis()).collect();
+        let without = self.fitter.question.without;
+        let new: Vec<Hypothesis> = terms.iter().map(|term| term.group.hypothesis(without)).collect();
         let prior = |variance: &f64| Prior { mean: 0.0, sigma: variance.sqrt() };
         let cause = |(hypothesis, term): (&Hypothesis, &FreeTerm)| EstimatedCause {
             form: hypothesis.form.clone(),
