@@ -144,6 +144,25 @@ mod tests {
     }
 
     #[test]
+    fn what_sticks_is_stretched_to_its_limit_and_relaxes_only_by_the_way_back() {
+        let data = recording(&[0.0, 0.2, 1.0, 0.9, 0.9, 0.0], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0], &[20.0; 6]);
+        let stretch = |row| data.memory(Memory::Stretch { joint: 0, limit: 0.3 }, row);
+        for (row, expected) in [0.0, 0.2, 0.3, 0.2, 0.2, -0.3].into_iter().enumerate() {
+            assert!((stretch(row) - expected).abs() < 1e-12, "{row}: {} {expected}", stretch(row));
+        }
+    }
+
+    #[test]
+    fn travel_of_late_fades_with_time() {
+        let data = recording(&[0.0, 1.0, 1.0, 0.5], &[0.0, 1.0, 11.0, 21.0], &[20.0; 4]);
+        let recent = |row| data.memory(Memory::Recent { joint: 0, time: 10.0 }, row);
+        let expected = [0.0, 1.0, (-1.0f64).exp(), (-2.0f64).exp() - 0.5];
+        for (row, expected) in expected.into_iter().enumerate() {
+            assert!((recent(row) - expected).abs() < 1e-12, "{row}: {} {expected}", recent(row));
+        }
+    }
+
+    #[test]
     fn work_is_the_speed_of_late() {
         let time: Vec<f64> = (0..100).map(|k| 2.0 * f64::from(k)).collect();
         let there_and_back: Vec<f64> = (0..100).map(|k| f64::from(k % 2)).collect();

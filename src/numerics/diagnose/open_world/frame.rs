@@ -4,13 +4,13 @@ use crate::diagnose::pool::{orthonormal, project};
 use crate::diagnose::round::{FitState, Fitter, RoundView};
 use crate::effect::{Form, Motion, Variable};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 use nalgebra::{DMatrix, DVector};
 
 /// Columns of a group, projected, with their products among each other and with the residual.
 pub(super) struct ProjectedColumns {
     /// Residual rows x columns.
-    pub columns: Mat<f64>,
+    pub columns: DMatrix<f64>,
     /// Mean squared change (m2 or rad2) of what was measured by a unit of each column's coefficient.
     pub square: Vec<f64>,
     pub products: GroupProducts,
@@ -68,7 +68,7 @@ impl<'a> ProjectedRows<'a> {
     /// GroupProducts of some columns with the residual.
     pub fn along(&self, columns: MatRef<'_, f64>) -> DVector<f64> {
         let residual = MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1);
-        dense(product(columns, residual).as_ref()).column(0).into_owned()
+        product(columns, residual).column(0).into_owned()
     }
 
     /// A form of the list or of the model.
@@ -105,9 +105,10 @@ impl<'a> ProjectedRows<'a> {
         let square = raw.chunks(rows).map(|column| self.mean_square(column)).collect();
         raw.chunks_mut(rows).for_each(|column| self.view.problem.innovate(column));
         project(self.base.as_ref(), &mut raw);
-        let columns = MatRef::from_column_major_slice(&raw, rows, raw.len() / rows).to_owned();
-        let gram = dense(product(columns.as_ref(), columns.as_ref()).as_ref());
-        let gradient = self.along(columns.as_ref());
+        let count = raw.len() / rows;
+        let columns = DMatrix::from_vec(rows, count, raw);
+        let gram = product(view(&columns), view(&columns));
+        let gradient = self.along(view(&columns));
         ProjectedColumns { columns, square, products: GroupProducts { gram, gradient } }
     }
 
@@ -121,16 +122,13 @@ impl<'a> ProjectedRows<'a> {
 }
 
 /// Transpose of `a` times `b`.
-pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
-    let mut products = Mat::zeros(a.ncols(), b.ncols());
-    matmul(products.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
+pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let mut products = DMatrix::zeros(a.ncols(), b.ncols());
+    let out = MatMut::from_column_major_slice_mut(products.as_mut_slice(), a.ncols(), b.ncols());
+    matmul(out, Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
     products
 }
 
-pub(super) fn dense(of: MatRef<'_, f64>) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(of.nrows(), of.ncols());
-    for (mut own, column) in out.column_iter_mut().zip(of.col_iter()) {
-        own.iter_mut().zip(column.iter()).for_each(|(own, value)| *own = *value);
-    }
-    out
+pub(super) fn view(of: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(of.as_slice(), of.nrows(), of.ncols())
 }

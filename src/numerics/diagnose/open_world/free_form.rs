@@ -1,11 +1,10 @@
 //! The free form of a place: groups that join one after another while each pays for itself.
 
 use super::evidence::{GroupEvidence, evidence, log_mean, log_sum};
-use super::frame::{ProjectedColumns, ProjectedRows, dense, product};
+use super::frame::{ProjectedColumns, ProjectedRows, product, view};
 use super::groups::{FreeGroup, GroupColumns};
 use super::state::KnownCauses;
 use crate::effect::{Place, Survey};
-use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 
 /// Groups of a place at most.
@@ -55,7 +54,7 @@ pub(super) struct AroundGroups<'f, 'a> {
     pub frame: &'f ProjectedRows<'a>,
     pub survey: &'f Survey<'f>,
     /// Columns of all causes of the model.
-    pub causes: MatRef<'f, f64>,
+    pub causes: &'f DMatrix<f64>,
     /// Names that are taken out of the list.
     pub without: &'f [String],
 }
@@ -78,7 +77,7 @@ impl PlaceGroups {
             }
             let Some(block) = columns.block(&group) else { continue };
             self.laws.push(is_law);
-            self.known.push(dense(product(around.causes, block.columns.as_ref()).as_ref()));
+            self.known.push(product(view(around.causes), view(&block.columns)));
             self.variances.push(group.variances(&block));
             self.groups.push(group);
             self.blocks.push(block);
@@ -193,7 +192,7 @@ impl PlaceGroups {
             let (found, length) = self.closest(best, &now);
             let square = found.amplitude * found.amplitude;
             let variances: Vec<f64> = self.variances[best][length].iter().map(|variance| variance * square).collect();
-            now = now.with(around.frame, self.blocks[best].columns.as_ref(), &variances);
+            now = now.with(around.frame, &self.blocks[best].columns, &variances);
             let group = self.groups[best];
             terms.push(FreeTerm { group, variances });
             if step == 0 {
@@ -212,15 +211,7 @@ fn mixed(all: &[GroupEvidence]) -> GroupEvidence {
 }
 
 /// Columns one after another as one matrix.
-pub(super) fn side_by_side(blocks: &[ProjectedColumns], rows: usize) -> Mat<f64> {
-    let count = blocks.iter().map(|block| block.columns.ncols()).sum();
-    let mut out = Mat::zeros(rows, count);
-    let mut at = 0;
-    for block in blocks {
-        for k in 0..block.columns.ncols() {
-            out.col_as_slice_mut(at).copy_from_slice(block.columns.col_as_slice(k));
-            at += 1;
-        }
-    }
-    out
+pub(super) fn side_by_side(blocks: &[ProjectedColumns], rows: usize) -> DMatrix<f64> {
+    let all: Vec<f64> = blocks.iter().flat_map(|block| block.columns.iter().copied()).collect();
+    DMatrix::from_vec(rows, all.len() / rows.max(1), all)
 }

@@ -348,3 +348,34 @@ fn name_of(group: &FreeGroup) -> Option<&'static str> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Effect;
+
+    fn turn(count: usize) -> FreeGroup {
+        let law = Law::new(Variable::Angle { joint: 2 }, Basis::Cosines { low: -1.0, high: 1.0, count });
+        FreeGroup { motion: Motion::Joint { joint: 2 }, law, of: 1 }
+    }
+
+    #[test]
+    fn a_joint_over_its_own_angle_is_the_curve_of_the_list_unless_that_is_left_out() {
+        let name = |group: FreeGroup, without: &[String]| group.hypothesis(without).form.name();
+        assert_eq!(name(turn(FINEST), &[]), JointTable::NAME);
+        assert_eq!(name(turn(FINEST), &[JointTable::NAME.into()]), Unknown::NAME);
+        assert_eq!(name(turn(FINE), &[]), Unknown::NAME);
+    }
+
+    #[test]
+    fn directions_near_one_are_off_it_by_the_angle_that_was_asked() {
+        for along in arrows() {
+            let near = arrows_near(along, 0.2);
+            assert_eq!(near.len(), 4);
+            for other in near {
+                let (a, b) = (Vector3::from(along), Vector3::from(other));
+                assert!((b.norm() - 1.0).abs() < 1e-12 && (a.angle(&b) - 0.2).abs() < 1e-9, "{along:?} {other:?}");
+            }
+        }
+    }
+}

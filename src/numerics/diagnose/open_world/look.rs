@@ -10,7 +10,7 @@ use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{Fitter, RoundView};
 use crate::diagnose::words::{FindingGroups, FindingKey, groups};
 use crate::effect::{Effect, GearCyclic, JointTable, Place, Survey};
-use faer::Mat;
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -31,7 +31,7 @@ pub(super) struct Sighted<'v> {
     fitter: &'v Fitter<'v>,
     blocks: Vec<ProjectedColumns>,
     /// Columns of all causes, and which are each one's.
-    all: Mat<f64>,
+    all: DMatrix<f64>,
     ranges: Vec<Range<usize>>,
 }
 
@@ -57,7 +57,7 @@ impl<'v> Sighted<'v> {
     }
 
     fn state(&self, is_in: &dyn Fn(usize) -> bool, scale: f64) -> KnownCauses {
-        KnownCauses::of(&self.frame, self.all.as_ref(), self.picked(is_in), scale)
+        KnownCauses::of(&self.frame, &self.all, self.picked(is_in), scale)
     }
 }
 
@@ -75,7 +75,7 @@ pub(super) struct OpenWorldLook<'l, 'v, 'a> {
 impl<'l, 'v, 'a> OpenWorldLook<'l, 'v, 'a> {
     pub fn of(sight: &'l Sighted<'v>, pool: &'l CachedHypotheses<'a>, survey: &'l Survey<'l>) -> Self {
         let without = sight.fitter.question.without;
-        let around = AroundGroups { frame: &sight.frame, survey, causes: sight.all.as_ref(), without };
+        let around = AroundGroups { frame: &sight.frame, survey, causes: &sight.all, without };
         let mut scale = 1.0 / sight.frame.view.autocorrelation_time();
         let mut whole = sight.state(&|_| true, scale);
         let mut beside = survey_places(&[(whole.clone(), None)], &around).remove(0);

@@ -9,6 +9,7 @@ use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState};
 use crate::diagnose::words::FindingKey;
 use crate::effect::{Effect, Place, Unknown};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Prior odds that nothing is there.
@@ -123,11 +124,10 @@ impl NameCase<'_, '_, '_, '_> {
         beside: &SurveyedPlaces,
     ) -> ContestedName {
         let (effect, place) = named.key;
-        let frame = self.around.frame;
         let set = &self.judged.set;
         let own = {
             let columns = named.own.iter().map(|(k, _)| *k).collect::<Vec<_>>();
-            let picked = faer::Mat::from_fn(frame.residual_rows(), columns.len(), |i, j| self.around.causes[(i, columns[j])]);
+            let picked = self.around.causes.select_columns(&columns);
             let variances: Vec<f64> = named.own.iter().map(|(_, variance)| *variance).collect();
             self.evidence_of(rest, &picked, &variances)
         };
@@ -194,12 +194,12 @@ impl NameCase<'_, '_, '_, '_> {
     }
 
     /// Evidence and fall of the squared residual of columns beside a state.
-    fn evidence_of(&self, rest: &KnownCauses, columns: &faer::Mat<f64>, variances: &[f64]) -> Own {
+    fn evidence_of(&self, rest: &KnownCauses, columns: &DMatrix<f64>, variances: &[f64]) -> Own {
         let with = |square: f64| {
             let scaled: Vec<f64> = variances.iter().map(|variance| variance * square).collect();
-            rest.with(self.around.frame, columns.as_ref(), &scaled).gain() - rest.gain()
+            rest.with(self.around.frame, columns, &scaled).gain() - rest.gain()
         };
-        let products = rest.of_columns(self.around.frame, columns.as_ref());
+        let products = rest.of_columns(self.around.frame, columns);
         let found = evidence(&products.gram, &products.gradient, variances);
         Own { log: found.log, gain: with(found.amplitude * found.amplitude) }
     }
@@ -222,7 +222,7 @@ impl NameCase<'_, '_, '_, '_> {
             let block = self.around.frame.block(form);
             let size: f64 = block.square.iter().sum();
             let variances = vec![1.0 / size.max(f64::MIN_POSITIVE); block.square.len()];
-            let products = rest.of_columns(self.around.frame, block.columns.as_ref());
+            let products = rest.of_columns(self.around.frame, &block.columns);
             let found = evidence(&products.gram, &products.gradient, &variances);
             out.push(LawOfTheList { key, at: *h, log: found.log - self.price(*h) });
             if out.len() == RIVALS {

@@ -2,8 +2,7 @@
 //!
 //! With columns Z of unit prior variance and noise variance 1/s: X' C^-1 X = s X'X - Y'Y, Y = L^-1 s Z'X, L L' = 1 + s Z'Z.
 
-use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows, dense, product};
-use faer::{Mat, MatRef};
+use super::frame::{GroupProducts, ProjectedColumns, ProjectedRows, product, view};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Causes and free forms under their priors.
@@ -12,7 +11,7 @@ pub(super) struct KnownCauses {
     /// The columns of the model's causes that are in it, by their numbers, with the roots of their prior variances.
     picked: Vec<(usize, f64)>,
     /// All of its columns times the roots of their prior variances, the picked ones first; residual rows x count.
-    columns: Mat<f64>,
+    columns: DMatrix<f64>,
     factor: Option<Cholesky<f64, Dyn>>,
     along: DVector<f64>,
     /// Over the variance of the noise, in the variances of the rows.
@@ -21,35 +20,29 @@ pub(super) struct KnownCauses {
 
 impl KnownCauses {
     /// Of some of the model's causes, whose columns are `all`, and noise.
-    pub fn of(frame: &ProjectedRows, all: MatRef<'_, f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
-        let mut columns = Mat::zeros(frame.residual_rows(), picked.len());
-        for (j, (k, root)) in picked.iter().enumerate() {
-            let column = columns.col_as_slice_mut(j).iter_mut().zip(all.col(*k).iter());
-            column.for_each(|(own, value)| *own = value * root);
+    pub fn of(frame: &ProjectedRows, all: &DMatrix<f64>, picked: Vec<(usize, f64)>, scale: f64) -> Self {
+        let mut columns = DMatrix::zeros(frame.residual_rows(), picked.len());
+        for (mut own, (k, root)) in columns.column_iter_mut().zip(&picked) {
+            own.axpy(*root, &all.column(*k), 0.0);
         }
         Self { picked, columns, factor: None, along: DVector::zeros(0), scale }.factored(frame)
     }
 
     /// With more columns of these prior variances.
-    pub fn with(&self, frame: &ProjectedRows, columns: MatRef<'_, f64>, variances: &[f64]) -> Self {
-        let (old, new) = (self.columns.ncols(), columns.ncols());
-        let mut all = Mat::zeros(frame.residual_rows(), old + new);
-        for j in 0..old {
-            all.col_as_slice_mut(j).copy_from_slice(self.columns.col_as_slice(j));
-        }
+    pub fn with(&self, frame: &ProjectedRows, columns: &DMatrix<f64>, variances: &[f64]) -> Self {
+        let old = self.columns.ncols();
+        let mut all = self.columns.clone().resize_horizontally(old + columns.ncols(), 0.0);
         for (j, variance) in variances.iter().enumerate() {
-            let column = all.col_as_slice_mut(old + j).iter_mut().zip(columns.col(j).iter());
-            column.for_each(|(own, value)| *own = value * variance.sqrt());
+            all.column_mut(old + j).axpy(variance.sqrt(), &columns.column(j), 0.0);
         }
-        let columns = all;
-        Self { columns, ..self.clone() }.factored(frame)
+        Self { columns: all, ..self.clone() }.factored(frame)
     }
 
     fn factored(mut self, frame: &ProjectedRows) -> Self {
         let count = self.columns.ncols();
-        let gram = dense(product(self.columns.as_ref(), self.columns.as_ref()).as_ref());
+        let gram = product(view(&self.columns), view(&self.columns));
         self.factor = Cholesky::new(DMatrix::identity(count, count) + gram * self.scale).filter(|_| count > 0);
-        self.along = frame.along(self.columns.as_ref()) * self.scale;
+        self.along = frame.along(view(&self.columns)) * self.scale;
         if let Some(factor) = &self.factor {
             factor.l_dirty().solve_lower_triangular_mut(&mut self.along);
         }
@@ -57,11 +50,11 @@ impl KnownCauses {
     }
 
     /// The products of any columns beside the state.
-    pub fn of_columns(&self, frame: &ProjectedRows, columns: MatRef<'_, f64>) -> GroupProducts {
-        let gradient = frame.along(columns);
-        let (mut gram, mut gradient) = (dense(product(columns, columns).as_ref()) * self.scale, gradient * self.scale);
+    pub fn of_columns(&self, frame: &ProjectedRows, columns: &DMatrix<f64>) -> GroupProducts {
+        let columns = view(columns);
+        let (mut gram, mut gradient) = (product(columns, columns) * self.scale, frame.along(columns) * self.scale);
         if let Some(factor) = &self.factor {
-            let mut share = dense(product(self.columns.as_ref(), columns).as_ref()) * self.scale;
+            let mut share = product(view(&self.columns), columns) * self.scale;
             factor.l_dirty().solve_lower_triangular_mut(&mut share);
             gram.gemm_tr(-1.0, &share, &share, 1.0);
             gradient.gemv_tr(-1.0, &share, &self.along, 1.0);
@@ -91,8 +84,8 @@ impl KnownCauses {
             share.row_mut(i).copy_from(&(known.row(*k) * (root * self.scale)));
         }
         if count > picked {
-            let more = product(self.columns.subcols(picked, count - picked), block.columns.as_ref());
-            share.rows_mut(picked, count - picked).copy_from(&(dense(more.as_ref()) * self.scale));
+            let more = product(view(&self.columns).subcols(picked, count - picked), view(&block.columns));
+            share.rows_mut(picked, count - picked).copy_from(&(more * self.scale));
         }
         factor.l_dirty().solve_lower_triangular_mut(&mut share);
         gram.gemm_tr(-1.0, &share, &share, 1.0);

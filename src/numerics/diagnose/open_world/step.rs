@@ -1,10 +1,10 @@
 //! A model changed: causes taken out, laws and free forms put in, fitted anew and held against folds.
 
 use super::free_form::FreeTerm;
-use crate::diagnose::judge::{FoldErrors, JudgedCauses};
+use crate::diagnose::judge::{FoldErrors, JudgedCauses, errors_at_ends};
 use crate::diagnose::pool::CachedHypotheses;
 use crate::diagnose::round::{EstimatedCause, FitState, Fitter};
-use crate::effect::{Effect, Hypothesis};
+use crate::effect::{Effect, Hypothesis, Variable};
 use crate::estimate::Prior;
 
 /// A changed model.
@@ -60,6 +60,18 @@ impl ModelChange<'_, '_> {
         let causes: Vec<EstimatedCause> = kept.iter().map(|i| judged.state.causes[*i].clone()).chain(causes).collect();
         let state = fitter.fit(&judged.state.model, causes);
         let (before, after) = (FoldErrors::of(&judged.state, fitter)?, FoldErrors::of(&state, fitter)?);
+        // What passes is predicted beyond what was fitted, too.
+        if new.iter().any(|hypothesis| hypothesis.form.variables().iter().any(passes)) {
+            let [before, after] = [&judged.state, &state].map(|state| errors_at_ends(state, fitter));
+            if after? > before? {
+                return None;
+            }
+        }
         (after.gain_over(&before) > -self.worse * before.rms()).then_some(ModelStep { state, kept, new, sentence })
     }
+}
+
+/// Whether a variable goes on where the recording ends.
+fn passes(of: &Variable) -> bool {
+    matches!(of, Variable::Time | Variable::Temperature)
 }
