@@ -7,7 +7,7 @@ use crate::observation::noise;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::stage::advice::advice;
 use crate::stage::folding::FoldSetting;
-use crate::stage::{Context, computed, repeated, screened};
+use crate::stage::{Context, computed, doubtful, repeated, screened};
 use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -133,6 +133,8 @@ pub struct Fitting<'a> {
     pub repeatability: Option<f64>,
     /// Parts of a cross-validation.
     pub folds: FoldSetting,
+    /// What the model as a whole was identified by.
+    pub measured: &'a Measurements,
 }
 
 impl Identified {
@@ -159,6 +161,7 @@ impl Identified {
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
+        let unseen_rows: Vec<usize> = (0..held_out.len()).filter(|row| held_out[*row]).collect();
         let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
@@ -172,7 +175,8 @@ impl Identified {
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
                 .with_suspects(aside)
                 .with_weights(fitting.rows, fitted)
-                .with_folds(errors);
+                .with_folds(errors)
+                .with_remarks(doubtful::remarks(model, of_model.as_ref(), fitting.measured, fitting.data, &unseen_rows));
         let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
         let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
         suspicion.into_iter().for_each(|line| context.services.warn(line));

@@ -59,7 +59,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -136,6 +136,7 @@ impl Stage for Identify {
             geometry: geometric_rank(&model, &data, &rows, &fitted),
             repeatability,
             folds: self.folds,
+            measured: &data,
         };
         brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
         question_ratios(&model, &fitted, &fitting, &setting, context);

@@ -8,6 +8,7 @@ mod computed;
 mod copied;
 mod curves;
 mod diagnose;
+mod doubtful;
 mod folding;
 mod identified;
 mod identify;

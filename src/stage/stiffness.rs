@@ -35,7 +35,7 @@ crate::stage::reads! {
 impl Stage for Stiffness {
     const NAME: &'static str = "stiffness";
     const SUMMARY: &'static str = "identifies joint compliance from loaded poses; everything identified before is kept";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = StiffnessReads;
     type Writes = Identified;
 
@@ -87,6 +87,7 @@ impl Stage for Stiffness {
             geometry: None,
             repeatability,
             folds: self.folds,
+            measured: &data,
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }

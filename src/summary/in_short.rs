@@ -32,6 +32,7 @@ pub fn in_short(
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
     let mut text = before.map_or_else(String::new, |row| labelled("before", &error(row)));
     text.push_str(&labelled(if carried.is_some() { "carried" } else { "after" }, &error(after)));
+    text.push_str(&after.doubts().map_or_else(String::new, |line| labelled("doubtful", &line)));
     text.push_str(&labelled("noise", &noise(after)));
     for warning in carried.iter().flat_map(|stage| &stage.warnings) {
         text.push_str(&labelled("warning", warning));

@@ -29,6 +29,17 @@ impl Circumstance {
     pub fn unknown(joints: usize) -> Self {
         Self { payload: 0.0, temperature: None, time: LONG_AFTER, direction: vec![0.0; joints], current: None }
     }
+
+    /// Those under which a row was measured.
+    pub fn of_row(data: &Measurements, row: usize) -> Self {
+        Self {
+            payload: data.payload[row],
+            temperature: data.temperature(row),
+            time: data.time(row),
+            direction: (0..data.joints).map(|joint| data.direction(row, joint)).collect(),
+            current: data.current(row).map(<[f64]>::to_vec),
+        }
+    }
 }
 
 /// An identified arm.
@@ -159,7 +170,10 @@ impl Reach<'_> {
             without[parameters.clone()].fill(0.0);
             let displacement = point - stack.point(robot, &self.data, 0, &without, &mut self.scratch);
             without[parameters.clone()].copy_from_slice(&x[parameters.clone()]);
-            out.push(BeyondFitted { parameters, variable, share, displacement });
+            // What belonged to the measurement moves no arm.
+            if displacement.norm() > 0.0 {
+                out.push(BeyondFitted { parameters, variable, share, displacement });
+            }
         }
         out
     }

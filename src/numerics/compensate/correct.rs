@@ -265,10 +265,7 @@ impl<'a> Corrector<'a> {
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
-            let doubtful = certainty.iter().filter(|certainty| certainty.is_remarkable());
-            remarks.extend(doubtful.map(|one| Remark::Uncertain(one.correction, one.u95, one.finding.clone())));
-            let beyond = certainty.iter().flat_map(|certainty| &certainty.beyond);
-            remarks.extend(beyond.map(|(finding, variable)| Remark::BeyondFitted(finding.clone(), variable.clone())));
+            remarks.extend(certainty.iter().flat_map(Remark::of_certainty));
             let share = reach.share();
             if share < 1.0 {
                 remarks.push(Remark::Faded(share));

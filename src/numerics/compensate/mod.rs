@@ -10,6 +10,7 @@ mod command;
 mod correct;
 mod correction_uncertainty;
 mod coverage;
+mod doubts;
 mod gate;
 mod inverse;
 mod load;
@@ -26,6 +27,7 @@ pub use correct::{CommandTarget, CorrectionOptions, CorrectionTotals, Corrector,
 pub use correction_uncertainty::CorrectionUncertainty;
 pub use coverage::Coverage;
 use coverage::beyond_limits;
+pub use doubts::doubts;
 pub use gate::{Gate, GateLimits};
 pub use inverse::inverse;
 pub use load::load_matters;
