@@ -5,12 +5,13 @@ use crate::effect::{BaseFrame, CAUSES};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
-use crate::robot::RobotModel;
+use crate::robot::{RobotModel, Visited};
 use crate::stage::blank_payload::blank_payload;
+use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
-use crate::stage::{Context, RawFile, Stage, doubtful, screened};
+use crate::stage::{Context, RawFile, Stage, screened};
 use crate::table::{
     Corrected, CovarianceTable, FindingNumbers, Findings, Forms, Parameters, Prediction, Recording, Rivals, Robot, Shares,
     Spectrum, Split, Suspects, Verdict,
@@ -191,11 +192,14 @@ impl Stage for Diagnose {
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
         let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
         let known = covariance.filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
+        let visited = Visited::of(&data, &diagnosis.kept);
+        let doubtful =
+            KnownModel { model: &diagnosis.model, covariance: known, measured: &data, visited: known.map(|_| &visited) };
         let prediction = Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
             .with_suspects(aside)
             .with_weights(&diagnosis.kept, &diagnosis.fitted)
             .with_folds(errors)
-            .with_remarks(doubtful::remarks(&diagnosis.model, known, &data, &data, &unseen));
+            .with_remarks(doubtful.remarks(&data, &unseen));
         if let Some(line) = doubtful::sentence(&prediction) {
             diagnosis.statement.push_str(&format!("; {line}"));
         }

@@ -4,27 +4,47 @@
 use crate::compensate::{IdentifiedArm, Remark, Scatter, Uncertainty, doubts};
 use crate::error::counted;
 use crate::estimate::{Covariance, Model};
-use crate::robot::Measurements;
+use crate::robot::{Measurements, Unmeasured, Visited};
+use crate::stage::dependence::Dependence;
 use crate::table::{Prediction, PredictionRow};
 
-/// A remark for each row of `data` among `rows`, none for all others, and none where the model's covariance is not known. What is usual is
-/// seen at the rows of `measured`, by which the model was identified.
-pub fn remarks(
-    model: &Model,
-    covariance: Option<&Covariance>,
-    measured: &Measurements,
-    data: &Measurements,
-    rows: &[usize],
-) -> Vec<Option<String>> {
-    let mut out = vec![None; data.rows()];
-    let Some(covariance) = covariance.filter(|_| !rows.is_empty()) else { return out };
-    let arm = IdentifiedArm::new(model.clone(), None);
-    let uncertainty = Uncertainty::new(&arm, covariance.clone(), Scatter::default()).beside(&arm, measured);
-    for (row, remarks) in rows.iter().zip(doubts(&arm, &uncertainty, data, rows)) {
-        let said: Vec<String> = remarks.iter().map(Remark::to_string).collect();
-        out[*row] = (!said.is_empty()).then(|| said.join("; "));
+/// A model, and where it was measured.
+pub struct KnownModel<'a> {
+    pub model: &'a Model,
+    /// Of all of its parameters; none where that is not known.
+    pub covariance: Option<&'a Covariance>,
+    /// The recording that it was identified by.
+    pub measured: &'a Measurements,
+    /// What its rows visited; none where that is not known.
+    pub visited: Option<&'a Visited>,
+}
+
+impl KnownModel<'_> {
+    /// A remark for each row of `data` among `rows`, none for all others: of all that a finding depends on what was never visited, and how
+    /// uncertain the correction is.
+    pub fn remarks(&self, data: &Measurements, rows: &[usize]) -> Vec<Option<String>> {
+        let depends = Dependence::of(self.model);
+        let unvisited = |row: usize| {
+            let beyond = self.visited.map(|visited| visited.beyond(data.q(row), data.payload[row], data.temperature(row)));
+            let mut beyond = beyond.unwrap_or_default();
+            beyond.retain_mut(|what| depends.has(what));
+            beyond
+        };
+        let mut out = vec![None; data.rows()];
+        for (row, doubts) in rows.iter().zip(self.doubts(data, rows)) {
+            let said: Vec<String> =
+                unvisited(*row).iter().map(Unmeasured::to_string).chain(doubts.iter().map(Remark::to_string)).collect();
+            out[*row] = (!said.is_empty()).then(|| said.join("; "));
+        }
+        out
     }
-    out
+
+    fn doubts(&self, data: &Measurements, rows: &[usize]) -> Vec<Vec<Remark>> {
+        let Some(covariance) = self.covariance else { return vec![Vec::new(); rows.len()] };
+        let arm = IdentifiedArm::new(self.model.clone(), None);
+        let uncertainty = Uncertainty::new(&arm, covariance.clone(), Scatter::default()).beside(&arm, self.measured);
+        doubts(&arm, &uncertainty, data, rows)
+    }
 }
 
 /// How many held-out points have a remark, of how many, in a sentence; none where none has.

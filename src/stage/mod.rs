@@ -7,6 +7,7 @@ mod compare;
 mod computed;
 mod copied;
 mod curves;
+mod dependence;
 mod diagnose;
 mod doubtful;
 mod folding;

@@ -2,7 +2,6 @@
 
 mod cells;
 mod comparison;
-mod dependence;
 mod source;
 
 use crate::diagnose::BASE;
@@ -16,7 +15,6 @@ use crate::stage::{Context, Labelled, Stage};
 use crate::table::{CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split};
 use cells::VisitedCells;
 use comparison::{ComparedRows, Comparison};
-use dependence::Dependence;
 use source::{CarriedFrom, stripped};
 
 crate::stage::identified::identification! {
@@ -92,6 +90,7 @@ impl Stage for Transfer {
         }
         let CarriedModel { earlier, model, fitted, screening, held } = &carried;
         let source_data = source.as_ref().map(|source| source.recording.measurements());
+        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -107,11 +106,17 @@ impl Stage for Transfer {
             repeatability,
             folds: self.folds,
             measured: source_data.as_ref().unwrap_or(&data),
+            visited: visited.as_ref(),
+            doubtful: (0..data.rows()).collect(),
         };
-        let mut identified = Identified::of(context, model, fitted, &fitting);
-        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
-        let remarks = remarks(visited.as_ref(), model, &data, context);
-        identified.prediction = identified.prediction.with_remarks(remarks);
+        let identified = Identified::of(context, model, fitted, &fitting);
+        let outside = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();
+        if outside > 0 {
+            let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
+            context.services.note(format!(
+                "{outside} of {rows} {lie} outside of what the model was measured at, or where it is uncertain: see the remarks of `prediction`"
+            ));
+        }
         Ok(identified)
     }
 }
@@ -208,24 +213,4 @@ fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Reco
         visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
     }
     Some(Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>()))
-}
-
-/// What of each row, of all that the model depends on, was never visited; nothing where that is not known.
-fn remarks(visited: Option<&Visited>, model: &Model, data: &Measurements, context: &Context) -> Vec<Option<String>> {
-    let Some(visited) = visited else { return vec![None; data.rows()] };
-    let depends = Dependence::of(model);
-    let said = |row: usize| {
-        let mut beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
-        beyond.retain_mut(|what| depends.has(what));
-        (!beyond.is_empty()).then(|| beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-    };
-    let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();
-    let outside = remarks.iter().flatten().count();
-    if outside > 0 {
-        let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
-        context.services.note(format!(
-            "{outside} of {rows} {lie} outside of what the model was measured at: see the remarks of `prediction`"
-        ));
-    }
-    remarks
 }

@@ -30,7 +30,7 @@ use coverage::beyond_limits;
 pub use doubts::doubts;
 pub use gate::{Gate, GateLimits};
 pub use inverse::inverse;
-pub use load::load_matters;
+pub use load::{load_matters, unstated_payload};
 pub use posture::StatedPosture;
 pub use remark::Remark;
 pub use rigid::{LeftOut, distance, left_out, rigid};
