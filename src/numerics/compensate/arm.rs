@@ -74,6 +74,16 @@ impl IdentifiedArm {
         &self.quiet
     }
 
+    /// The effect and place that depends on motor currents, where one does: without them it is nothing.
+    pub(super) fn by_current(&self) -> Option<String> {
+        let (specs, x) = (self.model.stack.specs(), &self.model.x);
+        let mut effects = self.model.stack.effects().filter(|(effect, _)| effect.needs_current());
+        effects.find_map(|(effect, mut range)| {
+            let k = range.find(|k| x[*k] != 0.0)?;
+            Some(format!("{} at {}", effect.name(), specs[k].place))
+        })
+    }
+
     /// The base in the tracker's frame.
     pub fn base(&self) -> &Pose {
         &self.base

@@ -78,6 +78,8 @@ pub struct Corrector<'a> {
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
+    /// What of the model depends on motor currents.
+    by_current: Option<String>,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
@@ -162,8 +164,9 @@ impl<'a> Corrector<'a> {
         uncertainty: Option<Uncertainty>,
         manner: CorrectionOptions,
     ) -> Self {
-        let joints = arm.model().robot.joints();
-        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
+        let (joints, by_current) = (arm.model().robot.joints(), arm.by_current());
+        let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
+        Self { arm, coverage, uncertainty, manner, by_current, last: None, direction, tally }
     }
 
     /// Whether targets get an uncertainty.
@@ -283,7 +286,11 @@ impl<'a> Corrector<'a> {
             certainty,
             remarks,
         };
-        self.manner.gate.judge(&mut command);
+        let unstated = self.by_current.as_ref().filter(|_| job.circumstance.current.is_none());
+        let unstated = unstated.map(|finding| {
+            format!("{finding} depends on the motor current, which the target does not state (columns i1_a, i2_a, ...)")
+        });
+        self.manner.gate.judge(&mut command, unstated);
         command
     }
 }

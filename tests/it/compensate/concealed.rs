@@ -310,7 +310,7 @@ fn a_correction_never_harms_unless_it_says_so() {
 
 /// Rows that keep the tool upright, up or down: the arm's moment across the sum of three angles loads no row. The robot file gives no
 /// masses, gears wave at all joints.
-fn upright(seed: u64) -> Case {
+pub fn upright(seed: u64) -> Case {
     let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
     let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
@@ -345,7 +345,8 @@ fn upright(seed: u64) -> Case {
 /// A desktop arm with nothing concealed, unless without masses.
 pub fn nothing(seed: u64, bare: bool) -> Case {
     let design = Design { seed, cases: 1, robots: vec![Kind::Compact6], nulls: 1.0, bare, faulty: 0.0, ..Design::default() };
-    Case { hidden: Default::default(), tampered: Vec::new(), ..Case::make(&design, 0, Content::Null).expect("a case") }
+    // Without currents, which no target states.
+    Case { hidden: [Column::Current].into(), tampered: Vec::new(), ..Case::make(&design, 0, Content::Null).expect("a case") }
 }
 
 /// The case measured again with these effects, at the poses that `q_of` gives its rows; nothing is carried.

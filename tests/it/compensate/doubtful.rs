@@ -1,7 +1,7 @@
 //! Findings beyond the rows that they were fitted to: held-out points there are counted and named, targets have a remark, none is harmed in
 //! silence.
 
-use super::concealed::{Outcome, again, is_harmed, nothing, outcomes_at, recording, split, targets};
+use super::concealed::{Outcome, again, is_harmed, nothing, outcomes_at, recording, split, targets, upright};
 use crate::desk::{Desk, table};
 use calib::stage::{Diagnose, DiagnoseReads, Labelled, Validate, ValidateReads};
 use calib::table::{Prediction, Robot, Statistics, StatisticsRow, Verdict};
@@ -70,6 +70,15 @@ fn a_zero_that_wanders_in_time_is_said_to_be_unknown_later() {
     let (soon, later) = remarks.split_at(remarks.len() / 10);
     assert!(later.iter().all(over_time) && soon.iter().filter(|remark| over_time(remark)).count() < 8, "{remarks:?}");
     unharmed(&case);
+}
+
+#[test]
+fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
+    let mut case = upright(500);
+    case.hidden.clear();
+    let (outcomes, named) = outcomes_at(&case, targets(&case));
+    assert!(named.contains("joint_compliance"), "{named}");
+    assert!(outcomes.iter().all(|one| one.refused && one.remarked), "{named}");
 }
 
 #[test]
