@@ -46,7 +46,7 @@ pub fn in_short(
     if let Some(stage) = ran(Diagnose::NAME) {
         let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
         text.push_str(&labelled("verdict", &told.verdict()));
-        text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));
+        text.push_str(&told.strongest().map_or_else(String::new, |findings| labelled("findings", &findings)));
     }
     Ok(Some(text))
 }
