@@ -5,10 +5,10 @@ use crate::compensate::{CorrectionOptions, Corrector, Gate, GateLimits, Identifi
 use crate::error::{Error, Fault, Result, counted};
 use crate::identified::IdentifiedModel;
 use crate::pipeline::Purpose;
-use crate::program::{self, Frames, Language, Partial, ProgramFile, mark};
+use crate::program::{self, Frames, Language, Partial, ProgramFile, ProgramLoad, ProgramRules, mark};
 use crate::raw;
 use crate::robot::{JointConvention, Measurements};
-use crate::targets::{Layout, Units, Unreached, parquet, text, unstated_payload, unwritten, whole};
+use crate::targets::{Layout, Units, Unreached, parquet, text, unwritten, whole};
 use crate::units::{Quantity, Unit};
 use clap::{Args, ValueEnum};
 use std::ffi::OsString;
@@ -26,11 +26,12 @@ use std::path::{Path, PathBuf};
 /// and the command ends with code 10 when all others are written; with --plain the messages alone say why.
 ///
 /// Programs of controllers are corrected in place, only the numbers of targets change: KUKA KRL (.src, .dat: E6AXIS, AXIS, E6POS, POS) and ABB
-/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, in the
-/// posture that they state: the quadrants cf1, cf4, cf6 of RAPID, the signs T of KRL, in the controller's counting; cfx and S are not
+/// RAPID (.mod: jointtarget, robtarget). Their Cartesian targets are taken as poses of the robot file's tool in the robot's base, or in the
+/// work object or $BASE that the program itself declares, in the posture that they state: the quadrants cf1, cf4, cf6 of RAPID, the signs T of KRL, in the controller's counting; cfx and S are not
 /// checked. Of what that leaves open, and where nothing is stated, the posture nearest to the target before (or --start) is taken. A target
-/// that cannot be reached in its posture is refused. Programs that set $BASE or $TOOL, name a work object or displace
-/// their targets are refused (--assume-frames), and so are programs and tables without a payload where the model depends on load (--payload).
+/// that cannot be reached in its posture is refused. Programs that set another $BASE or $TOOL, name another work object or displace
+/// their targets are refused (--assume-frames), and so are programs and tables without a payload where the model depends on load: of RAPID it is
+/// the mass of the motion's tool (tooldata, or \TLoad), of KRL that of $LOAD, where the program declares it once; --payload overrules it.
 /// A corrected program carries a comment, a table its columns, by which calib refuses to correct it once more; one written with --plain
 /// carries nothing and is not recognised. A target that is not understood exactly, not reached, or that
 /// may or may not be one, refuses the whole program with code 10. Left as they are, with a warning for each line: poses that the program
@@ -63,7 +64,8 @@ pub(super) struct CompensateArguments {
     /// Leaves targets of a program that state some of their numbers as they are (`LIN {X 10}`), with a warning for each, instead of refusing it
     #[arg(long)]
     leave_partial: bool,
-    /// Payload where the targets do not say, kg; needed where the model depends on load and was measured under one (0: none is carried)
+    /// Payload where the targets do not say, of programs whatever they say, kg; needed where the model depends on load and was measured under
+    /// one (0: none is carried)
     #[arg(long, value_name = "KG")]
     payload: Option<f64>,
     /// Largest displacement by which a target is corrected, mm: one that needs more is refused, as those that are not reached
@@ -294,11 +296,13 @@ fn rewritten(
         let message = "was compensated by calib already: a second correction would move the robot twice as far. Take the program of before, or insist with --force";
         return Err(Error::data(layout.place, message));
     }
-    if let Some(load) = layout.load {
-        return Err(Error::data(layout.place, unstated_payload(load)));
-    }
     let frames = if arguments.assume_frames { Frames::Assumed } else { Frames::Refused };
-    let mut rewritten = program::corrected(&source, partial, frames, layout.robot, corrector)?;
+    let load = match (arguments.payload, layout.load) {
+        (Some(payload), _) => ProgramLoad::Stated(payload),
+        (None, Some(most)) => ProgramLoad::Needed(most),
+        (None, None) => ProgramLoad::Optional,
+    };
+    let mut rewritten = program::corrected(&source, ProgramRules { partial, frames, load }, layout.robot, corrector)?;
     rewritten.bytes = mark::written(&rewritten.bytes, &text, language, remarks);
     let warnings = rewritten.warnings.iter().map(|note| format!("warning: {}: {}\n", source.at(note), note.message));
     let _ = std::io::stderr().write_all(warnings.collect::<String>().as_bytes());

@@ -3,6 +3,7 @@
 use super::literal::JOINTS;
 use super::{Frames, Language, Note, Partial, Program, ProgramRefusal, Rewritten, TargetKind, solve};
 use crate::compensate::Corrector;
+use crate::compensate::unstated_payload;
 use crate::description::RobotDescription;
 use crate::error::{Error, Fault, Result};
 use crate::robot::RobotModel;
@@ -39,20 +40,42 @@ impl ProgramFile<'_> {
     }
 }
 
+/// By what load targets of a program are corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ProgramLoad {
+    /// A person's, kg, whatever the program states.
+    Stated(f64),
+    /// The program's. One with a target of which it states none is refused: the model was measured under up to so many kg and depends on it.
+    Needed(f64),
+    /// The program's, if it states one.
+    Optional,
+}
+
+/// How a program is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProgramRules {
+    /// Targets that state some of their numbers.
+    pub partial: Partial,
+    /// Frames that are not applied.
+    pub frames: Frames,
+    /// What is carried.
+    pub load: ProgramLoad,
+}
+
 /// The program with its targets corrected; fails with every fault of it.
 pub fn corrected(
     source: &ProgramFile,
-    partial: Partial,
-    frames: Frames,
+    rules: ProgramRules,
     robot: &RobotDescription,
     corrector: &mut Corrector,
 ) -> Result<Rewritten> {
+    let ProgramRules { partial, frames, load } = rules;
     let robot = RobotModel::new(robot.clone());
     if robot.joints() != JOINTS {
         let message = format!("programs have targets of {JOINTS} joints, the robot has {}", robot.joints());
         return Err(Error::spec(source.place, message));
     }
-    let program = Program::parse(source.text, source.language, partial).map_err(|refusal| source.refused(refusal))?;
+    let mut program = Program::parse(source.text, source.language, partial).map_err(|refusal| source.refused(refusal))?;
     if program.literals().is_empty() {
         return Err(Error::data(source.place, "has no targets"));
     }
@@ -62,6 +85,13 @@ pub fn corrected(
         let refused = |note: &Note| Note { message: format!("{}; --assume-frames accepts it", note.message), ..note.clone() };
         let faults = program.frames().iter().map(refused).collect();
         return Err(source.refused(ProgramRefusal { faults, partial: 0 }));
+    }
+    match load {
+        ProgramLoad::Stated(payload) => program.carries(payload),
+        ProgramLoad::Needed(most) if program.literals().iter().any(|literal| literal.payload.is_none()) => {
+            return Err(Error::data(source.place, unstated_payload(most)));
+        }
+        ProgramLoad::Needed(_) | ProgramLoad::Optional => {}
     }
     let answers = solve(program.literals(), &robot, corrector);
     program.rewritten(answers).map_err(|refusal| source.refused(refusal))

@@ -1,6 +1,7 @@
 //! A target as a program states it: its numbers, where they stand, and how corrected ones are written there.
 
 use crate::robot::Bound;
+use crate::spatial::Pose;
 use std::ops::Range;
 
 /// Joints that both languages have targets for.
@@ -42,6 +43,10 @@ pub struct Literal {
     pub external: Vec<Option<f64>>,
     /// In which posture.
     pub posture: PostureStatement,
+    /// The frame that a Cartesian target stands in, in the robot's base (m); none: the base itself.
+    pub frame: Option<Pose>,
+    /// The mass at the flange that the program states, kg.
+    pub payload: Option<f64>,
 }
 
 impl Literal {

@@ -14,7 +14,7 @@ mod pose;
 mod rapid;
 mod token;
 
-pub use correct::{ProgramFile, corrected};
+pub use correct::{ProgramFile, ProgramLoad, ProgramRules, corrected};
 pub use list::{JointList, ListedJoints, MOST_BYTES, joint_list, listing};
 pub use literal::{Literal, PostureStatement, TargetKind};
 pub use pose::solve;
@@ -187,6 +187,18 @@ impl<'p> Program<'p> {
     /// The targets that are to be corrected.
     pub fn literals(&self) -> &[Literal] {
         &self.literals
+    }
+
+    /// Takes `payload` (kg) as what all targets carry, and says where the program states another one.
+    fn carries(&mut self, payload: f64) {
+        let differ = |literal: &&Literal| literal.payload.is_some_and(|stated| stated != payload);
+        let other = self.literals.iter().find(differ).map(|literal| (literal.at(), literal.payload.unwrap_or_default()));
+        if let Some((at, stated)) = other {
+            let message = format!("the program states a payload of {stated} kg, --payload {payload} kg, which is used");
+            self.warnings.extend(placed(self.bytes, vec![(at, message)]));
+            self.warnings.sort_by_key(|note| (note.line, note.column));
+        }
+        self.literals.iter_mut().for_each(|literal| literal.payload = Some(payload));
     }
 
     /// The lines that use frames which are not applied; they are among the warnings, too.

@@ -1,13 +1,14 @@
 //! The numbers of a program as targets of the arm, and commands as numbers of a program.
 //!
-//! Cartesian targets are taken as poses of the robot file's tool in the robot's base. They stay Cartesian: the pose at which the
+//! Cartesian targets are taken as poses of the robot file's tool in the frame that the program states, else in the robot's base. They stay Cartesian: the pose at which the
 //! controller, which believes in the nominal robot, drives the corrected joints.
 
 use super::literal::JOINTS;
 use super::{Literal, PostureStatement, SolvedLiteral, TargetKind};
 use crate::compensate::{Chain, CommandTarget, CorrectedCommand, Corrector, Nominal, StatedPosture, turns};
 use crate::robot::{JointConvention, RobotModel};
-use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
+use crate::spatial::Pose;
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
 /// Every literal corrected, in their order; an error says why there is no command.
@@ -49,19 +50,18 @@ fn posture(literal: &Literal) -> Option<StatedPosture> {
 
 fn target(literal: &Literal) -> CommandTarget {
     let v = &literal.values;
-    let point = || Some(Vector3::new(v[0], v[1], v[2]) * 1e-3);
+    let stated = CommandTarget { payload: literal.payload, ..CommandTarget::default() };
+    let posed = |rotation: Matrix3<f64>| {
+        let pose = literal.frame.unwrap_or_else(Pose::identity) * Pose::new(rotation, Vector3::new(v[0], v[1], v[2]) * 1e-3);
+        let (point, rotation) = (Some(pose.translation), Some(pose.rotation));
+        CommandTarget { point, rotation, posture: posture(literal), ..stated.clone() }
+    };
     match literal.kind {
-        TargetKind::Joints => {
-            CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..CommandTarget::default() }
-        }
-        TargetKind::Frame => {
-            let rotation = turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians());
-            CommandTarget { point: point(), rotation: Some(rotation), posture: posture(literal), ..CommandTarget::default() }
-        }
+        TargetKind::Joints => CommandTarget { q: Some(v.iter().map(|deg| deg.to_radians()).collect()), ..stated },
+        TargetKind::Frame => posed(turns(v[3].to_radians(), v[4].to_radians(), v[5].to_radians())),
         TargetKind::Quaternion => {
             let turn = UnitQuaternion::from_quaternion(Quaternion::new(v[3], v[4], v[5], v[6]));
-            let rotation = Some(turn.to_rotation_matrix().into_inner());
-            CommandTarget { point: point(), rotation, posture: posture(literal), ..CommandTarget::default() }
+            posed(turn.to_rotation_matrix().into_inner())
         }
     }
 }
@@ -72,7 +72,7 @@ fn values(literal: &Literal, robot: &RobotModel, convention: &JointConvention, q
     }
     let mut own = q.to_vec();
     convention.to_robot(&mut own);
-    let pose = Nominal::new(robot).place(&own);
+    let pose = literal.frame.unwrap_or_else(Pose::identity).inverse() * Nominal::new(robot).place(&own);
     let mut out: Vec<f64> = pose.translation.iter().map(|metres| metres * 1e3).collect();
     let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     let given = &literal.values[3..];

@@ -270,7 +270,11 @@ fn verdict(rows: &[StatisticsRow], last: &[&StatisticsRow], withdrawn: &[Withdra
     };
     VerdictView {
         sentence,
-        others: (withdrawn.iter().map(|gone| format!("{gone}."))).chain(uneven).chain(last.iter().skip(1).map(other)).collect(),
+        others: (withdrawn.iter().map(|gone| format!("{gone}.")))
+            .chain(uneven)
+            .chain(after.doubts().map(|line| format!("{line}.")))
+            .chain(last.iter().skip(1).map(other))
+            .collect(),
     }
 }
 

@@ -5,8 +5,9 @@ use crate::effect::{BaseFrame, CAUSES};
 use crate::error::{Error, Fault, Result, instead};
 use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
-use crate::robot::RobotModel;
+use crate::robot::{RobotModel, Visited};
 use crate::stage::blank_payload::blank_payload;
+use crate::stage::doubtful::{self, KnownModel};
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
@@ -93,7 +94,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 21;
+    const IMPLEMENTATION: u32 = 22;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -189,6 +190,19 @@ impl Stage for Diagnose {
         let kept = &diagnosis.kept;
         let errors = diagnosis.folds.iter().flat_map(|folds| kept.iter().zip(folds.random.iter().zip(&folds.blocks)));
         let aside = diagnosis.screening.suspects.iter().filter(|suspect| !suspect.used()).map(|Suspect { row, .. }| *row);
+        let unseen: Vec<usize> = (0..data.rows()).filter(|row| held_out[*row]).collect();
+        let known = covariance.filter(|_| corrected == Corrected::RobotFile && diagnosis.verdict != Said::WrongSetup);
+        let visited = Visited::of(&data, &diagnosis.kept);
+        let doubtful =
+            KnownModel { model: &diagnosis.model, covariance: known, measured: &data, visited: known.map(|_| &visited) };
+        let prediction = Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
+            .with_suspects(aside)
+            .with_weights(&diagnosis.kept, &diagnosis.fitted)
+            .with_folds(errors)
+            .with_remarks(doubtful.remarks(&data, &unseen));
+        if let Some(line) = doubtful::sentence(&prediction) {
+            diagnosis.statement.push_str(&format!("; {line}"));
+        }
         Ok(DiagnoseWrites {
             verdict: Verdict::of(step, &diagnosis),
             findings: Findings::of(&diagnosis),
@@ -199,10 +213,7 @@ impl Stage for Diagnose {
             spectrum: Spectrum::of(&diagnosis),
             parameters: parameters.correcting(corrected),
             covariance: CovarianceTable::of(&diagnosis.model, &diagnosis.fitted, None),
-            prediction: Prediction::of(step, &diagnosis.model, &data, &reads.recording, &reads.split, &held_out, covariance)
-                .with_suspects(aside)
-                .with_weights(&diagnosis.kept, &diagnosis.fitted)
-                .with_folds(errors),
+            prediction,
             suspects: Suspects::of(step, &diagnosis.screening, &reads.recording, &reads.split),
         })
     }

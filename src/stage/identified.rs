@@ -4,8 +4,9 @@ use crate::effect::Load;
 use crate::error::counted;
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, Screening, Session, Suspect};
 use crate::observation::noise;
-use crate::robot::{Measurements, NoiseBasis, RobotModel};
+use crate::robot::{Measurements, NoiseBasis, RobotModel, Visited};
 use crate::stage::advice::advice;
+use crate::stage::doubtful::KnownModel;
 use crate::stage::folding::FoldSetting;
 use crate::stage::{Context, computed, repeated, screened};
 use crate::table::{CovarianceTable, Fit, FitContext, Observability, Parameters, Prediction, Recording, Split, Suspects};
@@ -133,6 +134,11 @@ pub struct Fitting<'a> {
     pub repeatability: Option<f64>,
     /// Parts of a cross-validation.
     pub folds: FoldSetting,
+    /// What the model as a whole was identified by, and what its rows visited.
+    pub measured: &'a Measurements,
+    pub visited: Option<&'a Visited>,
+    /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
+    pub doubtful: Vec<usize>,
 }
 
 impl Identified {
@@ -159,6 +165,8 @@ impl Identified {
         let errors =
             folds.iter().flat_map(|folds| fitting.rows.iter().zip(folds.random.iter().zip(&folds.blocks)).filter(unseen));
         let advice = advice(context, model, fitting.data, fitting.rows, fitted);
+        let Fitting { measured, visited, .. } = *fitting;
+        let known = KnownModel { model, covariance: of_model.as_ref(), measured, visited };
         let beside = FitContext {
             geometry: fitting.geometry,
             repeatability: fitting.repeatability,
@@ -172,7 +180,8 @@ impl Identified {
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
                 .with_suspects(aside)
                 .with_weights(fitting.rows, fitted)
-                .with_folds(errors);
+                .with_folds(errors)
+                .with_remarks(known.remarks(fitting.data, &fitting.doubtful));
         let fitted_points = fitting.rows.iter().map(|row| &prediction.0[*row]).filter(|row| row.measured.is_none());
         let suspicion = computed::suspicion(fitted_points.map(|row| [row.error_mm, row.noise_mm]), fitted.singular.len());
         suspicion.into_iter().for_each(|line| context.services.warn(line));

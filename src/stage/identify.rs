@@ -7,7 +7,7 @@ use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompli
 use crate::error::{Error, Fault, Result, nearest};
 use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
 use crate::observation;
-use crate::robot::{Measurements, RobotModel};
+use crate::robot::{Measurements, RobotModel, Visited};
 use crate::spatial::Pose;
 use crate::stage::brought::{self, KnownDistance, KnownSphere};
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
@@ -59,7 +59,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -122,6 +122,7 @@ impl Stage for Identify {
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let visited = Visited::of(&data, &screening.kept);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -136,6 +137,9 @@ impl Stage for Identify {
             geometry: geometric_rank(&model, &data, &rows, &fitted),
             repeatability,
             folds: self.folds,
+            measured: &data,
+            visited: Some(&visited),
+            doubtful: (0..data.rows()).filter(|row| rows.binary_search(row).is_err()).collect(),
         };
         brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
         question_ratios(&model, &fitted, &fitting, &setting, context);

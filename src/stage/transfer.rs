@@ -2,7 +2,6 @@
 
 mod cells;
 mod comparison;
-mod dependence;
 mod source;
 
 use crate::diagnose::BASE;
@@ -15,8 +14,7 @@ use crate::stage::screened::fit_rows;
 use crate::stage::{Context, Labelled, Stage};
 use crate::table::{CovarianceTable, ParameterRow, Parameters, Prediction, Recording, Robot, Split};
 use cells::VisitedCells;
-use comparison::Comparison;
-use dependence::Dependence;
+use comparison::{ComparedRows, Comparison};
 use source::{CarriedFrom, stripped};
 
 crate::stage::identified::identification! {
@@ -49,7 +47,7 @@ crate::stage::reads! {
 impl Stage for Transfer {
     const NAME: &'static str = "transfer";
     const SUMMARY: &'static str = "tests an identified model on another recording of the robot; only its base is estimated anew";
-    const IMPLEMENTATION: u32 = 10;
+    const IMPLEMENTATION: u32 = 11;
     type Reads = TransferReads;
     type Writes = Identified;
 
@@ -91,6 +89,8 @@ impl Stage for Transfer {
             (carried, covariance) = (geometry, None);
         }
         let CarriedModel { earlier, model, fitted, screening, held } = &carried;
+        let source_data = source.as_ref().map(|source| source.recording.measurements());
+        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -105,11 +105,18 @@ impl Stage for Transfer {
             geometry: None,
             repeatability,
             folds: self.folds,
+            measured: source_data.as_ref().unwrap_or(&data),
+            visited: visited.as_ref(),
+            doubtful: (0..data.rows()).collect(),
         };
-        let mut identified = Identified::of(context, model, fitted, &fitting);
-        let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);
-        let remarks = remarks(visited.as_ref(), model, &data, context);
-        identified.prediction = identified.prediction.with_remarks(remarks.into_iter());
+        let identified = Identified::of(context, model, fitted, &fitting);
+        let outside = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();
+        if outside > 0 {
+            let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
+            context.services.note(format!(
+                "{outside} of {rows} {lie} outside of what the model was measured at, or where it is uncertain: see the remarks of `prediction`"
+            ));
+        }
         Ok(identified)
     }
 }
@@ -155,20 +162,23 @@ impl Transfer {
         let candidates: Vec<usize> = start.stack.parameters_of(BaseFrame::NAME).collect();
         let options = FitOptions { rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&start, data, &options, &reads.split, self.screen);
-        let judges = judges(data, rows, [&carried.screening, &screening]);
+        let sides = sides(data, rows, [&carried.screening, &screening]);
         let visited = source.map(|source| VisitedCells::of(&source.recording.measurements(), &source.rows));
         let both = [&carried.model.predict(data)[..], &model.predict(data)];
-        let comparison = Comparison::of(data, &judges, both, visited.as_ref());
+        let comparison = Comparison::of(data, &sides, both, visited.as_ref());
         let words = comparison.words();
         if comparison.is_worse() {
             context.services.warn(format!("{words}: what was identified besides it does not hold here and is not used"));
             return Ok(Some(CarriedModel { earlier: geometry, model, fitted, screening, held: Vec::new() }));
         }
-        match comparison.is_worse_outside() {
-            true => context
+        match (comparison.is_worse_where_judged(), comparison.is_worse_outside()) {
+            (true, _) => context.services.warn(format!(
+                "{words}: what was identified besides the geometry makes these points worse, though not those that placed the base, by which it was chosen"
+            )),
+            (false, true) => context
                 .services
                 .warn(format!("{words}: in unvisited cells what was identified besides the geometry makes it worse")),
-            false => context.services.note(words),
+            (false, false) => context.services.note(words),
         }
         Ok(None)
     }
@@ -179,14 +189,14 @@ fn is_geometry(row: &ParameterRow) -> bool {
     row.form.is_none() && (row.effect == AnchorShift::NAME || BASE.contains(&row.effect.as_str()))
 }
 
-/// Whole points by which carried models are judged: those that did not place their base, or where there are none, all; without those
-/// that neither can follow.
-fn judges(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> Vec<usize> {
+/// Whole points by which one of two carried models is chosen, those that place their base, and by which both are judged, all others, or
+/// where there are none the same; without those that neither can follow.
+fn sides(data: &Measurements, asked: &[usize], screenings: [&Screening; 2]) -> ComparedRows {
     let aside =
         |row: usize| screenings.iter().all(|one| one.suspects.iter().any(|suspect| suspect.row == row && !suspect.used()));
     let whole: Vec<usize> = (0..data.rows()).filter(|row| data.whole(*row) && !aside(*row)).collect();
-    let others: Vec<usize> = whole.iter().copied().filter(|row| !asked.contains(row)).collect();
-    if others.is_empty() { whole } else { others }
+    let (choose, others): (Vec<usize>, Vec<usize>) = whole.into_iter().partition(|row| asked.contains(row));
+    ComparedRows { judge: if others.is_empty() { choose.clone() } else { others }, choose }
 }
 
 /// What was visited where the model was fitted, else by all other recordings; nothing where there is no other.
@@ -203,24 +213,4 @@ fn visited(source: Option<&CarriedFrom>, all: &[Labelled<Recording>], own: &Reco
         visited.temperature = visited.temperature.take().zip(more.temperature).map(|(a, b)| [a, b].concat());
     }
     Some(Visited::of(&visited, &(0..visited.rows()).collect::<Vec<_>>()))
-}
-
-/// What of each row, of all that the model depends on, was never visited; nothing where that is not known.
-fn remarks(visited: Option<&Visited>, model: &Model, data: &Measurements, context: &Context) -> Vec<Option<String>> {
-    let Some(visited) = visited else { return vec![None; data.rows()] };
-    let depends = Dependence::of(model);
-    let said = |row: usize| {
-        let mut beyond = visited.beyond(data.q(row), data.payload[row], data.temperature(row));
-        beyond.retain_mut(|what| depends.has(what));
-        (!beyond.is_empty()).then(|| beyond.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
-    };
-    let remarks: Vec<Option<String>> = (0..data.rows()).map(said).collect();
-    let outside = remarks.iter().flatten().count();
-    if outside > 0 {
-        let (rows, lie) = (counted(data.rows(), "row"), if outside == 1 { "lies" } else { "lie" });
-        context.services.note(format!(
-            "{outside} of {rows} {lie} outside of what the model was measured at: see the remarks of `prediction`"
-        ));
-    }
-    remarks
 }

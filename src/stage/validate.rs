@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result, counted};
 use crate::robot::NoiseBasis;
-use crate::stage::{Context, Labelled, Stage, computed, reads, writes};
+use crate::stage::{Context, Labelled, Stage, computed, doubtful, reads, writes};
 use crate::statistics::quantile;
 use crate::table::{Observability, Prediction, PredictionRow, Statistics, StatisticsRow};
 use schemars::JsonSchema;
@@ -56,7 +56,7 @@ writes! {
 impl Stage for Validate {
     const NAME: &'static str = "validate";
     const SUMMARY: &'static str = "states the position error after every step, held-out and training rows apart";
-    const IMPLEMENTATION: u32 = 4;
+    const IMPLEMENTATION: u32 = 5;
     type Reads = ValidateReads;
     type Writes = ValidateWrites;
 
@@ -102,6 +102,9 @@ impl Stage for Validate {
                     "{} on {}: the held-out mean of {:.3} mm includes {suspects}; without {them} {without:.3} mm",
                     row.step, row.set, row.mean_mm
                 ));
+            }
+            if let Some(line) = row.doubts() {
+                context.services.note(format!("{} on {}: {line}", row.step, row.set));
             }
         }
         for reference in &self.reference {
@@ -160,6 +163,7 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
     let mut without: Vec<f64> = rows.iter().filter(|row| !row.suspect).map(|row| row.error_mm).collect();
     without.sort_by(f64::total_cmp);
     let suspects = rows.len() - without.len();
+    let remarked: Vec<&PredictionRow> = rows.iter().copied().filter(|row| row.remark.is_some()).collect();
     let at = |share: f64| quantile(&error, share).unwrap_or(f64::NAN);
     let some = suspects > 0 && !without.is_empty();
     let basis = rows.iter().filter_map(|row| NoiseBasis::parse(row.noise_basis.as_deref()?)).max();
@@ -186,6 +190,11 @@ fn describe(order: i64, step: &str, set: &str, held_out: bool, rows: &[&Predicti
         mean_without_mm: some.then(|| average(1)),
         rms_without_mm: some.then(|| average(2).sqrt()),
         max_without_mm: without.last().copied().filter(|_| some),
+        remarked: Some(remarked.len() as i64),
+        mean_remarked_mm: (!remarked.is_empty())
+            .then(|| remarked.iter().map(|row| row.error_mm).sum::<f64>() / remarked.len() as f64),
+        max_remarked_mm: remarked.iter().map(|row| row.error_mm).max_by(f64::total_cmp),
+        remarked_points: (!remarked.is_empty()).then(|| doubtful::named(&remarked)),
         fold_mean_mm: None,
         fold_rms_mm: None,
         fold_max_mm: None,

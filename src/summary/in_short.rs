@@ -32,6 +32,7 @@ pub fn in_short(
     let before = earlier.min_by_key(|row| (row.order, row.held_out != after.held_out));
     let mut text = before.map_or_else(String::new, |row| labelled("before", &error(row)));
     text.push_str(&labelled(if carried.is_some() { "carried" } else { "after" }, &error(after)));
+    text.push_str(&after.doubts().map_or_else(String::new, |line| labelled("doubtful", &line)));
     text.push_str(&labelled("noise", &noise(after)));
     for warning in carried.iter().flat_map(|stage| &stage.warnings) {
         text.push_str(&labelled("warning", warning));
@@ -45,7 +46,7 @@ pub fn in_short(
     if let Some(stage) = ran(Diagnose::NAME) {
         let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
         text.push_str(&labelled("verdict", &told.verdict()));
-        text.push_str(&told.largest().map_or_else(String::new, |findings| labelled("findings", &findings)));
+        text.push_str(&told.strongest().map_or_else(String::new, |findings| labelled("findings", &findings)));
     }
     Ok(Some(text))
 }

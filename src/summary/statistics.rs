@@ -143,6 +143,8 @@ pub fn statistics_json(outcome: &CompletedRun, store: &Store) -> Result<serde_js
             "noise_basis": row.noise_basis,
             "suspects": row.suspects, "mean_without_mm": row.mean_without_mm, "rms_without_mm": row.rms_without_mm,
             "max_without_mm": row.max_without_mm,
+            "remarked": row.remarked, "mean_remarked_mm": row.mean_remarked_mm, "max_remarked_mm": row.max_remarked_mm,
+            "remarked_points": row.remarked_points,
             "fold_mean_mm": row.fold_mean_mm, "fold_rms_mm": row.fold_rms_mm, "fold_max_mm": row.fold_max_mm,
             "block_mean_mm": row.block_mean_mm, "block_rms_mm": row.block_rms_mm, "block_max_mm": row.block_max_mm,
             "fold_expected_mm": row.fold_expected_mm,

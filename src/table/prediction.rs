@@ -39,7 +39,7 @@ crate::table::rows! { "prediction",
         measured: Option<String>,
         /// Angle between what was measured and predicted of the orientation; null where nothing was.
         turn_rad: Option<f64>,
-        /// What of the row lies outside of where the model was measured; null inside, or where that is not known.
+        /// What of the row lies outside of where the model was measured, or is uncertain; null elsewhere, or where that is not known.
         remark: Option<String>,
     }
 }
@@ -161,9 +161,14 @@ impl Prediction {
         self
     }
 
-    /// The same with a remark for each row; nothing where there is none.
-    pub fn with_remarks(mut self, remarks: impl Iterator<Item = Option<String>>) -> Self {
-        self.0.iter_mut().zip(remarks).for_each(|(row, remark)| row.remark = remark);
+    /// The same with a remark for each row behind what is said already; nothing where there is none.
+    pub fn with_remarks(mut self, remarks: impl IntoIterator<Item = Option<String>>) -> Self {
+        for (row, remark) in self.0.iter_mut().zip(remarks) {
+            row.remark = match (row.remark.take(), remark) {
+                (Some(said), Some(more)) => Some(format!("{said}; {more}")),
+                (said, more) => said.or(more),
+            };
+        }
         self
     }
 

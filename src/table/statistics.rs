@@ -50,6 +50,13 @@ crate::table::rows! { "statistics",
         block_max_mm: Option<f64>,
         /// What `fold_rms_mm` to expect of a complete model of p parameters fitted to n values: noise x sqrt(1 + p / (n - p - 1)).
         fold_expected_mm: Option<f64>,
+        /// Points with a remark of `prediction`: outside of where the model was measured, or uncertain. Null in tables of before.
+        remarked: Option<i64>,
+        /// Mean and largest error of these points; null where there are none.
+        mean_remarked_mm: Option<f64>,
+        max_remarked_mm: Option<f64>,
+        /// The first of them, with the remark of one.
+        remarked_points: Option<String>,
         /// A published or agreed figure of the same quantity, named by the pipeline.
         reference: Option<String>,
         reference_mean_mm: Option<f64>,
@@ -58,9 +65,21 @@ crate::table::rows! { "statistics",
     }
 }
 
+use crate::error::counted;
 use crate::robot::NoiseBasis;
 
 impl StatisticsRow {
+    /// Which of its points are outside of what the model knows, with their errors; none where none is.
+    pub fn doubts(&self) -> Option<String> {
+        let (mean, max) = self.mean_remarked_mm.zip(self.max_remarked_mm)?;
+        let points = self.remarked_points.as_deref().unwrap_or_default();
+        let remarked = self.remarked.unwrap_or_default();
+        Some(format!(
+            "{remarked} of {} beyond what was fitted or uncertain by more than half of the correction: mean {mean:.4} mm, max {max:.4} mm there; {points}",
+            counted(self.points as usize, "point")
+        ))
+    }
+
     /// Whether its figures of noise rest on nothing that was stated or measured again.
     pub fn is_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())

@@ -41,13 +41,6 @@ pub struct Layout<'a> {
 /// Columns that calib appends, and that no other table of targets has together.
 const APPENDED: [&str; 3] = ["uncorrected_mm", "residual_mm", "iterations"];
 
-/// Why targets without a payload are refused.
-pub fn unstated_payload(load: f64) -> String {
-    format!(
-        "states no payload, and the identified arm depends on it (measured up to {load} kg): give --payload KG, 0 where nothing is carried; a table may have a column payload_kg"
-    )
-}
-
 impl Layout<'_> {
     /// Why a table is refused by its columns: it was corrected already.
     fn refused(&self, names: &[String]) -> Result<()> {

@@ -1,7 +1,8 @@
 //! One row of targets as numbers, and what holds of the rows of a whole table.
 
+use super::Layout;
 use super::columns::{ColumnRole, TargetColumns};
-use super::{Layout, unstated_payload};
+use crate::compensate::unstated_payload;
 use crate::compensate::{CommandTarget, turns};
 use crate::description::{JointKind, RobotDescription};
 use crate::error::{Fault, counted};

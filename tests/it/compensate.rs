@@ -4,6 +4,7 @@ pub mod concealed;
 mod controller_list;
 mod counting;
 mod counting_said;
+mod doubtful;
 mod gate;
 mod maker;
 mod posture;

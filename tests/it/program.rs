@@ -4,6 +4,7 @@ mod krl;
 mod random;
 mod rapid;
 mod reader;
+mod surroundings;
 
 use calib::program::{Language, Note, Partial, Program, SolvedLiteral, TargetKind};
 

@@ -29,6 +29,17 @@ impl Circumstance {
     pub fn unknown(joints: usize) -> Self {
         Self { payload: 0.0, temperature: None, time: LONG_AFTER, direction: vec![0.0; joints], current: None }
     }
+
+    /// Those under which a row was measured.
+    pub fn of_row(data: &Measurements, row: usize) -> Self {
+        Self {
+            payload: data.payload[row],
+            temperature: data.temperature(row),
+            time: data.time(row),
+            direction: (0..data.joints).map(|joint| data.direction(row, joint)).collect(),
+            current: data.current(row).map(<[f64]>::to_vec),
+        }
+    }
 }
 
 /// An identified arm.
@@ -61,6 +72,16 @@ impl IdentifiedArm {
     /// Positions of the parameters that belonged to the measurement by which the arm was identified.
     pub(super) fn of_the_measurement(&self) -> &[usize] {
         &self.quiet
+    }
+
+    /// The effect and place that depends on motor currents, where one does: without them it is nothing.
+    pub(super) fn by_current(&self) -> Option<String> {
+        let (specs, x) = (self.model.stack.specs(), &self.model.x);
+        let mut effects = self.model.stack.effects().filter(|(effect, _)| effect.needs_current());
+        effects.find_map(|(effect, mut range)| {
+            let k = range.find(|k| x[*k] != 0.0)?;
+            Some(format!("{} at {}", effect.name(), specs[k].place))
+        })
     }
 
     /// The base in the tracker's frame.
@@ -159,7 +180,10 @@ impl Reach<'_> {
             without[parameters.clone()].fill(0.0);
             let displacement = point - stack.point(robot, &self.data, 0, &without, &mut self.scratch);
             without[parameters.clone()].copy_from_slice(&x[parameters.clone()]);
-            out.push(BeyondFitted { parameters, variable, share, displacement });
+            // What belonged to the measurement moves no arm.
+            if displacement.norm() > 0.0 {
+                out.push(BeyondFitted { parameters, variable, share, displacement });
+            }
         }
         out
     }

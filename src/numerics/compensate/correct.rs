@@ -78,6 +78,8 @@ pub struct Corrector<'a> {
     coverage: Option<Coverage>,
     uncertainty: Option<Uncertainty>,
     manner: CorrectionOptions,
+    /// What of the model depends on motor currents.
+    by_current: Option<String>,
     /// Nominal joints of the target before.
     last: Option<Vec<f64>>,
     direction: Vec<f64>,
@@ -162,8 +164,9 @@ impl<'a> Corrector<'a> {
         uncertainty: Option<Uncertainty>,
         manner: CorrectionOptions,
     ) -> Self {
-        let joints = arm.model().robot.joints();
-        Self { arm, coverage, uncertainty, manner, last: None, direction: vec![0.0; joints], tally: CorrectionTotals::default() }
+        let (joints, by_current) = (arm.model().robot.joints(), arm.by_current());
+        let (direction, tally) = (vec![0.0; joints], CorrectionTotals::default());
+        Self { arm, coverage, uncertainty, manner, by_current, last: None, direction, tally }
     }
 
     /// Whether targets get an uncertainty.
@@ -265,10 +268,7 @@ impl<'a> Corrector<'a> {
             remarks.extend((!limits.is_empty()).then_some(Remark::BeyondLimits(limits)));
             let unmeasured = self.coverage.iter().flat_map(|coverage| coverage.beyond(&found.q, &job.circumstance));
             remarks.extend(unmeasured.map(Remark::BeyondMeasured));
-            let doubtful = certainty.iter().filter(|certainty| certainty.is_remarkable());
-            remarks.extend(doubtful.map(|one| Remark::Uncertain(one.correction, one.u95, one.finding.clone())));
-            let beyond = certainty.iter().flat_map(|certainty| &certainty.beyond);
-            remarks.extend(beyond.map(|(finding, variable)| Remark::BeyondFitted(finding.clone(), variable.clone())));
+            remarks.extend(certainty.iter().flat_map(Remark::of_certainty));
             let share = reach.share();
             if share < 1.0 {
                 remarks.push(Remark::Faded(share));
@@ -286,7 +286,11 @@ impl<'a> Corrector<'a> {
             certainty,
             remarks,
         };
-        self.manner.gate.judge(&mut command);
+        let unstated = self.by_current.as_ref().filter(|_| job.circumstance.current.is_none());
+        let unstated = unstated.map(|finding| {
+            format!("{finding} depends on the motor current, which the target does not state (columns i1_a, i2_a, ...)")
+        });
+        self.manner.gate.judge(&mut command, unstated);
         command
     }
 }

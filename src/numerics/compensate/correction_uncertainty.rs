@@ -4,7 +4,7 @@ use super::arm::{BeyondFitted, IdentifiedArm, Reach};
 use super::uncertainty::Uncertainty;
 use crate::estimate::choose::median;
 use crate::robot::Measurements;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// 95 % of a normal distribution lie within so many standard deviations.
 const COVERAGE: f64 = 1.96;
@@ -58,23 +58,21 @@ impl Uncertainty {
     /// Of the correction (m, tracker frame) that brought the command to `q`, under the circumstances that `reach` is set to.
     pub fn of_correction(&self, reach: &mut Reach, q: &[f64], correction: &Vector3<f64>) -> CorrectionUncertainty {
         let beyond: Vec<BeyondFitted> = reach.beyond_fitted(q).into_iter().filter(|one| one.share > SLACK).collect();
-        let off = |one: &BeyondFitted| one.share * one.displacement;
-        let by_range: Matrix3<f64> = beyond.iter().map(|one| off(one) * off(one).transpose()).sum();
         let size = correction.norm();
         let along = if size > 0.0 { correction / size } else { Vector3::zeros() };
-        let variance = |covariance: &Matrix3<f64>| along.dot(&(covariance * along));
-        let all = variance(&(self.of_parameters(reach, q) + by_range));
+        let by_range = |one: &BeyondFitted| (one.share * one.displacement.dot(&along)).powi(2);
+        let jacobian = self.along(reach, q, &along);
+        let variance = self.variance(&jacobian) + beyond.iter().map(by_range).sum::<f64>();
         let named: Vec<(String, String)> =
             beyond.iter().map(|one| (self.name(one.parameters.start), one.variable.to_string())).collect();
-        let mut shares = self.by_effect(reach, q, &along);
-        shares.extend(beyond.iter().zip(&named).map(|(one, (name, _))| (name.clone(), along.dot(&off(one)).powi(2))));
-        let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-        CorrectionUncertainty {
-            correction: size,
-            u95: COVERAGE * all.sqrt(),
-            finding: most.filter(|(_, own)| *own >= NAMED * all).map(|(name, _)| name),
-            beyond: named,
-            usual: self.usual,
+        let u95 = COVERAGE * variance.sqrt();
+        let mut finding = None;
+        if u95 > 0.5 * size {
+            let mut shares = self.by_effect(&jacobian);
+            shares.extend(beyond.iter().zip(&named).map(|(one, (name, _))| (name.clone(), by_range(one))));
+            let most = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+            finding = most.filter(|(_, own)| *own >= NAMED * variance).map(|(name, _)| name);
         }
+        CorrectionUncertainty { correction: size, u95, finding, beyond: named, usual: self.usual }
     }
 }

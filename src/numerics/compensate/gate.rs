@@ -44,12 +44,13 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Takes the joints away from a command beyond the limits, or remarks that someone insisted.
-    pub(super) fn judge(&self, command: &mut CorrectedCommand) {
+    /// Takes the joints away from a command beyond the limits, or of which something is not known that it depends on; or remarks that someone
+    /// insisted.
+    pub(super) fn judge(&self, command: &mut CorrectedCommand, unstated: Option<String>) {
         if command.q.is_some() {
             command.remarks.extend(self.model.iter().cloned().map(Remark::Insisted));
         }
-        let Some(reason) = command.q.as_ref().and_then(|_| self.reason(command)) else { return };
+        let Some(reason) = command.q.as_ref().and_then(|_| unstated.or_else(|| self.reason(command))) else { return };
         if self.insisted {
             command.remarks.push(Remark::Insisted(reason));
         } else {

@@ -23,3 +23,10 @@ pub fn load_matters(arm: &IdentifiedArm, heaviest: f64) -> bool {
         (reach.place(poses.q(row)).translation - without.translation).norm() > MATTERS
     })
 }
+
+/// Why targets without a payload are refused; `load`: the largest that was measured, kg.
+pub fn unstated_payload(load: f64) -> String {
+    format!(
+        "states no payload, and the identified arm depends on it (measured up to {load} kg): give --payload KG, 0 where nothing is carried; a table may have a column payload_kg, a program tooldata or $LOAD"
+    )
+}

@@ -1,5 +1,6 @@
 //! What is wrong with a command, and how people are told.
 
+use super::CorrectionUncertainty;
 use crate::robot::{Unmeasured, numbered};
 use std::fmt;
 
@@ -26,6 +27,15 @@ pub enum Remark {
     Refused(String),
     /// Beyond a limit, and written because someone insisted.
     Insisted(String),
+}
+
+impl Remark {
+    /// What is to be said of how certain a correction is.
+    pub(super) fn of_certainty(certainty: &CorrectionUncertainty) -> Vec<Self> {
+        let uncertain = || Self::Uncertain(certainty.correction, certainty.u95, certainty.finding.clone());
+        let beyond = certainty.beyond.iter().map(|(finding, variable)| Self::BeyondFitted(finding.clone(), variable.clone()));
+        certainty.is_remarkable().then(uncertain).into_iter().chain(beyond).collect()
+    }
 }
 
 impl fmt::Display for Remark {

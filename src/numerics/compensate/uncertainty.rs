@@ -93,13 +93,22 @@ impl Uncertainty {
         self.covariance.of_point(&self.jacobian(reach, q))
     }
 
-    /// Variance (m2) along a direction by each effect at a place alone.
-    pub(super) fn by_effect(&self, reach: &mut Reach, q: &[f64], along: &Vector3<f64>) -> Vec<(String, f64)> {
-        let jacobian = self.jacobian(reach, q);
+    /// Derivatives (m per unit) of the point at command `q` along a direction, by the parameters of the covariance.
+    pub(super) fn along(&self, reach: &mut Reach, q: &[f64], along: &Vector3<f64>) -> Vec<f64> {
+        self.jacobian(reach, q).iter().map(|derivative| derivative.dot(along)).collect()
+    }
+
+    /// Variance (m2) along the direction of these derivatives.
+    pub(super) fn variance(&self, derivatives: &[f64]) -> f64 {
+        self.covariance.along(derivatives)
+    }
+
+    /// The same by each effect at a place alone.
+    pub(super) fn by_effect(&self, derivatives: &[f64]) -> Vec<(String, f64)> {
         let variance = |source: &Source| {
-            let mut own = vec![Vector3::zeros(); jacobian.len()];
-            source.parameters.iter().for_each(|row| own[*row] = jacobian[*row]);
-            along.dot(&(self.covariance.of_point(&own) * along))
+            let mut own = vec![0.0; derivatives.len()];
+            source.parameters.iter().for_each(|row| own[*row] = derivatives[*row]);
+            self.variance(&own)
         };
         self.sources.iter().map(|source| (source.name.clone(), variance(source))).collect()
     }

@@ -175,6 +175,9 @@ impl Effect for Form {
     fn needs_torque(&self) -> bool {
         self.inner.needs_torque()
     }
+    fn needs_current(&self) -> bool {
+        self.inner.needs_current() || self.variables().iter().any(|variable| matches!(variable, Variable::Current { .. }))
+    }
     fn needs_sight(&self) -> bool {
         self.inner.needs_sight()
     }

@@ -5,7 +5,7 @@ use super::summary::amplitude;
 use super::unweighed_windup::UnweighedWindup;
 use super::{
     Basis, Cause, CauseDescription, Form, Hypothesis, Law, Motion, NumberSpec, ParameterEstimate, Place, Summary, Survey, Term,
-    Variable, figure, orders,
+    Variable, orders,
 };
 use crate::robot::RobotModel;
 use crate::units::Unit;
@@ -68,7 +68,7 @@ impl Cause for GearCyclic {
 
     fn sentence(&self, summary: &Summary) -> String {
         let mut orders: Vec<String> = summary.estimates(Self::NAME).map(|(term, numbers)| order(term, &numbers)).collect();
-        let weight = summary.form::<UnweighedWindup>().map(|windup| figure(windup.largest(summary), 0));
+        let weight = summary.form::<UnweighedWindup>().map(|windup| windup.largest(summary));
         orders.extend(weight.map(|size| format!("1 times a turn by {size} arcsec")));
         orders.extend(summary.estimates(JointTable::NAME).map(|(table, numbers)| strongest_orders(table, &numbers)));
         format!("the transmission or encoder of {} errs periodically with its angle: {}", summary.place, orders.join(", "))

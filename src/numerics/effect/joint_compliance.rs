@@ -140,6 +140,10 @@ impl Effect for Windup {
         self.load == Load::GravityTorque
     }
 
+    fn needs_current(&self) -> bool {
+        self.load == Load::MotorCurrent
+    }
+
     fn missing(&self, robot: &RobotModel, data: &Measurements) -> Option<String> {
         match self.load {
             Load::MotorCurrent if data.current.is_none() => Some("the recording has no motor currents".into()),

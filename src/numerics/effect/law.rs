@@ -1,6 +1,6 @@
 //! Laws: a basis of a variable, or the product of two.
 
-use super::{ArmState, Basis, LONG_AFTER, Variable};
+use super::{ArmState, Basis, Variable};
 use crate::robot::RobotModel;
 use serde::{Deserialize, Serialize};
 
@@ -38,19 +38,24 @@ impl Factor {
         Self { within: held.then_some([low, high]), ..self }
     }
 
-    /// The variable, where nothing more was seen at the place where the functions are held. A law of few numbers goes on for a while.
+    /// The variable, where nothing more was seen at the place where the functions are held. A law of few numbers goes on for a while, but
+    /// not in time: what was seen last is the best that is known of later.
     fn held(&self, u: f64) -> f64 {
         let Some([low, high]) = self.within else { return u };
-        let further = if self.basis.is_curve() { 0.0 } else { FURTHER * (high - low) };
+        let ends = self.basis.is_curve() || self.of == Variable::Time;
+        let further = if ends { 0.0 } else { FURTHER * (high - low) };
         u.clamp(low - further, high + further)
     }
 
     /// By how much the variable is beyond the fitted range in a row, as a share of that range, at most 1; 0 inside.
     pub(super) fn beyond(&self, robot: &RobotModel, state: &ArmState) -> f64 {
         let (Some([low, high]), Some(u)) = (self.within, self.of.value(0, robot, state)) else { return 0.0 };
-        // A step has happened, and a command whose time nobody states is long after the recording.
-        if matches!(self.basis, Basis::After { .. }) || (self.of == Variable::Time && u == LONG_AFTER) {
-            return 0.0;
+        match self.basis {
+            // A step has happened.
+            Basis::After { .. } => return 0.0,
+            // What had not yet settled when the recording ended.
+            Basis::Settling { start, constant } if u > high => return libm::exp(-(high - start).max(0.0) / constant),
+            _ => {}
         }
         let off = (low - u).max(u - high).max(0.0);
         if off == 0.0 { 0.0 } else { (off / (high - low)).min(1.0) }

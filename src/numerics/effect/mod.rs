@@ -225,6 +225,10 @@ pub trait Effect: Send + Sync {
     fn needs_torque(&self) -> bool {
         false
     }
+    /// True if the effect reads motor currents.
+    fn needs_current(&self) -> bool {
+        false
+    }
     /// True if the effect reads [`ArmState::sight`]; such a one reads no posture.
     fn needs_sight(&self) -> bool {
         false

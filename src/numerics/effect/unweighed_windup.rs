@@ -115,17 +115,29 @@ impl UnweighedWindup {
     /// The deflection of a finding that has such a form, in words: up to so many arcsec.
     pub fn size(summary: &Summary) -> Option<String> {
         let windup: &Self = summary.form()?;
-        Some(format!("by up to {} arcsec where its links stretch out level", figure(windup.largest(summary), 0)))
+        Some(format!("by up to {} arcsec where its links stretch out level", windup.largest(summary)))
     }
 
-    /// The deflection (arcsec) of a finding's form with all its bodies level.
-    pub fn largest(&self, summary: &Summary) -> f64 {
+    /// The deflection (arcsec) of a finding's form with all its bodies level, with its standard deviation where that is known, as if the
+    /// moments were independent.
+    pub fn largest(&self, summary: &Summary) -> String {
         let number = summary.forms.iter().position(|form| form.as_a::<Self>() == Some(self));
         let own = summary.parameters.iter().filter(|estimate| Some(estimate.form) == number);
-        let sizes: Vec<(usize, f64)> =
-            self.shape.moments.iter().map(|moment| moment.body).zip(own.map(|own| own.value)).collect();
-        let squares = sizes.chunk_by(|a, b| a.0 == b.0).map(|body| body.iter().map(|(_, size)| size * size).sum::<f64>());
-        squares.map(f64::sqrt).sum()
+        let moments: Vec<(usize, f64, Option<f64>)> =
+            self.shape.moments.iter().zip(own).map(|(moment, own)| (moment.body, own.value, own.sigma)).collect();
+        let (mut size, mut variance) = (0.0, Some(0.0));
+        for body in moments.chunk_by(|a, b| a.0 == b.0) {
+            let length = body.iter().map(|(_, value, _)| value * value).sum::<f64>().sqrt();
+            size += length;
+            for (_, value, sigma) in body {
+                let share = if length > 0.0 { value / length } else { 1.0 };
+                variance = variance.zip(*sigma).map(|(sum, sigma)| sum + (share * sigma).powi(2));
+            }
+        }
+        match variance {
+            Some(variance) => format!("{} +- {}", figure(size, 0), figure(variance.sqrt(), 0)),
+            None => figure(size, 0),
+        }
     }
 
     /// An eccentric wheel, or a balancer, does the same as a weight about the first level axis.

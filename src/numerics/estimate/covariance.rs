@@ -75,6 +75,11 @@ impl Covariance {
         (0..self.free.len()).map(along).map(|along| along * along.transpose()).sum()
     }
 
+    /// Variance of what has these derivatives (SI) by [`Covariance::parameters`].
+    pub(crate) fn along(&self, derivatives: &[f64]) -> f64 {
+        (0..self.free.len()).map(|k| dot(derivatives, self.root.column(k)).powi(2)).sum()
+    }
+
     /// Standard deviation of the `row`-th free parameter, SI.
     pub(crate) fn sigma(&self, row: usize) -> f64 {
         self.product(row, row).sqrt()

@@ -115,6 +115,12 @@ impl<'t> Aggregate<'t> {
             || (!names.is_empty() && names.iter().all(|name| of(&[&FRAME, &STATUS, &EXTERNALS], name)))
     }
 
+    /// The number of a field, in capitals, where it is one.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let field = self.fields.iter().find(|field| field.first().is_some_and(|first| self.source.is_word(first, &[name])))?;
+        self.source.number(&field[1..]).map(|(number, _)| number)
+    }
+
     /// How its type is stated.
     pub fn advice(&self) -> &'static str {
         if self.has_axes() {
@@ -168,7 +174,7 @@ impl<'t> Aggregate<'t> {
         let turn = given("T").map_or(PostureStatement::Unstated, |(_, value, _)| PostureStatement::Turn(*value as u32));
         let status = given("S").map(|(.., span)| span.start);
         found.status = found.status.or(status);
-        found.literals.push(Literal { kind, values, spans, external, posture: turn });
+        found.literals.push(Literal { kind, values, spans, external, posture: turn, frame: None, payload: None });
     }
 
     /// Name and number of a field; status and turn may be bit patterns.

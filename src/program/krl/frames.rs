@@ -3,27 +3,32 @@
 use super::super::Gathered;
 use super::super::token::{ProgramText, Token};
 use super::line::member;
+use super::surroundings::Surroundings;
 
 /// What a line sets that calib takes for granted.
-pub(super) fn set(source: ProgramText, line: &[Token], found: &mut Gathered) {
+pub(super) fn set(source: ProgramText, line: &[Token], known: &Surroundings, found: &mut Gathered) {
     for (k, token) in line.iter().enumerate() {
         let names = ["$BASE", "$TOOL", "$IPO_MODE", "$ROBROOT"];
         if source.is_word(token, &names) && member(source, &line[k + 1..]).is_some_and(|(_, rest)| rest.is_some()) {
             let name = source.upper(token);
-            found.frame(token.span.start, assumed(&name));
+            if !known.applies(&name) {
+                found.frame(token.span.start, assumed(&name));
+            }
         }
     }
     let calls = line.windows(4).find(|w| source.is_word(&w[0], &["BAS"]) && w[1].is(b'(') && w[2].is(b'#'));
     if let Some(call) = calls.filter(|call| source.is_word(&call[3], &["BASE", "TOOL", "EX_BASE", "FRAMES"])) {
         let name = if source.is_word(&call[3], &["TOOL"]) { "$TOOL" } else { "$BASE" };
-        found.frame(call[0].span.start, assumed(name));
+        if !known.applies(name) {
+            found.frame(call[0].span.start, assumed(name));
+        }
     }
 }
 
 /// The data of an inline form: which base its point is taught in.
-pub(super) fn of_point(source: ProgramText, tokens: &[Token], found: &mut Gathered) {
+pub(super) fn of_point(source: ProgramText, tokens: &[Token], known: &Surroundings, found: &mut Gathered) {
     let base = tokens.windows(2).find(|w| source.is_word(&w[0], &["BASE_NO"]));
-    if base.and_then(|w| source.number(&w[1..])).is_some_and(|(number, _)| number != 0.0) {
+    if base.and_then(|w| source.number(&w[1..])).is_some_and(|(number, _)| number != 0.0) && !known.applies("$BASE") {
         found.frame(tokens[0].span.start, assumed("$BASE"));
     }
     if tokens.windows(3).any(|w| source.is_word(&w[0], &["IPO_FRAME"]) && source.is_word(&w[2], &["TCP"])) {

@@ -9,6 +9,7 @@ mod aggregate;
 mod frames;
 mod line;
 mod listed;
+mod surroundings;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
@@ -16,6 +17,7 @@ use aggregate::{Aggregate, Type};
 use line::{closing, declared, member, opens, structure, variable};
 pub(super) use listed::listed;
 use std::collections::{BTreeMap, BTreeSet};
+use surroundings::Surroundings;
 
 /// Motions, and how many positions each has.
 const MOTIONS: [(&str, usize); 7] = [("PTP", 1), ("LIN", 1), ("CIRC", 2), ("SPTP", 1), ("SLIN", 1), ("SCIRC", 2), ("SPL", 1)];
@@ -51,10 +53,12 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
         }
     }
     let structures = lines.iter().filter_map(|line| structure(source, line)).collect();
-    let mut reader = Reader { source, types, structures, found };
+    let surroundings = Surroundings::of(source, &lines);
+    let mut reader = Reader { source, types, structures, surroundings, found };
     for line in lines {
         reader.line(line);
     }
+    reader.surroundings.settle(&mut reader.found);
     reader.found
 }
 
@@ -64,6 +68,7 @@ struct Reader<'p> {
     types: BTreeMap<String, Vec<String>>,
     /// Types that the file itself declares by STRUC, in capitals.
     structures: BTreeSet<String>,
+    surroundings: Surroundings,
     found: Gathered,
 }
 
@@ -72,7 +77,7 @@ impl Reader<'_> {
         if !self.braces_match(line) {
             return;
         }
-        frames::set(self.source, line, &mut self.found);
+        frames::set(self.source, line, &self.surroundings, &mut self.found);
         let head = self.source.upper(&line[0]);
         if LEFT.contains(&head.as_str()) {
             if head.ends_with("_REL") {
@@ -254,7 +259,10 @@ impl Reader<'_> {
             return;
         }
         if FRAME_TABLES.contains(&name.as_str()) {
-            self.found.frame(at, frames::assumed(if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" }));
+            let variable = if name == "TOOL_DATA" { "$TOOL" } else { "$BASE" };
+            if !self.surroundings.applies(variable) {
+                self.found.frame(at, frames::assumed(variable));
+            }
             return;
         }
         let by_name = declares.or_else(|| self.stated(&name)).filter(|_| member.is_none()).map(String::from);
@@ -275,7 +283,7 @@ impl Reader<'_> {
     fn of_other_type(&mut self, kind: &str, tokens: &[Token]) {
         let at = tokens[0].span.start;
         if kind == "FDAT" {
-            frames::of_point(self.source, tokens, &mut self.found);
+            frames::of_point(self.source, tokens, &self.surroundings, &mut self.found);
         } else if !KNOWN.contains(&kind) && Aggregate::new(self.source, tokens).may_be_target() {
             if self.structures.contains(kind) {
                 self.found.warn(at, format!("left as it is: {kind} is a structure of this file and no type of targets"));

@@ -9,7 +9,7 @@ use std::ops::Range;
 const NOT_CONNECTED: f64 = 9e9;
 
 /// How far from 1 the length of a quaternion may be: four decimals are enough.
-const UNIT: f64 = 1e-3;
+pub(super) const UNIT: f64 = 1e-3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Want {
@@ -80,6 +80,22 @@ impl<'t> List<'t> {
 
     fn lists(&self) -> impl Iterator<Item = &List<'t>> {
         self.items.iter().filter_map(|item| if let Item::List(list) = item { Some(list) } else { None })
+    }
+
+    /// The list that is item `k`.
+    pub fn list(&self, k: usize) -> Option<&List<'t>> {
+        self.items.get(k).and_then(|item| if let Item::List(list) = item { Some(list) } else { None })
+    }
+
+    /// The number that is item `k`.
+    pub fn number(&self, k: usize) -> Option<f64> {
+        let Item::Leaf(tokens) = self.items.get(k)? else { return None };
+        self.source.number(tokens).map(|(number, _)| number)
+    }
+
+    /// Whether item `k` is a word, in any case.
+    pub fn is_word(&self, k: usize, word: &str) -> bool {
+        matches!(self.items.get(k), Some(Item::Leaf([token])) if self.source.is_word(token, &[word]))
     }
 
     /// What it, or a list inside it, has the form of: names may stand for some of its lists.
@@ -166,7 +182,7 @@ impl<'t> List<'t> {
             }
         }
         let kind = if want == Want::Joints { TargetKind::Joints } else { TargetKind::Quaternion };
-        found.literals.push(Literal { kind, values, spans, external, posture });
+        found.literals.push(Literal { kind, values, spans, external, posture, frame: None, payload: None });
     }
 
     fn numbers(&self, found: &mut Gathered) -> Vec<(f64, Range<usize>)> {

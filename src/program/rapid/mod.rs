@@ -7,12 +7,14 @@
 
 mod list;
 mod listed;
+mod surroundings;
 
 use super::token::{ProgramText, Token, TokenKind, tokens};
 use super::{DEPTH, Gathered, Language, quoted};
 use list::{List, Want};
 pub(super) use listed::listed;
 use std::collections::BTreeMap;
+use surroundings::Surroundings;
 
 /// Motion instructions by how they begin, and which of the positional arguments are positions.
 const MOTIONS: [(&str, &[usize]); 10] = [
@@ -70,10 +72,12 @@ pub(super) fn read(bytes: &[u8]) -> Gathered {
             }
         }
     }
-    let mut reader = Reader { source, types, found };
+    let surroundings = Surroundings::of(source, &statements);
+    let mut reader = Reader { source, types, surroundings, found };
     for statement in statements {
         reader.statement(statement);
     }
+    reader.surroundings.settle(&mut reader.found);
     reader.found
 }
 
@@ -152,6 +156,7 @@ struct Reader<'p> {
     source: ProgramText<'p>,
     /// Variable -> types it is declared with anywhere in the file.
     types: BTreeMap<String, Vec<String>>,
+    surroundings: Surroundings,
     found: Gathered,
 }
 
@@ -161,12 +166,12 @@ impl Reader<'_> {
             return;
         }
         self.frames(statement);
-        if let Some(Declaration { kind, value, stray, .. }) = declaration(self.source, statement) {
+        if let Some(Declaration { kind, value, stray, name }) = declaration(self.source, statement) {
             if let Some(stray) = stray {
                 let text = quoted(self.source.bytes, stray.span.clone());
                 self.found.fault(stray.span.start, format!("{text} in a declaration is not understood; expected `:=` or `;`"));
             }
-            return self.set(value.unwrap_or_default(), Some(&kind));
+            return self.set(value.unwrap_or_default(), Some(&kind), name);
         }
         // In the head of a routine these words stand in brackets.
         let storage = |(token, depth): &(&Token, _)| *depth == 0 && self.source.is_word(token, &STORAGE);
@@ -213,7 +218,9 @@ impl Reader<'_> {
             let rest = &statement[k + 1..];
             let Some(name) = rest.first() else { continue };
             let value = quoted(self.source.bytes, rest.get(2).map_or(name.span.clone(), |value| value.span.clone()));
-            if self.source.is_word(name, &["WOBJ"]) && !rest.get(2).is_some_and(|value| self.source.is_word(value, &["WOBJ0"])) {
+            let applied =
+                |value: &Token| self.source.is_word(value, &["WOBJ0"]) || self.surroundings.has_object(&self.source.upper(value));
+            if self.source.is_word(name, &["WOBJ"]) && !rest.get(2).is_some_and(applied) {
                 self.found.frame(token.span.start, format!("work object {value}: {BASE}"));
             } else if self.source.is_word(name, &["TOOL"]) {
                 self.found.frame(token.span.start, format!("tool {value}: calib assumed that it is the tool of the robot file"));
@@ -226,8 +233,8 @@ impl Reader<'_> {
         }
     }
 
-    /// A value for a variable of type `kind`; none: of a type that this file does not state.
-    fn set(&mut self, value: &[Token], kind: Option<&str>) {
+    /// A value for the variable `name` of type `kind`; none: of a type that this file does not state.
+    fn set(&mut self, value: &[Token], kind: Option<&str>, name: String) {
         let want = match kind {
             Some("ROBTARGET") => Some(Want::Pose),
             Some("JOINTTARGET") => Some(Want::Joints),
@@ -241,7 +248,9 @@ impl Reader<'_> {
                     let text = quoted(self.source.bytes, stray.span.clone());
                     self.found.fault(stray.span.start, format!("{text} behind a target is not understood"));
                 } else {
+                    let before = self.found.literals.len();
                     list.take(want, true, &mut self.found);
+                    self.surroundings.named(before..self.found.literals.len(), name);
                 }
             }
             _ if kind.is_some_and(|kind| NUMBERS.contains(&kind)) => {}
@@ -279,7 +288,7 @@ impl Reader<'_> {
         let types = self.types.get(&name).map(Vec::as_slice).unwrap_or_default();
         let Some(member) = members.first() else {
             let kind = if let [one] = types { Some(one.clone()) } else { None };
-            return self.set(value, kind.as_deref());
+            return self.set(value, kind.as_deref(), name);
         };
         let at = variable[0].span.start;
         let target = types.iter().any(|kind| matches!(kind.as_str(), "ROBTARGET" | "JOINTTARGET"));
@@ -296,6 +305,9 @@ impl Reader<'_> {
 
     fn instruction(&mut self, statement: &[Token]) {
         let name = self.source.upper(&statement[0]);
+        if name == "GRIPLOAD" {
+            self.surroundings.grip(self.source, statement, &mut self.found);
+        }
         let motion = MOTIONS.iter().find(|(begin, _)| name.starts_with(begin) && name != NO_MOTION);
         let Some((begin, positions)) = motion else {
             return self.others(statement, format!("`{name}`, no motion instruction that calib knows"));
@@ -305,8 +317,9 @@ impl Reader<'_> {
             return;
         }
         let want = if name.contains("ABSJ") { Want::Joints } else { Want::Pose };
-        let mut number = 0;
-        for argument in arguments(&statement[1..]) {
+        let (mut number, arguments) = (0, arguments(&statement[1..]));
+        self.surroundings.motion(self.source, &name, &arguments, positions, self.found.literals.len());
+        for argument in arguments {
             let Some(first) = argument.first() else {
                 number += 1;
                 continue;

@@ -50,18 +50,25 @@ impl Compared {
     }
 }
 
+/// Rows of whole points: held-out ones judge and never choose.
+pub(super) struct ComparedRows {
+    pub choose: Vec<usize>,
+    pub judge: Vec<usize>,
+}
+
 /// Both models at the points that judge them.
 pub(super) struct Comparison {
+    chosen_by: Compared,
     all: Compared,
     /// In cells of the joint space that the model was fitted in, and outside of them; none where that is not known.
     parts: Option<[Compared; 2]>,
 }
 
 impl Comparison {
-    /// Of rows that judge; predictions of the carried model and of its geometry.
+    /// By predictions of the carried model and of its geometry.
     pub fn of(
         data: &Measurements,
-        judges: &[usize],
+        rows: &ComparedRows,
         [whole, geometry]: [&[Vector3<f64>]; 2],
         visited: Option<&VisitedCells>,
     ) -> Self {
@@ -71,14 +78,19 @@ impl Comparison {
             geometry: CarriedErrors::of(data, geometry, rows),
         };
         let parts = visited.map(|visited| {
-            let (inside, outside): (Vec<usize>, Vec<usize>) = judges.iter().partition(|row| visited.has(data.q(**row)));
+            let (inside, outside): (Vec<usize>, Vec<usize>) = rows.judge.iter().partition(|row| visited.has(data.q(**row)));
             [compared(&inside), compared(&outside)]
         });
-        Self { all: compared(judges), parts }
+        Self { chosen_by: compared(&rows.choose), all: compared(&rows.judge), parts }
     }
 
-    /// Whether the geometry alone is better.
+    /// Whether the geometry alone is better at the points that choose.
     pub fn is_worse(&self) -> bool {
+        self.chosen_by.points > 0 && self.chosen_by.whole.is_worse(&self.chosen_by.geometry)
+    }
+
+    /// Whether it is better at the points that judge.
+    pub fn is_worse_where_judged(&self) -> bool {
         self.all.points > 0 && self.all.whole.is_worse(&self.all.geometry)
     }
 

@@ -19,12 +19,10 @@ impl DiagnosisSummary {
         }
     }
 
-    /// The largest findings by name, place and size; nothing where nothing was found.
-    pub fn largest(&self) -> Option<String> {
-        let mut all: Vec<&FindingRow> = self.findings.0.iter().collect();
-        // One recording tells lengths or angles.
-        let size = |row: &FindingRow| row.effect_rms_mm.or(row.effect_rms_rad).unwrap_or(0.0);
-        all.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    /// The strongest findings by name, place and size; nothing where nothing was found. The size of one that zero or ratio make up for may be
+    /// large, whatever the data say of it: it puts none first.
+    pub fn strongest(&self) -> Option<String> {
+        let all: Vec<&FindingRow> = self.findings.0.iter().collect();
         let told = |row: &FindingRow| match (row.effect_rms_mm, row.effect_rms_rad) {
             (Some(mm), _) => format!(" ({:.0} um rms)", 1000.0 * mm),
             (None, Some(angle)) => format!(" ({:.0} arcsec rms)", Unit::Arcsecond.from_si(angle)),

@@ -48,18 +48,23 @@ const OF_THE_ARM: [&str; 13] = [
 const TARGETS: usize = 500;
 
 /// A target and what came of it.
-struct Outcome {
-    outside: bool,
+pub struct Outcome {
+    pub outside: bool,
     /// mm; with all findings, and with geometry alone.
-    miss: f64,
-    plain: f64,
+    pub miss: f64,
+    pub plain: f64,
     u95: f64,
-    remarked: bool,
-    refused: bool,
+    pub remarked: bool,
+    pub refused: bool,
 }
 
-/// What the tool says of a target, and where the arm goes then.
+/// What the tool says of a target, and where the arm goes then; what it names.
 fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
+    outcomes_at(case, targets(case))
+}
+
+/// The same of these targets, each with whether it is outside of what was measured.
+pub fn outcomes_at(case: &Case, (targets, outside): (Vec<Point>, Vec<bool>)) -> (Vec<Outcome>, String) {
     let recording = recording(case);
     let split = split(case, &recording);
     let mut robot = case.robot.clone();
@@ -78,6 +83,12 @@ fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
     let model = model(&robot, &table::<Parameters>(&tables).remove(0));
     let covariance = table::<CovarianceTable>(&tables).remove(0).of_model(&model);
     let verdict = table::<Verdict>(&tables).remove(0);
+    if from_environment("CALIB_DETAILS", 0) == 1 {
+        for row in &table::<Parameters>(&tables).remove(0).0 {
+            println!("  {} {} = {:.4} +- {:?} {} {}", row.name, row.place, row.change, row.sigma, row.unit, row.status);
+        }
+        println!("  {:?}", verdict.0[0].statement);
+    }
     let unexplained = table::<Prediction>(&tables).remove(0).unexplained_mm() * 1e-3;
     let findings = table::<Findings>(&tables).remove(0);
     let named: Vec<String> = findings.0.iter().map(|row| format!("{} at {}", row.effect, row.place)).collect();
@@ -85,7 +96,6 @@ fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
     let arm = IdentifiedArm::new(model, None);
     let data = recording.measurements();
 
-    let (targets, outside) = targets(case);
     let options = || CorrectionOptions {
         convention: JointConvention::of_the_robot_file(robot.joints.len()),
         cartesian: false,
@@ -119,7 +129,7 @@ fn outcomes(case: &Case) -> (Vec<Outcome>, String) {
 
 const GEOMETRY: [&str; 6] = ["base_frame", "tool_offset", "joint_offset", "link_geometry", "reduction_ratio", "coupling_ratio"];
 
-fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
+pub fn model(robot: &RobotDescription, parameters: &Parameters) -> Model {
     parameters.model(RobotModel::new(robot.clone()), &[], Load::GravityTorque).expect("a model")
 }
 
@@ -154,7 +164,7 @@ pub fn recording(case: &Case) -> Recording {
 }
 
 /// Two thirds in the joints' recorded ranges, loads and times, then one third over all that the joints can do, with other loads, later.
-fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
+pub fn targets(case: &Case) -> (Vec<Point>, Vec<bool>) {
     let fitted: Vec<_> = case.shots.iter().filter(|shot| shot.block == FIT).collect();
     let joints = case.robot.joints.len();
     let recorded: Vec<[f64; 2]> = (0..joints)
@@ -232,7 +242,7 @@ pub fn from_environment(name: &str, usual: u64) -> u64 {
 }
 
 /// Whether a target is missed by more than with geometry alone, and by more than the instrument scatters, without a word.
-fn is_harmed(one: &Outcome, floor: f64) -> bool {
+pub fn is_harmed(one: &Outcome, floor: f64) -> bool {
     one.miss > (1.5 * one.plain).max(2.0 * floor) && !one.remarked
 }
 
@@ -300,34 +310,23 @@ fn a_correction_never_harms_unless_it_says_so() {
 
 /// Rows that keep the tool upright, up or down: the arm's moment across the sum of three angles loads no row. The robot file gives no
 /// masses, gears wave at all joints.
-fn upright(seed: u64) -> Case {
-    let design =
-        Design { seed, cases: 1, robots: vec![Kind::Compact6], nulls: 1.0, bare: true, faulty: 0.0, ..Design::default() };
-    let mut case = Case::make(&design, 0, Content::Null).expect("a case");
+pub fn upright(seed: u64) -> Case {
+    let case = nothing(seed, true);
     let mut draw = Noise::new(seed, Purpose::Design);
     let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
     let arm = Arm::new(&case.robot, &case.truth);
     let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
-    let mut q_of = |_: usize| loop {
-        let (mut q, _) = allowed(&arm, &poses, &limits, &mut draw).expect("a pose");
-        let turned = if draw.chance(0.5) { 90.0f64 } else { -90.0 };
+    let mut own = Noise::new(seed ^ 7, Purpose::Design);
+    let q_of = |_: &Shot| loop {
+        let (mut q, _) = allowed(&arm, &poses, &limits, &mut own).expect("a pose");
+        let turned = if own.chance(0.5) { 90.0f64 } else { -90.0 };
         q[3] = turned.to_radians() - q[1] - q[2];
         q[3] -= std::f64::consts::TAU * (q[3] / std::f64::consts::TAU).round();
-        q[4] = if draw.chance(0.5) { 90.0f64 } else { -90.0 }.to_radians();
+        q[4] = if own.chance(0.5) { 90.0f64 } else { -90.0 }.to_radians();
         if (limits[3][0]..=limits[3][1]).contains(&q[3]) {
             return q;
         }
     };
-    let mut points = std::mem::take(&mut case.shots);
-    let mut before = vec![0.0; 6];
-    let mut planned = Vec::new();
-    for (k, shot) in points.drain(..).enumerate() {
-        let q: Vec<f64> = q_of(k);
-        let direction = calib::twin::plan::direction(&q, &before);
-        let Shot { block, time_s, temperature_c, .. } = shot;
-        planned.push(Point { block, q: q.clone(), before, direction, time_s, temperature_c, payload_kg: 0.0 });
-        before = q;
-    }
     let yields = [(2, 6e-6), (3, 8e-6), (4, 1e-5)]
         .map(|(joint, rad_per_nm)| Physical::JointCompliance(JointCompliance { joint, rad_per_nm }));
     let gears = (1..=5).map(|joint| {
@@ -339,8 +338,29 @@ fn upright(seed: u64) -> Case {
             phase_deg: draw.uniform(0.0, 360.0),
         })
     });
-    case.friction.clear();
-    case.friction.extend(yields.into_iter().chain(gears));
+    let effects = yields.into_iter().chain(gears).collect();
+    again(case, effects, seed, q_of)
+}
+
+/// A desktop arm with nothing concealed, unless without masses.
+pub fn nothing(seed: u64, bare: bool) -> Case {
+    let design = Design { seed, cases: 1, robots: vec![Kind::Compact6], nulls: 1.0, bare, faulty: 0.0, ..Design::default() };
+    // Without currents, which no target states.
+    Case { hidden: [Column::Current].into(), tampered: Vec::new(), ..Case::make(&design, 0, Content::Null).expect("a case") }
+}
+
+/// The case measured again with these effects, at the poses that `q_of` gives its rows; nothing is carried.
+pub fn again(mut case: Case, effects: Vec<Physical>, seed: u64, mut q_of: impl FnMut(&Shot) -> Vec<f64>) -> Case {
+    let mut before = vec![0.0; 6];
+    let mut planned = Vec::new();
+    for shot in std::mem::take(&mut case.shots) {
+        let q = q_of(&shot);
+        let direction = calib::twin::plan::direction(&q, &before);
+        let Shot { block, time_s, temperature_c, .. } = shot;
+        planned.push(Point { block, q: q.clone(), before, direction, time_s, temperature_c, payload_kg: 0.0 });
+        before = q;
+    }
+    case.friction = effects;
     let experiment = Experiment {
         robot: &case.robot,
         truth: &case.truth,
@@ -370,5 +390,21 @@ fn what_no_row_shows_moves_no_robot() {
         let square = |of: fn(&Outcome) -> f64| kept().map(of).map(|miss| miss * miss).sum::<f64>();
         assert!(square(|one| one.miss) < 0.25 * square(|one| one.plain), "seed {}: {named}", 500 + seed);
         assert!(outcomes.iter().filter(|one| is_harmed(one, floor)).count() * 1000 <= outcomes.len(), "seed {}", 500 + seed);
+        // Home, and all links in line upwards: the tool is level there, as in no row.
+        let away = [[0.0; 6], [0.0, 0.0, -90.0, 0.0, 0.0, 0.0]].map(|q: [f64; 6]| q.map(f64::to_radians).to_vec());
+        let point = |q: Vec<f64>| Point {
+            block: FIT,
+            before: q.clone(),
+            direction: vec![0.0; 6],
+            time_s: case.shots[0].time_s,
+            temperature_c: case.shots[0].temperature_c,
+            payload_kg: 0.0,
+            q,
+        };
+        let (away, _) = outcomes_at(&case, (away.map(point).to_vec(), vec![true; 2]));
+        for one in &away {
+            println!("    home and candle: {:.3} mm, with geometry alone {:.3}, remark {}", one.miss, one.plain, one.remarked);
+            assert!(one.refused || !is_harmed(one, floor), "seed {}", 500 + seed);
+        }
     }
 }

@@ -78,6 +78,81 @@ fn a_cartesian_program_in_a_frame_that_is_not_applied_is_refused_by_line() {
 }
 
 #[test]
+fn a_target_in_a_work_object_is_corrected_where_it_stands() {
+    let rest = "[9E9,9E9,9E9,9E9,9E9,9E9]]";
+    let numbers = |text: &str| -> Vec<f64> {
+        let line = text.lines().find(|line| line.starts_with("MoveL")).expect("a motion");
+        let cut = |c: char| !(c.is_ascii_digit() || "+-.".contains(c));
+        line[5..].split(cut).filter_map(|word| word.parse().ok()).take(7).collect()
+    };
+    let plain = format!("MODULE m\nMoveL [[900,40,930],[1,0,0,0],[9E9,9E9,9E9,9E9],{rest},v1,z1,t;\nENDMODULE\n");
+    std::fs::write(cell().join("plain.mod"), plain).expect("a file");
+    let (code, plain, err) = run(&["compensate", "latest", "plain.mod"], "");
+    assert_eq!(code, Some(0), "{err}");
+    // Moved by 100, 20, -30 mm and turned by half a turn about z: x and y change their signs.
+    let object = "PERS wobjdata fixture:=[FALSE,TRUE,\"\",[[100,0,0],[0,0,0,1]],[[0,-20,-30],[1,0,0,0]]];\n";
+    let program = format!(
+        "MODULE m\n{object}MoveL [[-800,-20,960],[0,0,0,1],[9E9,9E9,9E9,9E9],{rest},v1,z1,t\\WObj:=fixture;\nENDMODULE\n"
+    );
+    std::fs::write(cell().join("object.mod"), program).expect("a file");
+    let (code, within, err) = run(&["compensate", "latest", "object.mod"], "");
+    assert_eq!(code, Some(0), "{err}");
+    assert!(err.contains("work object `FIXTURE` is applied as this program declares it"), "{err}");
+    let (plain, within) = (numbers(&plain), numbers(&within));
+    let there = [100.0 - within[0], 20.0 - within[1], within[2] - 30.0];
+    assert!(there.iter().zip(&plain).all(|(a, b)| (a - b).abs() < 2e-5), "{there:?} {plain:?}");
+    assert!((plain[0] - 900.0).abs() > 0.01, "{plain:?}");
+}
+
+#[test]
+fn a_table_of_parameters_without_a_verdict_is_held_to_the_same_limits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    std::fs::write(here.join("robot.yaml"), ROBOT).expect("a file");
+    let far = PIPELINE.replace("shift_mm: [0.4, 0.2, -0.3]", "shift_mm: [80.0, 0.2, -0.3]");
+    for (pipeline, refused) in [(PIPELINE.to_string(), false), (far, true)] {
+        std::fs::write(here.join("pipeline.yaml"), pipeline).expect("a file");
+        calib(here, &["run", "pipeline.yaml", "--quiet"], "");
+        let tables = here.join(".calib/tables");
+        let table = newest_parameters(&tables);
+        let bare = here.join("bare.parquet");
+        std::fs::copy(table, &bare).expect("a copy");
+        let given = ["compensate", "bare.parquet", "--robot", "robot.yaml", "--angle", "deg"];
+        let said = |more: &[&str]| {
+            let output = calib(here, &[&given[..], more].concat(), HEADER);
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned(), output.stdout.len())
+        };
+        let (code, err, bytes) = said(&[]);
+        if refused {
+            assert_eq!((code, bytes), (Some(10), 0), "{err}");
+            assert!(err.contains("refused: joint_offset at joint 2 is") && err.contains("from the robot file's"), "{err}");
+            let (code, err, _) = said(&["--force"]);
+            assert!(code != Some(2) && err.contains("used because of --force: joint_offset at joint 2"), "{err}");
+        } else {
+            assert_eq!(code, Some(0), "{err}");
+            assert_eq!(said(&["--max-correction", "0.01"]).0, Some(10));
+            assert_eq!(said(&["--max-shift", "0.001"]).0, Some(10));
+        }
+    }
+}
+
+/// The table of parameters that was written last below a folder.
+fn newest_parameters(folder: &std::path::Path) -> std::path::PathBuf {
+    let mut all: Vec<std::path::PathBuf> = vec![folder.into()];
+    let mut found = Vec::new();
+    while let Some(next) = all.pop() {
+        for entry in std::fs::read_dir(next).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+            if entry.is_dir() {
+                all.push(entry);
+            } else if entry.file_name().is_some_and(|name| name.to_string_lossy().contains("parameters")) {
+                found.push((entry.metadata().and_then(|data| data.modified()).expect("a time"), entry));
+            }
+        }
+    }
+    found.into_iter().max().expect("a table").1
+}
+
+#[test]
 fn an_output_never_takes_the_place_of_a_file_that_was_read() {
     for file in ["robot.yaml", "pipeline.yaml"] {
         let folder = tempfile::tempdir().expect("a folder");
@@ -138,6 +213,33 @@ fn targets_that_state_no_payload_are_refused_where_the_model_depends_on_it() {
         assert!(said.contains("states no payload") && said.contains("measured up to 50 kg"), "{said}");
         let stated = calib(here, &["compensate", "pipeline.yaml", file, "--quiet", "--payload", "0"], HEADER);
         assert_eq!(stated.status.code(), Some(0), "{}", String::from_utf8_lossy(&stated.stderr));
+    }
+    // A program says it by the tool of its motions, or by $LOAD.
+    let joints = "MoveAbsJ [[10,20,-30,5,40,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,gun;\n";
+    let tool = "PERS tooldata gun:=[TRUE,[[0,0,0],[1,0,0,0]],[50,[0,0,0],[1,0,0,0],0,0,0]];\n";
+    for (file, stating, target) in [
+        ("t.mod", tool, joints),
+        ("t.src", "$LOAD={M 50,CM {X 0,Y 0,Z 0,A 0,B 0,C 0}}\n", "PTP {A1 10,A2 20,A3 -30,A4 5,A5 40,A6 0}\n"),
+    ] {
+        let said = |text: &str, more: &[&str]| {
+            std::fs::write(here.join(file), text).expect("a file");
+            let output = calib(here, &[&["compensate", "pipeline.yaml", file], more].concat(), "");
+            let [out, err] = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+            (
+                output.status.code(),
+                out.lines().filter(|line| line.contains("20.") || line.contains("19.")).collect::<String>(),
+                err,
+            )
+        };
+        let (code, out, err) = said(target, &[]);
+        assert_eq!((code, out.as_str()), (Some(10), ""), "{err}");
+        let (code, by_program, err) = said(&format!("{stating}{target}"), &[]);
+        assert_eq!(code, Some(0), "{err}");
+        assert!(err.contains("payload 50 kg, as"), "{err}");
+        assert_eq!(by_program, said(target, &["--payload", "50"]).1);
+        let (_, other, err) = said(&format!("{stating}{target}"), &["--payload", "0"]);
+        assert!(err.contains("the program states a payload of 50 kg, --payload 0 kg, which is used"), "{err}");
+        assert_ne!(by_program, other);
     }
     let column = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg\n10,20,-30,5,40,0,50\n";
     assert_eq!(calib(here, &["compensate", "pipeline.yaml", "--quiet"], column).status.code(), Some(0));

@@ -30,7 +30,7 @@ pub(crate) fn settle(
     fitter: &Fitter,
     tell: &mut dyn FnMut(String),
 ) -> Settled {
-    let joins = structured || !fitter.data.in_motion(&judged.state.screening.kept);
+    let joins = structured || !fitter.is_on_a_path(&judged.state.screening.kept);
     let mut refused: Vec<Place> = Vec::new();
     let mut asked_alone = false;
     for round in 0..=ROUNDS {

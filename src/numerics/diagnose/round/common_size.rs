@@ -46,7 +46,9 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         let specs = cause.form.parameters(&state.model.robot);
         let Some(size) = size(&state.model, covariance, &own, specs[family[0]].prior_sigma) else { continue };
         let others = range.clone().filter(|k| !own.contains(k)).map(|k| state.model.x[k].abs());
-        let size = size.max(BESIDE * others.fold(0.0, f64::max));
+        // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
+        let most = others.fold(0.0, f64::max);
+        let size = if most > 0.0 { size.clamp(BESIDE * most, most) } else { size };
         any = true;
         let sigma = |k: usize| if family.contains(&k) { size } else { specs[k].prior_sigma };
         cause.priors = (0..specs.len()).map(|k| Prior { mean: 0.0, sigma: sigma(k) }).collect();

@@ -184,6 +184,11 @@ impl<'a> Fitter<'a> {
         self.estimated < ESTIMATES && !self.data.in_motion(&settled.screening.kept)
     }
 
+    /// Whether neighbours in time are neighbours in pose: there noise that lasts looks like a smooth function of any variable.
+    pub fn is_on_a_path(&self, rows: &[usize]) -> bool {
+        self.data.in_motion(rows) || follow_a_path(&self.data, rows)
+    }
+
     /// Whether causes that do not follow time are searched by themselves: rows follow a path, and something looks correlated.
     pub fn causes_of_the_arm_first(&self) -> bool {
         self.on_path == PathCorrelation::CausesFirst

@@ -1,4 +1,4 @@
-//! What the findings of a carried model depend on: only that is worth a remark where it was never visited.
+//! What the findings of a model depend on: only that is worth a remark where it was never visited.
 
 use crate::diagnose::BASE;
 use crate::effect::{AnchorShift, Variable};

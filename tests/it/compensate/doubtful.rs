@@ -1,0 +1,108 @@
+//! Findings beyond the rows that they were fitted to: held-out points there are counted and named, targets have a remark, none is harmed in
+//! silence.
+
+use super::concealed::{Outcome, again, is_harmed, nothing, outcomes_at, recording, split, targets, upright};
+use crate::desk::{Desk, table};
+use calib::stage::{Diagnose, DiagnoseReads, Labelled, Validate, ValidateReads};
+use calib::table::{Prediction, Robot, Statistics, StatisticsRow, Verdict};
+use calib::twin::arm::Arm;
+use calib::twin::conceal::case::Case;
+use calib::twin::conceal::points::FIT;
+use calib::twin::effect::{Curve, Foreign, ForeignCourse, ForeignMotion, ForeignShape, ForeignVariable};
+use calib::twin::effect::{JointCompliance, JointHardening, Physical};
+use calib::twin::noise::{Noise, Purpose};
+use calib::twin::plan::{Poses, allowed};
+use calib::twin::recorder::Shot;
+use serde_json::json;
+
+/// What a diagnosis and its validation say of a recording.
+fn judged(case: &Case) -> (Verdict, Prediction, StatisticsRow) {
+    let recording = recording(case);
+    let split = split(case, &recording);
+    let stage: Diagnose = serde_json::from_value(json!({})).expect("settings");
+    let reads = DiagnoseReads { robot: Robot::from_description(&case.robot), recording, split };
+    let tables = Desk::default().run(&stage, reads).expect("a diagnosis");
+    let prediction = table::<Prediction>(&tables).remove(0);
+    let labelled = Labelled { stage: "diagnose".into(), table: prediction.clone() };
+    let reads = ValidateReads { prediction: vec![labelled], observability: Vec::new() };
+    let stated = Desk::default().run(&Validate::default(), reads).expect("statistics");
+    let held_out = table::<Statistics>(&stated).remove(0).0.into_iter().find(|row| row.held_out).expect("held-out rows");
+    (table::<Verdict>(&tables).remove(0), prediction, held_out)
+}
+
+/// Every remark of a held-out row, and that table, figures and verdict count alike.
+fn counted(case: &Case) -> Vec<Option<String>> {
+    let (verdict, prediction, held_out) = judged(case);
+    let remarks: Vec<Option<String>> = prediction.0.iter().filter(|row| row.held_out).map(|row| row.remark.clone()).collect();
+    let remarked = remarks.iter().flatten().count();
+    assert_eq!(held_out.remarked, Some(remarked as i64));
+    let statement = verdict.0[0].statement.clone().expect("a statement");
+    println!("{statement}\n{:?}", held_out.doubts());
+    assert_eq!(remarked > 0, held_out.doubts().is_some());
+    assert_eq!(remarked > 0, statement.contains("held-out points have a remark"), "{statement}");
+    remarks
+}
+
+fn unharmed(case: &Case) -> Vec<Outcome> {
+    let floor = case.noise_mm[0] * 3f64.sqrt();
+    let (outcomes, named) = outcomes_at(case, targets(case));
+    let harmed = outcomes.iter().filter(|one| !one.refused && is_harmed(one, floor)).count();
+    println!("{named}: harmed {harmed} of {}", outcomes.len());
+    assert!(harmed * 500 <= outcomes.len(), "{named}: {harmed}");
+    outcomes
+}
+
+#[test]
+fn a_zero_that_wanders_in_time_is_said_to_be_unknown_later() {
+    let case = nothing(41, false);
+    let last = case.shots.last().expect("rows").time_s;
+    let course = ForeignCourse {
+        over: ForeignVariable::Time,
+        between: [0.0, last],
+        shape: ForeignShape::Smooth(vec![[1.0, 7.0, 0.4], [0.5, 13.0, 2.0]]),
+    };
+    let wanders = Foreign { motion: ForeignMotion::JointTurn, seat: 2, direction: [0.0; 3], size: 60.0, courses: vec![course] };
+    let case = again(case, vec![Physical::Foreign(wanders)], 41, |shot| shot.q.clone());
+    let remarks = counted(&case);
+    let over_time =
+        |remark: &Option<String>| remark.as_ref().is_some_and(|said| said.contains("beyond the") && said.contains("time"));
+    // The first follow the last fitted one by less than a fiftieth of the recording.
+    let (soon, later) = remarks.split_at(remarks.len() / 10);
+    assert!(later.iter().all(over_time) && soon.iter().filter(|remark| over_time(remark)).count() < 8, "{remarks:?}");
+    unharmed(&case);
+}
+
+#[test]
+fn what_depends_on_motor_currents_is_refused_to_targets_that_state_none() {
+    let mut case = upright(500);
+    case.hidden.clear();
+    let (outcomes, named) = outcomes_at(&case, targets(&case));
+    assert!(named.contains("joint_compliance"), "{named}");
+    assert!(outcomes.iter().all(|one| one.refused && one.remarked), "{named}");
+}
+
+#[test]
+fn loads_on_one_side_say_nothing_of_the_other_without_a_word() {
+    let case = nothing(43, false);
+    let limits: Vec<[f64; 2]> = case.robot.joints.iter().map(|joint| joint.limits.expect("limits")).collect();
+    let arm = Arm::new(&case.robot, &case.truth);
+    let poses = Poses { range_deg: Vec::new(), floor_mm: 20.0, clearance_mm: 150.0, candidates: 1 };
+    let mut draw = Noise::new(43, Purpose::Design);
+    // The arm leans forward in fitted rows, backward in the others.
+    let lean = |shot: &Shot| {
+        let [low, high] = if shot.block == FIT { [15.0, 75.0] } else { [-75.0, -15.0] }.map(f64::to_radians);
+        let mut ranges = limits.clone();
+        ranges[1] = [limits[1][0].max(low), limits[1][1].min(high)];
+        ranges[2] = [-10f64, 10.0].map(f64::to_radians);
+        allowed(&arm, &poses, &ranges, &mut draw).expect("a pose").0
+    };
+    let effects = vec![
+        Physical::JointCompliance(JointCompliance { joint: 2, rad_per_nm: 6e-6 }),
+        Physical::JointHardening(JointHardening { joint: 2, curve: Curve::Tanh, amplitude_arcsec: 80.0, scale_nm: 12.0 }),
+    ];
+    let case = again(case.clone(), effects, 43, lean);
+    let remarks = counted(&case);
+    // Held-out rows lean the other way: joint 2, whose load that is, has been there in none.
+    assert!(remarks.iter().all(|remark| remark.as_ref().is_some_and(|said| said.contains("joint 2"))), "{remarks:?}");
+    unharmed(&case);
+}
