@@ -24,8 +24,8 @@ pub(super) fn not_so(effect: &str, summary: &Summary, why: &str, rms: &str) -> S
 
 /// The sentence of a finding that is none of the list with a probability; `nearest` is that of its name, which holds a share of what is there.
 pub(super) fn none_of_the_list(place: Place, nearest: &str, none: f64, share: f64) -> String {
-    let holds = if share < 0.995 { format!(", which holds {:.0} % of it", 100.0 * share) } else { String::new() };
-    format!("what acts at {place} is no cause of the list, with probability {none:.2}; nearest is{holds}: {nearest}")
+    let holds = if share < 0.995 { format!(" explains {:.0} % of it", 100.0 * share) } else { " comes close".into() };
+    format!("a cause that is in no list acts at {place} (probability {none:.2}); the nearest of the list{holds}: {nearest}")
 }
 
 /// The sentence of a finding whose name the user has excluded.
