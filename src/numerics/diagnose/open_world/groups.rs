@@ -11,6 +11,8 @@ const LENGTHS: [f64; 5] = [1.0, 0.35, 0.12, 0.045, 0.02];
 const FINEST: usize = 48;
 const FINE: usize = 16;
 const COARSE: usize = 8;
+/// Of what is tried with several numbers; the best of them is looked at again with [`FINE`] ones.
+const SKETCH: usize = 4;
 /// Cosines of each of two variables.
 const EACH: usize = 4;
 /// Cosines have no slope at the ends of their range: it is wider than the rows' by this share at either end.
@@ -214,7 +216,8 @@ impl<'f, 'a> GroupColumns<'f, 'a> {
             _ => Vec::new(),
         };
         let one = |of: Variable| Some(FreeGroup { law: Law::new(of, self.basis(of, FINE)?), ..*group });
-        variables.into_iter().filter_map(one).collect()
+        let first = (level == 0 && !variables.is_empty()).then_some(group.law.first.of);
+        first.into_iter().chain(variables).filter_map(one).collect()
     }
 
     /// GroupProducts of a group that shows with every other variable of its motion: an interaction is looked for where a factor of it helps.
@@ -289,9 +292,9 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
         let fades = FADING.map(|time| Variable::Recent { joint, time });
         let clocked = survey.data.has_clock();
         let all = sticks.into_iter().chain(fades.into_iter().filter(move |_| clocked)).chain([Variable::Move { joint }]);
-        all.map(|of| (of, COARSE))
+        all.map(|of| (of, if alike(of) > 1 { SKETCH } else { COARSE }))
     };
-    let space = || arrows().map(|along| (Variable::Position { along }, COARSE));
+    let space = || arrows().map(|along| (Variable::Position { along }, SKETCH));
     match place {
         Place::Joint(joint) => {
             let own: Vec<_> =
@@ -313,7 +316,7 @@ fn motions(place: Place, survey: &Survey) -> Vec<(Motion, Vec<(Variable, usize)>
         }
         Place::Tracker => {
             let sight = [Variable::Azimuth, Variable::Elevation, Variable::Range].map(|of| (of, FINE));
-            let space = arrows().map(|along| (Variable::Sighted { along }, COARSE));
+            let space = arrows().map(|along| (Variable::Sighted { along }, SKETCH));
             let own: Vec<_> = sight.into_iter().chain(passing()).chain(angles(joints)).chain(sides()).chain(space).collect();
             [Polar::Range, Polar::Azimuth, Polar::Elevation].map(|of| (Motion::Instrument { of }, own.clone())).to_vec()
         }
