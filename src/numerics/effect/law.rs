@@ -145,3 +145,82 @@ impl From<Factor> for Law {
         Self { first, times: None }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robot::import::{RobotFileText, read_calib};
+    use crate::robot::{Measurements, Posture};
+    use nalgebra::Vector3;
+
+    const ROBOT: &str = "calib_robot: 1
+name: small
+units: {length: mm, angle: deg}
+kinematics:
+  screws:
+    - {axis: [0, 0, 1], point: [0, 0, 0]}
+    - {axis: [0, 1, 0], point: [0, 0, 400]}
+tool: {point: [500, 0, 400]}
+joints: [{name: A1}, {name: A2}]
+links:
+  - {mass: 10, centre: [0, 0, 200]}
+  - {mass: 5, centre: [250, 0, 400]}
+";
+
+    /// The sum of a factor's functions at one row, and its share beyond the fitted range.
+    fn at(factor: &Factor, angle: f64, [payload, temperature, time]: [f64; 3]) -> (f64, f64) {
+        let robot = RobotModel::new(read_calib(RobotFileText { label: "robot.yaml", text: ROBOT }, None).expect("a robot").robot);
+        let data = Measurements {
+            joints: 2,
+            q: vec![angle; 2],
+            position: vec![Vector3::new(2.0 + payload, 0.0, 0.0)],
+            sigma: vec![Vector3::repeat(1e-5)],
+            payload: vec![payload],
+            temperature: Some(vec![temperature]),
+            time: Some(vec![time]),
+            ..Measurements::default()
+        };
+        let posture = Posture::as_stated(&robot, data.q(0), payload);
+        let state = ArmState::new(&data, 0, &posture, Vector3::new(2.0 + payload, 0.0, 0.0));
+        let mut sum = 0.0;
+        factor.values(&robot, &state, &mut |_, value| sum += value);
+        (sum, factor.beyond(&robot, &state))
+    }
+
+    #[test]
+    fn every_law_holds_at_the_ends_of_what_was_fitted_and_says_how_far_beyond_it_is() {
+        let curve = |[low, high]: [f64; 2]| Basis::Cosines { low, high, count: 6 };
+        let line = |_: [f64; 2]| Basis::PROPORTIONAL;
+        let variables: [(Variable, [f64; 2], fn(f64) -> (f64, [f64; 3])); 5] = [
+            (Variable::Angle { joint: 1 }, [-0.4, 0.6], |u| (u, [0.0; 3])),
+            (Variable::Payload, [1.0, 9.0], |u| (0.0, [u, 0.0, 0.0])),
+            (Variable::Temperature, [20.0, 30.0], |u| (0.0, [0.0, u, 0.0])),
+            (Variable::Time, [0.0, 1000.0], |u| (0.0, [0.0, 0.0, u])),
+            (Variable::Range, [2.0, 4.0], |u| (0.0, [u - 2.0, 0.0, 0.0])),
+        ];
+        for (of, within, row) in variables {
+            let span = within[1] - within[0];
+            for (basis, further) in [(curve(within), 0.0), (line(within), if of == Variable::Time { 0.0 } else { FURTHER })] {
+                let factor = Factor::new(of, basis).held_within(within);
+                let see = |u: f64| {
+                    let (angle, rest) = row(u);
+                    at(&factor, angle, rest)
+                };
+                assert_eq!(see(within[0] + 0.3 * span).1, 0.0, "{of}");
+                let end = see(within[1] + further * span);
+                let (far, share) = see(within[1] + 0.8 * span);
+                assert!((far - end.0).abs() < 1e-9, "{of}: {far} {}", end.0);
+                assert!((share - 0.8).abs() < 1e-9, "{of}: {share}");
+                assert_eq!(see(within[1] + 5.0 * span).1, 1.0, "{of}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_settled_or_stepped_stays_and_what_had_not_is_unknown_later() {
+        let share = |basis: Basis| at(&Factor::new(Variable::Time, basis).held_within([0.0, 1000.0]), 0.0, [0.0, 0.0, 9000.0]).1;
+        assert_eq!(share(Basis::After { at: 500.0 }), 0.0);
+        assert!((share(Basis::Settling { start: 0.0, constant: 200.0 }) - (-5.0f64).exp()).abs() < 1e-12);
+        assert!(share(Basis::Settling { start: 0.0, constant: 2000.0 }) > 0.6);
+    }
+}

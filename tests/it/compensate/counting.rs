@@ -4,11 +4,12 @@
 use super::maker::{IDENTIFY, Maker, PLAIN, makers, ran, recorded};
 use super::true_error::Cell;
 use super::{ROBOT, calib};
+use calib::compensate::{Nominal, ToolGoal, least_change, turns};
 use calib::robot::RobotModel;
 use calib::robot::import::{RobotFileText, read_calib};
 use calib::spatial::Pose;
 use calib::twin::plan::Point;
-use nalgebra::Rotation3;
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::path::Path;
 
 /// How far (mm) the true robot is with each command from where it was wanted, in the base as it was identified.
@@ -62,6 +63,36 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
     std::fs::write(here.join("t.mod"), format!("MODULE m\n{rapid}ENDMODULE\n")).expect("a file");
     let rapid = ran(here, &["compensate", "latest", "t.mod"], "");
 
+    let quadrant = |c: f64| (c / 90.0).floor() as i32;
+    let cartesian: Vec<(Vec<f64>, [f64; 3], nalgebra::UnitQuaternion<f64>)> = targets
+        .iter()
+        .map(|target| {
+            let pose = robot.forward(&target.q);
+            (maker.counted(&target.q), (pose.translation * 1e3).into(), nalgebra::UnitQuaternion::from_matrix(&pose.rotation))
+        })
+        .collect();
+    let krl_poses: String = cartesian
+        .iter()
+        .map(|(counted, [x, y, z], turn)| {
+            let (c, b, a) = turn.euler_angles();
+            let [a, b, c] = [a, b, c].map(|angle: f64| format!("{:.9}", angle.to_degrees()));
+            let turn: u32 = (0..6).filter(|joint| counted[*joint] < 0.0).map(|joint| 1 << joint).sum();
+            format!("LIN {{X {x:.6},Y {y:.6},Z {z:.6},A {a},B {b},C {c},T {turn}}}\n")
+        })
+        .collect();
+    std::fs::write(here.join("poses.src"), krl_poses).expect("a file");
+    let krl_poses = ran(here, &["compensate", "latest", "poses.src"], "");
+    let rapid_poses: String = cartesian
+        .iter()
+        .map(|(counted, [x, y, z], turn)| {
+            let q = format!("{:.10},{:.10},{:.10},{:.10}", turn.w, turn.i, turn.j, turn.k);
+            let [one, four, six] = [0, 3, 5].map(|joint| quadrant(counted[joint]));
+            format!("MoveL [[{x:.6},{y:.6},{z:.6}],[{q}],[{one},{four},{six},0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,z1,t;\n")
+        })
+        .collect();
+    std::fs::write(here.join("poses.mod"), format!("MODULE m\n{rapid_poses}ENDMODULE\n")).expect("a file");
+    let rapid_poses = ran(here, &["compensate", "latest", "poses.mod"], "");
+
     let listed = |text: &str, start: &str, end: &str| -> Vec<Vec<f64>> {
         let number = |part: &str| part.trim().trim_start_matches('A').to_string();
         text.lines()
@@ -90,11 +121,35 @@ fn compensated(maker: &Maker, cell: &Cell, points: &[Point], targets: &[Point]) 
         ("KRL", listed(&krl, "{", "}")),
         ("RAPID", listed(&rapid, "[[", "]")),
     ];
-    outputs
+    let joints = outputs.map(|(output, commands)| (output, commands.iter().map(|numbers| maker.driven(numbers)).collect()));
+    // A controller that believes in the robot file drives to a pose from where it is near.
+    let driven = |poses: Vec<(Matrix3<f64>, [f64; 3])>| -> Vec<Vec<f64>> {
+        let near = |((rotation, place), target): ((Matrix3<f64>, [f64; 3]), &Point)| {
+            let goal = ToolGoal { pose: Pose::new(rotation, Vector3::from(place) * 1e-3), oriented: true };
+            let found = least_change(&mut Nominal::new(&robot), &goal, &target.q, &target.q);
+            assert!(found.residual < 1e-6, "{}", found.residual);
+            found.q
+        };
+        poses.into_iter().zip(targets).map(near).collect()
+    };
+    let of_krl = |numbers: Vec<f64>| {
+        let [a, b, c] = [3, 4, 5].map(|k| numbers[k].to_radians());
+        (turns(a, b, c), [numbers[0], numbers[1], numbers[2]])
+    };
+    let of_rapid = |numbers: Vec<f64>| {
+        let turn = nalgebra::Quaternion::new(numbers[3], numbers[4], numbers[5], numbers[6]);
+        let turn = nalgebra::UnitQuaternion::from_quaternion(turn).to_rotation_matrix().into_inner();
+        (turn, [numbers[0], numbers[1], numbers[2]])
+    };
+    let poses = [
+        ("KRL, poses", driven(listed(&krl_poses, "{", ",T").into_iter().map(of_krl).collect())),
+        ("RAPID, poses", driven(listed(&rapid_poses.replace("],[", ","), "[[", ",9E9").into_iter().map(of_rapid).collect())),
+    ];
+    joints
         .into_iter()
-        .map(|(output, commands)| {
-            assert_eq!(commands.len(), targets.len(), "{output}");
-            let driven: Vec<Vec<f64>> = commands.iter().map(|numbers| maker.driven(numbers)).collect();
+        .chain(poses)
+        .map(|(output, driven)| {
+            assert_eq!(driven.len(), targets.len(), "{output}");
             (output, misses(cell, &base, targets, &driven))
         })
         .collect()

@@ -5,7 +5,7 @@
 //! logarithm of the evidence is half the sum over eigenvalues p of P of b^2 / (p + 1/s^2) - ln(1 + s^2 p).
 
 use super::fit_state::{EstimatedCause, FitState, Fitter};
-use crate::estimate::{Covariance, Model, Prior};
+use crate::estimate::{Covariance, Model, ParameterStatus, Prior};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// The size is searched from the plausible one downwards over so many e-folds, in so many steps.
@@ -44,16 +44,30 @@ fn held(state: &FitState) -> Option<Vec<EstimatedCause>> {
         }
         let own: Vec<usize> = family.iter().map(|k| range.start + k).collect();
         let specs = cause.form.parameters(&state.model.robot);
-        let Some(size) = size(&state.model, covariance, &own, specs[family[0]].prior_sigma) else { continue };
-        let others = range.clone().filter(|k| !own.contains(k)).map(|k| state.model.x[k].abs());
+        let free: Vec<usize> = own.iter().copied().filter(|k| covariance.parameters().contains(k)).collect();
+        let Some(size) = size(&state.model, covariance, &free, specs[family[0]].prior_sigma) else { continue };
         // Bodies farther out are lighter and shorter: what rows hardly show of them is no larger than what they show of the arm's lines.
+        let others = range.clone().filter(|k| !own.contains(k) && is_shown(state, *k)).map(|k| state.model.x[k].abs());
         let most = others.fold(0.0, f64::max);
         let size = if most > 0.0 { size.clamp(BESIDE * most, most) } else { size };
         any = true;
-        let sigma = |k: usize| if family.contains(&k) { size } else { specs[k].prior_sigma };
+        let sigma = |k: usize| match specs[k].prior_sigma {
+            _ if family.contains(&k) => size,
+            plausible if most > 0.0 && !is_shown(state, range.start + k) => plausible.min(most),
+            plausible => plausible,
+        };
         cause.priors = (0..specs.len()).map(|k| Prior { mean: 0.0, sigma: sigma(k) }).collect();
     }
     any.then_some(causes)
+}
+
+/// Whether the rows clearly show a coefficient.
+fn is_shown(state: &FitState, k: usize) -> bool {
+    let error = match state.fitted.statuses[k] {
+        ParameterStatus::Free(sigma) => sigma,
+        _ => f64::INFINITY,
+    };
+    state.model.x[k].powi(2) > SHOWN * error * error
 }
 
 /// The largest size (SI) that the evidence allows, at most `plausible`; none where the parameters were not all estimated.
