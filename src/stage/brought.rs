@@ -110,6 +110,8 @@ const FAR: f64 = 4.0;
 const MORE: f64 = 0.25;
 /// Rows of one name that stand off together in a row are an event from so many on.
 const TOGETHER: usize = 3;
+/// Links that differ by so much more than their priors say are spoken of.
+const TOLD_BEYOND: f64 = 1.05;
 /// Weak directions that are named.
 const NAMED: usize = 4;
 /// What the data know hardly better than the prior.
@@ -161,12 +163,18 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
         }
     };
     match scale.sigma {
-        Some(sigma) => context.services.note(format!(
-            "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base",
-            sigma,
-            1e3 * sigma * scale.reach,
-            1e3 * scale.reach
-        )),
+        Some(sigma) => {
+            let beyond = match scale.beyond > TOLD_BEYOND {
+                true => format!("; links differ {:.1} times as much as their priors say, and so much wider it is stated", scale.beyond),
+                false => String::new(),
+            };
+            context.services.note(format!(
+                "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base{beyond}",
+                sigma,
+                1e3 * sigma * scale.reach,
+                1e3 * scale.reach
+            ));
+        }
         None => context
             .services
             .note(format!("all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated")),

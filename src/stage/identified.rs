@@ -133,6 +133,8 @@ pub struct Fitting<'a> {
     pub repeatability: Option<f64>,
     /// Parts of a cross-validation.
     pub folds: FoldSetting,
+    /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
+    pub placed: &'a BTreeMap<usize, f64>,
 }
 
 impl Identified {
@@ -170,6 +172,7 @@ impl Identified {
         };
         let prediction =
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
+                .with_places(fitting.placed)
                 .with_suspects(aside)
                 .with_weights(fitting.rows, fitted)
                 .with_folds(errors);

@@ -5,7 +5,7 @@
 use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
-use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
+use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, placed_by_left_out};
 use crate::observation;
 use crate::robot::{Measurements, RobotModel};
 use crate::spatial::Pose;
@@ -59,7 +59,7 @@ crate::stage::reads! {
 impl Stage for Identify {
     const NAME: &'static str = "identify";
     const SUMMARY: &'static str = "identifies geometry, transmission and compliance from the nominal robot in one estimation";
-    const IMPLEMENTATION: u32 = 14;
+    const IMPLEMENTATION: u32 = 15;
     type Reads = IdentifyReads;
     type Writes = Identified;
 
@@ -122,6 +122,7 @@ impl Stage for Identify {
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
+        let (model, placed) = placed_by_left_out(&model, &data, &rows);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -136,6 +137,7 @@ impl Stage for Identify {
             geometry: geometric_rank(&model, &data, &rows, &fitted),
             repeatability,
             folds: self.folds,
+            placed: &placed,
         };
         brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
         question_ratios(&model, &fitted, &fitting, &setting, context);

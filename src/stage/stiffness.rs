@@ -87,6 +87,7 @@ impl Stage for Stiffness {
             geometry: None,
             repeatability,
             folds: self.folds,
+            placed: &std::collections::BTreeMap::new(),
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }

@@ -105,6 +105,7 @@ impl Stage for Transfer {
             geometry: None,
             repeatability,
             folds: self.folds,
+            placed: &std::collections::BTreeMap::new(),
         };
         let mut identified = Identified::of(context, model, fitted, &fitting);
         let visited = visited(source.as_ref(), &reads.recordings, &reads.recording);

@@ -13,8 +13,11 @@ const APART: f64 = 0.02;
 /// What is known of the scale of an arm that was brought to places, where nothing else was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmScale {
-    /// Relative standard deviation of the distances between the places; none where all rows close at one.
+    /// Relative standard deviation of the distances between the places; none where all rows close at one. Where links lie further
+    /// from their priors than these say, as far as the data see them, the rest that the priors carry is stated wider by `beyond`.
     pub sigma: Option<f64>,
+    /// By how much more than their priors say links differ from nominal; at least 1.
+    pub beyond: f64,
     /// Whether a length was given, or a radius.
     pub by_length: bool,
     /// Whether priors of links hold it.
@@ -37,6 +40,7 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         rows.iter().map(|row| model.stack.point(&model.robot, data, *row, &model.x, &mut scratch)).collect();
     let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let square: f64 = points.iter().map(|point| (point - middle).norm_squared()).sum();
+    let beyond = covariance.map_or(1.0, |covariance| beyond_priors(model, covariance));
     let sigma = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
         let mut along = vec![0.0; model.x.len()];
         for (row, point) in rows.iter().zip(&points) {
@@ -46,14 +50,29 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         let parameters = covariance.parameters();
         let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
         let block = covariance.block(parameters)?;
-        Some(weights.dot(&(block * &weights)).max(0.0).sqrt())
+        Some(beyond * weights.dot(&(block * &weights)).max(0.0).sqrt())
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
     let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
     Some(ArmScale {
         sigma,
+        beyond,
         by_length: !model.lengths.is_empty() || told(AnchorShift::NAME),
         by_priors: told("link_geometry") || told(ToolOffset::NAME),
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })
+}
+
+/// Root of the squares of links' deviations from their priors, in standard deviations, over the number of directions that the data see of
+/// them (the ratio of Birge; effective parameters after MacKay, 1992); at least 1.
+fn beyond_priors(model: &Model, covariance: &Covariance) -> f64 {
+    let (mut square, mut seen) = (0.0, 0.0);
+    let links: Vec<usize> = model.stack.parameters_of("link_geometry").collect();
+    for (row, k) in covariance.parameters().iter().enumerate().filter(|(_, k)| links.contains(k)) {
+        if let Some(prior) = model.known(*k).prior {
+            square += ((model.x[*k] - prior.mean) / prior.sigma).powi(2);
+            seen += (1.0 - (covariance.sigma(row) / prior.sigma).powi(2)).max(0.0);
+        }
+    }
+    if seen < 1.0 { 1.0 } else { (square / seen).sqrt().max(1.0) }
 }
