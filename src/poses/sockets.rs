@@ -29,8 +29,6 @@ pub struct SocketProposal<'a> {
 
 /// mm per axis; a ball that is brought to a printed socket by hand.
 const SIGMA: f64 = 0.1;
-/// A zero that postures know worse than this, mrad, is called not seen.
-const SEEN: f64 = 10.0;
 
 /// What a maker's tolerances justify: 0.3 mm and 1 mrad a link, 30 mrad a zero; the ball within 10 mm.
 fn priors() -> Vec<PriorSigma> {
@@ -96,27 +94,19 @@ impl SocketProposal<'_> {
     /// What is said of the ball's distance from the last axis.
     fn advice(&self) -> Option<String> {
         let offsets = &self.proposal.offsets;
-        let now = offsets.first()?;
-        let joint = self.robot.joints.len();
-        if 1e3 * now.zero <= SEEN {
-            return None;
-        }
-        let enough = offsets.iter().find(|other| 1e3 * other.zero <= SEEN);
-        Some(match enough {
-            Some(enough) => format!(
-                "joint {joint}: the ball lies {:.1} mm off its axis, and its zero stays unknown to {:.0} mrad; {:.0} mm off the axis show it to \
-                 {:.1} mrad",
-                1e3 * now.off,
-                1e3 * now.zero,
-                1e3 * enough.off,
-                1e3 * enough.zero
-            ),
-            None => format!(
-                "joint {joint}: the ball lies {:.1} mm off its axis, and its zero stays unknown to {:.0} mrad",
-                1e3 * now.off,
-                1e3 * now.zero
-            ),
-        })
+        let now = offsets.first().filter(|now| now.known < now.directions)?;
+        let best = offsets.iter().map(|other| other.known).max().filter(|best| *best > now.known)?;
+        let enough = offsets.iter().find(|other| other.known == best)?;
+        Some(format!(
+            "the ball lies {:.1} mm off the axis of joint {}: that joint's zero, its axis and the ball are hardly seen. {:.0} mm off the axis \
+             {} of {} directions are known to 1 mm or mrad, instead of {}",
+            1e3 * now.off,
+            self.robot.joints.len(),
+            1e3 * enough.off,
+            enough.known,
+            enough.directions,
+            now.known
+        ))
     }
 }
 
@@ -152,9 +142,17 @@ impl PoseAnswer for SocketProposal<'_> {
         let links = || sigma.iter().filter(|(k, ..)| self.name(*k).0.starts_with("link_geometry"));
         let shown = links().filter(|(_, before, after, _)| 2.0 * after < *before).count();
         text.push_str(&format!("  links: {shown} of {} are known twice as well as by their maker\n", counted(links().count(), "parameter")));
-        text.push_str(&format!("\n  ball off the axis of joint {}, mm   sigma of its zero, mrad\n", self.robot.joints.len()));
+        text.push_str(&format!(
+            "\nby the postures alone, with the ball off the axis of joint {}\n  {:>8}  {:>28}  {:>24}\n",
+            self.robot.joints.len(),
+            "mm",
+            "directions to 1 mm or mrad",
+            "the weakest, mm or mrad"
+        ));
         for offset in offsets {
-            text.push_str(&format!("  {:>34.1}   {:>23.1}\n", 1e3 * offset.off, 1e3 * offset.zero));
+            let of = format!("{} of {}", offset.known, offset.directions);
+            let weakest = if offset.weakest.is_finite() { format!("{:.1}", 1e3 * offset.weakest) } else { "not seen".into() };
+            text.push_str(&format!("  {:>8.1}  {of:>28}  {weakest:>24}\n", 1e3 * offset.off));
         }
         if let Some(advice) = self.advice() {
             text.push_str(&format!("{advice}\n"));
@@ -174,7 +172,10 @@ impl PoseAnswer for SocketProposal<'_> {
         let sockets = self.places.iter().zip(without).map(|(place, own)| {
             json!({"place_m": place, "postures": own.count, "growth_without": own.growth})
         });
-        let offsets = offsets.iter().map(|own| json!({"off_axis_mm": 1e3 * own.off, "sigma_last_zero_rad": own.zero}));
+        let offsets = offsets.iter().map(|own| {
+            let weakest = own.weakest.is_finite().then_some(1e3 * own.weakest);
+            json!({"off_axis_mm": 1e3 * own.off, "directions": own.directions, "known": own.known, "weakest_mm_or_mrad": weakest})
+        });
         json!({
             "joints_counted_as": drive::counting(&self.convention, &self.robot),
             "sigma_mm": self.sigma,

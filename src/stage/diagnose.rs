@@ -7,6 +7,7 @@ use crate::estimate::{Suspect, gauge};
 use crate::observation::values;
 use crate::robot::RobotModel;
 use crate::stage::blank_payload::blank_payload;
+use crate::stage::brought;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
@@ -93,7 +94,7 @@ impl Stage for Diagnose {
     const NAME: &'static str = "diagnose";
     const SUMMARY: &'static str =
         "locates where simulation and recording differ, and names the physics that the model leaves out";
-    const IMPLEMENTATION: u32 = 21;
+    const IMPLEMENTATION: u32 = 22;
     type Reads = DiagnoseReads;
     type Writes = DiagnoseWrites;
 
@@ -177,6 +178,12 @@ impl Stage for Diagnose {
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
             let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
             for line in rounded_logs(&diagnosis.model, &data, &points) {
+                diagnosis.statement.push_str(&format!("; {line}"));
+                context.services.warn(line);
+            }
+        }
+        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
+            for line in brought::events(&diagnosis.model, &diagnosis.fitted, &data, &reads.recording, &diagnosis.kept) {
                 diagnosis.statement.push_str(&format!("; {line}"));
                 context.services.warn(line);
             }

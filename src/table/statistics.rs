@@ -44,7 +44,7 @@ crate::table::rows! { "statistics",
         fold_mean_mm: Option<f64>,
         fold_rms_mm: Option<f64>,
         fold_max_mm: Option<f64>,
-        /// The same with contiguous stretches of the recording as folds.
+        /// The same with contiguous stretches of the recording as folds; of a target that was brought to places, each of these in turn.
         block_mean_mm: Option<f64>,
         block_rms_mm: Option<f64>,
         block_max_mm: Option<f64>,
@@ -58,9 +58,16 @@ crate::table::rows! { "statistics",
     }
 }
 
+use crate::observation::KINDS;
 use crate::robot::NoiseBasis;
 
 impl StatisticsRow {
+    /// Whether it is of rows in which the target was brought to places: blocks that are left out are places then.
+    pub fn is_brought(&self) -> bool {
+        let own = |word: &str| self.set.ends_with(&format!("({word})"));
+        KINDS.iter().any(|kind| kind.is_brought() && own(kind.about().word))
+    }
+
     /// Whether its figures of noise rest on nothing that was stated or measured again.
     pub fn is_inferred(&self) -> bool {
         self.noise_basis.as_deref() == Some(NoiseBasis::Inferred.name())

@@ -58,6 +58,6 @@ pub use remedy::{Remedy, remedies};
 pub use repeats::{Poses, Repeated, spread};
 pub use reseated::{Reseat, reseated};
 pub use row_error::RowError;
-pub use scale::{ArmScale, scale};
+pub use scale::{ArmScale, known_places, scale};
 pub use screen::{Screening, Suspect, SuspectKind, fit_screened};
 pub use session::Session;

@@ -3,7 +3,7 @@
 use super::covariance::Covariance;
 use super::model::Model;
 use crate::effect::{AnchorShift, ToolOffset};
-use crate::observation::kinds;
+use crate::observation::only_brought;
 use crate::robot::Measurements;
 use nalgebra::{DVector, Vector3};
 
@@ -18,7 +18,7 @@ pub struct ArmScale {
     pub sigma: Option<f64>,
     /// By how much more than their priors say links differ from nominal; at least 1.
     pub beyond: f64,
-    /// Whether a length was given, or a radius.
+    /// Whether a length was given, a radius, or the places of two sockets.
     pub by_length: bool,
     /// Whether priors of links hold it.
     pub by_priors: bool,
@@ -28,11 +28,10 @@ pub struct ArmScale {
 
 /// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
 pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
-    let brought = |row: &usize| kinds(data).iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
     let linked = model.stack.parameters_of("link_geometry").any(|k| free.contains(&k));
-    if rows.is_empty() || !linked || !rows.iter().all(brought) {
+    if rows.is_empty() || !linked || !only_brought(data, rows) {
         return None;
     }
     let mut scratch = model.stack.scratch(&model.robot);
@@ -53,14 +52,22 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         Some(beyond * weights.dot(&(block * &weights)).max(0.0).sqrt())
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
+    let is_radius = |k: usize| model.stack.specs()[k].name.ends_with(".radius");
     let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
     Some(ArmScale {
         sigma,
         beyond,
-        by_length: !model.lengths.is_empty() || told(AnchorShift::NAME),
+        by_length: !model.lengths.is_empty() || known_places(model) > 1 || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
         by_priors: told("link_geometry") || told(ToolOffset::NAME),
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })
+}
+
+/// Sockets whose places are known beforehand.
+pub fn known_places(model: &Model) -> usize {
+    let specs = model.stack.specs();
+    let told = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
+    model.stack.parameters_of(AnchorShift::NAME).filter(told).count()
 }
 
 /// Root of the squares of links' deviations from their priors, in standard deviations, over the number of directions that the data see of

@@ -11,14 +11,13 @@ use crate::effect::{AnchorShift, EffectContext, EffectStack, JointCompliance, Lo
 use crate::estimate::closure::closed;
 use crate::estimate::factor::TriangularFactor;
 use crate::estimate::model::Model;
-use crate::observation::{MeasurementKind, SocketKind};
+use crate::observation::{MeasurementKind, SocketKind, rank};
 use crate::robot::{Anchor, MeasurementSetup, Measurements, Named, Readings, RobotModel, Target};
 use crate::spatial::Pose;
 use faer::Mat;
 use nalgebra::Vector3;
-use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 
 /// One standard deviation beforehand of a parameter by the beginning of its name, SI.
 #[derive(Debug, Clone)]
@@ -57,13 +56,17 @@ pub struct LeftOutPlace {
     pub growth: f64,
 }
 
-/// What the ball's distance from the last axis does.
+/// What the ball's distance from the last axis does to the directions of the geometry that such data show at all.
 #[derive(Debug, Clone, Copy)]
 pub struct BallOffset {
     /// m
     pub off: f64,
-    /// Sigma of the last joint's zero, rad.
-    pub zero: f64,
+    /// How many there are by theory: 4n - 4 of n turning joints.
+    pub directions: usize,
+    /// Those known to 1 mm or 1 mrad by the postures alone.
+    pub known: usize,
+    /// Sigma of the weakest, m or rad; infinite where it is not seen.
+    pub weakest: f64,
 }
 
 /// Postures and what they promise.
@@ -90,6 +93,12 @@ const TRIES: usize = 200;
 const BATCH: usize = 256;
 /// m; the ball lies in the socket.
 const THERE: f64 = 1e-9;
+/// m or rad; by which directions of the geometry are measured.
+const UNIT: f64 = 1e-3;
+/// Directions that are seen by less than this share of the best are rounding.
+const UNSEEN: f64 = 1e-9;
+/// Beginnings of the names of what belongs to the geometry of arm and ball.
+const GEOMETRY: [&str; 3] = ["tool_offset.", "joint_offset.", "link_geometry."];
 /// How far off the last axis a ball is tried, m.
 const OFF: [f64; 4] = [0.01, 0.02, 0.05, 0.1];
 
@@ -117,7 +126,7 @@ fn socketed(sockets: Vec<usize>, sigma: f64) -> Measurements {
     let readings = Readings { kind: SocketKind.about().name, sigma: vec![sigma; rows], anchor, ..Readings::default() };
     Measurements {
         position: vec![Vector3::zeros(); rows],
-        sigma: vec![Vector3::repeat(sigma); rows],
+        sigma: vec![Vector3::repeat(f64::INFINITY); rows],
         payload: vec![0.0; rows],
         readings: vec![readings],
         ..Measurements::default()
@@ -224,7 +233,8 @@ pub fn propose_brought(robot: &RobotModel, site: &Site, request: &BroughtRequest
     Ok(BroughtProposal { socket: chosen.iter().map(|row| sockets[*row]).collect(), poses, model, sigma, sets, without, offsets })
 }
 
-/// The last joint's zero with the ball farther and farther off its axis, in these postures moved until the ball lies in the socket.
+/// How well the postures alone tell the geometry with the ball farther and farther off the last axis: of last joint and ball nothing is seen
+/// where it lies on that. The postures are moved until the ball lies in the socket.
 fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -> Vec<BallOffset> {
     let last = robot.joints() - 1;
     let (axis, home) = (robot.axis(last), robot.home().translation);
@@ -237,11 +247,30 @@ fn offsets(robot: &RobotModel, request: &BroughtRequest, poses: &Measurements) -
         let model = model(robot, &request.places, Some(home + side * (off - now)));
         let rows: Vec<usize> = (0..poses.rows()).collect();
         let data = closed(&model, poses, &rows)?;
-        let jacobian = PointJacobian::given(&model, (0..model.stack.specs().len()).collect(), Vec::new());
-        let sigma = sigmas(&jacobian.rows(&model, &data), &factor_of(&known(&model, &request.priors)));
-        let name = format!("joint_offset.j{}", last + 1);
-        let k = model.stack.specs().iter().position(|spec| spec.name == name)?;
-        Some(BallOffset { off, zero: sigma[k] * model.stack.specs()[k].prior_sigma })
+        let theory = rank(&model.robot, &data, &rows, false, 0)?;
+        let directions = theory.saturating_sub(model.robot.setup().first_of_anchor(request.places.len()));
+        let sigmas = geometry(&model, &data, directions);
+        let known = sigmas.iter().filter(|sigma| **sigma <= UNIT).count();
+        Some(BallOffset { off, directions, known, weakest: sigmas.last().copied()? })
     };
     tried.filter_map(one).collect()
+}
+
+/// Of the `count` directions of the geometry that are seen best, the standard deviations (m or rad, ascending), without any prior.
+fn geometry(model: &Model, data: &Measurements, count: usize) -> Vec<f64> {
+    let specs = model.stack.specs();
+    let own = |name: &str| GEOMETRY.iter().any(|begins| name.starts_with(begins));
+    // Sockets come first: what is left of the others is beside them.
+    let last: Vec<usize> = (0..specs.len()).filter(|k| own(&specs[*k].name)).collect();
+    let mut order: Vec<usize> = model.stack.parameters_of(AnchorShift::NAME).collect();
+    let first = order.len();
+    order.extend(&last);
+    let scale: Vec<f64> = last.iter().map(|k| UNIT / specs[*k].prior_sigma).collect();
+    let all = factor(&PointJacobian::given(model, order, Vec::new()).rows(model, data));
+    let p = last.len();
+    let rest = Mat::from_fn(p, p + 1, |i, j| if j < p && i <= j { all.entry(first + i, first + j) } else { 0.0 });
+    let seen = TriangularFactor::of(&rest).singular_values(&scale);
+    let largest = seen.first().copied().unwrap_or_default();
+    let sigma = |value: &f64| if *value > UNSEEN * largest { UNIT / value } else { f64::INFINITY };
+    seen.iter().take(count).map(sigma).collect()
 }

@@ -101,10 +101,12 @@ impl PointJacobian {
                 },
             )
             .collect();
+        let closing = |row: usize| data.reading(SocketKind.about().name, row).map(|reading| Vector3::repeat(reading.sigma));
+        let sigma: Vec<Vector3<f64>> = (0..data.rows()).map(|row| closing(row).unwrap_or(data.sigma[row])).collect();
         let mut out = Mat::zeros(3 * data.rows(), p);
         for (j, scale) in scale.iter().enumerate() {
             let column = out.col_as_slice_mut(j);
-            for (row, (line, sigma)) in poses.iter().zip(&data.sigma).enumerate() {
+            for (row, (line, sigma)) in poses.iter().zip(&sigma).enumerate() {
                 let derivative = line[j] * *scale;
                 column[3 * row] = derivative.x / sigma.x;
                 column[3 * row + 1] = derivative.y / sigma.y;
