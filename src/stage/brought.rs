@@ -180,6 +180,8 @@ const MORE: f64 = 0.25;
 const TOGETHER: usize = 3;
 /// Links that differ by so much more than their priors say are spoken of.
 const TOLD_BEYOND: f64 = 1.05;
+/// A scale that is known so much better where links err independently is told too.
+const LEANING: f64 = 0.95;
 /// Weak directions that are named.
 const NAMED: usize = 4;
 /// What the data know hardly better than the prior.
@@ -236,8 +238,12 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
                 true => format!("; links differ {:.1} times as much as their priors say, and so much wider it is stated", scale.beyond),
                 false => String::new(),
             };
+            let apart = match scale.independent.filter(|independent| *independent < LEANING * sigma) {
+                Some(independent) => format!(", or to {independent:.1e} if no two links lean the same way"),
+                None => String::new(),
+            };
             context.services.note(format!(
-                "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base{beyond}",
+                "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base{apart}{beyond}",
                 sigma,
                 1e3 * sigma * scale.reach,
                 1e3 * scale.reach
