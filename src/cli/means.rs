@@ -1,8 +1,8 @@
 //! What every verb that runs a pipeline, or takes its result, may be told: overrides, the store, worker threads.
 
 use super::surroundings::{cores, open_store, surroundings};
-use crate::error::Result;
-use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, run};
+use crate::error::{Error, Fault, Result};
+use crate::pipeline::{CompletedRun, Override, Plan, Purpose, RunOptions, Selection, faults_of_robots, run};
 use crate::progress::{Progress, Verbosity};
 use crate::shell::typed;
 use crate::stage::STAGES;
@@ -41,8 +41,17 @@ pub(super) fn shown(quiet: bool, details: bool) -> Verbosity {
 }
 
 impl Means {
+    /// Reads a pipeline. Fails with every fault of its YAML and of the robot file at once.
     pub fn plan(&self, pipeline: &Path) -> Result<Plan> {
-        Plan::load(pipeline, &self.set, STAGES)
+        Plan::load(pipeline, &self.set, STAGES).map_err(|error| match error {
+            Error::Spec(mut faults) => {
+                let robots = faults_of_robots(pipeline, &self.set, STAGES);
+                let new: Vec<Fault> = robots.into_iter().filter(|fault| !faults.contains(fault)).collect();
+                faults.extend(new);
+                Error::Spec(faults)
+            }
+            other => other,
+        })
     }
 
     pub fn store(&self) -> Result<Store> {

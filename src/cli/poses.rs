@@ -4,7 +4,7 @@ use super::surroundings::open_store;
 use super::{emit, emit_json};
 use crate::effect::identified;
 use crate::error::{Error, Fault, Result, nearest};
-use crate::poses::{PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, proposal, write};
+use crate::poses::{PoseAnswer, PoseRequest, RobotFiles, RunStage, apart, fault, is_known, places, proposal, sockets, write};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
@@ -63,6 +63,10 @@ pub(super) struct PosesArguments {
     /// Standard deviation per axis of a measured point, instrument and repeatability, mm [default: that of the recording `--against` or of the run, else 0.02]
     #[arg(long, value_name = "MM")]
     sigma: Option<f64>,
+    /// Postures that bring a ball on the tool to sockets instead, by joints alone: where these are in the base frame, m
+    #[arg(long, value_name = "[[X,Y,Z],..]", requires = "robot", value_parser = sockets_of, allow_hyphen_values = true,
+          conflicts_with_all = ["separate", "against", "effects", "bounds"])]
+    sockets: Option<SocketPlaces>,
     /// Random poses to choose from
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     candidates: u32,
@@ -84,6 +88,7 @@ const EXAMPLES: &str = "Examples:
   calib poses robot.yaml --count 50 --payload 0,210 --floor 200 --out poses.csv
   calib poses robot.yaml --box 500:2500,-1200:1200,300:2400 --against .calib/tables/cell7/ingest.recording.parquet
   calib poses robot.yaml --separate reduction_ratio joint_compliance --payload 0,105,210 --count 30 --out more.csv
+  calib poses robot.yaml --sockets '[[0.4,0.1,0.0],[0.4,0.15,0.0]]' --count 60 --out sockets.csv
   calib poses --run HEAD --separate --count 30 --out more.csv
   calib poses --run HEAD --separate 1 'link_compliance@link 2' --payload 0,10
   calib poses robot.json --limits -170:170,-60:75,-80:75,-180:180,-120:120,-180:180 --json";
@@ -99,6 +104,9 @@ pub(super) fn main(arguments: &PosesArguments) -> Result<()> {
         }
         (None, Some(file)) => {
             let robot = RobotFiles { file, urdf: arguments.urdf.as_deref() };
+            if let Some(places) = &arguments.sockets {
+                return show(arguments, &sockets(&request, &robot, &places.0)?);
+            }
             show(arguments, &proposal(&request, &robot, pair, arguments.against.as_deref())?)
         }
         (None, None) => Err(Error::spec("ROBOT", "expected a robot file, or --run")),
@@ -129,6 +137,14 @@ fn show(arguments: &PosesArguments, answer: &impl PoseAnswer) -> Result<()> {
         write(path, &poses)?;
     }
     if arguments.json { emit_json(&answer.document()) } else { emit(&answer.text()) }
+}
+
+/// m, base frame.
+#[derive(Debug, Clone)]
+struct SocketPlaces(Vec<[f64; 3]>);
+
+fn sockets_of(text: &str) -> Result<SocketPlaces, String> {
+    places(text).map(SocketPlaces)
 }
 
 /// Lower and upper ends; infinite where left empty.

@@ -1,10 +1,12 @@
 //! What can be seen of a plan's input files without running it: the robot, the headers of the data. All faults at once.
 
 use super::plan::{InputFile, PlannedStage};
-use super::{Plan, services};
+use super::{Override, Plan, services, spec};
 use crate::error::{Error, Fault, Result};
-use crate::stage::{Context, OpenedInput, Output, RawFile, Services, Sink};
+use crate::raw;
+use crate::stage::{Context, OpenedInput, Output, RawFile, Services, Sink, StageEntry};
 use crate::store::frame::Frame;
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// Looks at every stage's files. Gives what stages warn of; fails with the faults of all files, as faults of the author's where one
@@ -44,6 +46,22 @@ pub fn look(plan: &Plan) -> Result<Vec<String>> {
         (_, true) => Err(Error::Spec(faults)),
         _ => Err(Error::Data(faults)),
     }
+}
+
+/// The faults of the robot files of a pipeline whose YAML has faults of its own: where the stage that names one can be read, all are told
+/// in one pass.
+pub fn faults_of_robots(file: &Path, overrides: &[Override], registry: &'static [StageEntry]) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let Some(text) = raw::bytes(file).ok().and_then(|bytes| String::from_utf8(bytes).ok()) else { return faults };
+    for draft in spec::read(file, &text, overrides, registry).stages {
+        let Some(stage) = draft.stage.filter(|_| draft.entry.is_some_and(|entry| entry.name == "robot")) else { continue };
+        let services = Onlooker { id: &draft.id, files: &draft.files, warnings: Mutex::default() };
+        let seen = stage.look(Some(Vec::new()), &Context { id: &draft.id, seed: 0, jobs: 1, services: &services });
+        if let Err(Error::Spec(own)) = seen {
+            faults.extend(own);
+        }
+    }
+    faults
 }
 
 /// The tables that a stage reads, if those before it could give them all.

@@ -7,10 +7,12 @@ mod proposal;
 mod recorded;
 mod show;
 mod site;
+mod sockets;
 
 pub use apart::{RunStage, apart};
 pub use drive::{Drive, fault, write};
 pub use proposal::{RobotFiles, is_known, proposal};
+pub use sockets::{SocketProposal, places, sockets};
 
 use crate::estimate::choose::{Aim, DesignRequest};
 use std::path::PathBuf;

@@ -57,6 +57,8 @@ pub(super) struct ErrorsSection {
     held_out: Vec<Block>,
     training: Vec<Block>,
     folds: Vec<Fold>,
+    /// What the second kind of folds is.
+    blocks: &'static str,
     /// Steps whose cross-validation was dropped, and the number of poses.
     unfolded: Vec<(String, String)>,
     references: Vec<ReferenceView>,
@@ -148,6 +150,10 @@ impl ErrorsSection {
             held_out: held_out.chain(used).collect(),
             training: sets(rows, false).into_iter().map(|set| block(set, false, None)).collect(),
             folds: rows.iter().filter_map(|row| fold(row, steps)).collect(),
+            blocks: match rows.iter().filter(|row| row.fold_rms_mm.is_some()).all(StatisticsRow::is_brought) {
+                true => "whole places",
+                false => "contiguous parts of the recording",
+            },
             unfolded: unfolded(tables),
             references: rows.iter().filter_map(beside).collect(),
             pictures: last.iter().map(|row| picture(tables, row, steps)).collect(),

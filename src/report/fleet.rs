@@ -17,6 +17,10 @@ struct Page<'a> {
     script: &'static str,
     counts: Vec<(String, usize)>,
     robots: Vec<FleetRowView<'a>>,
+    /// Of the robots those that need a technician, the most urgent first.
+    urgent: Vec<UrgentView<'a>>,
+    /// So many more of them, which stand at the head of the table.
+    more: usize,
     changes: Vec<ChangeView<'a>>,
     flagged: usize,
     diagnosed: bool,
@@ -40,6 +44,14 @@ struct FleetRowView<'a> {
     verdict: Option<String>,
     causes: Option<&'a str>,
     flags: Option<&'a str>,
+}
+
+/// A robot that needs a technician, and what for.
+#[derive(Serialize)]
+struct UrgentView<'a> {
+    name: String,
+    link: Option<&'a str>,
+    needs: String,
 }
 
 /// A figure as people read it and as the page sorts it.
@@ -67,7 +79,16 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
     for row in &fleet.0 {
         *counts.entry(&row.status).or_default() += 1;
     }
+    let mut rows: Vec<(Option<(u8, String)>, &FleetRow)> = fleet.0.iter().map(|row| (needs(row), row)).collect();
+    // Robots that need nobody come last, in the order of the fleet.
+    rows.sort_by_key(|(needs, _)| needs.as_ref().map_or(u8::MAX, |(urgency, _)| *urgency));
+    let urgent = rows.iter().filter_map(|(needs, row)| {
+        let (_, needs) = needs.clone()?;
+        Some(UrgentView { name: visible(&row.robot), link: links.get(&row.robot).map(String::as_str), needs })
+    });
     let page = Page {
+        more: urgent.clone().count().saturating_sub(NAMED),
+        urgent: urgent.take(NAMED).collect(),
         name,
         title: format!("Fleet {name}"),
         policy: "; script-src 'unsafe-inline'; img-src data:",
@@ -75,7 +96,7 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
         style: include_str!("fleet.css"),
         script: include_str!("fleet.js"),
         counts: counts.into_iter().map(|(status, count)| (status.to_string(), count)).collect(),
-        robots: fleet.0.iter().map(|row| self::row(row, links)).collect(),
+        robots: rows.iter().map(|(_, row)| self::row(row, links)).collect(),
         changes: changes.0.iter().filter(|row| row.flagged).map(change).collect(),
         flagged: fleet.0.iter().filter(|row| row.flags.is_some()).count(),
         diagnosed: fleet.0.iter().any(|row| row.verdict.is_some()),
@@ -83,6 +104,30 @@ pub fn html(name: &str, fleet: &FleetTable, changes: &FleetChanges, links: &BTre
         grouped: fleet.0.iter().any(|row| row.model.is_some() || row.plant.is_some() || row.campaign.is_some()),
     };
     render("fleet.html", include_str!("fleet.html"), &page)
+}
+
+/// Robots that are named above the table, at most.
+const NAMED: usize = 30;
+
+/// What a robot needs a technician for, in a sentence, and how urgently, 0 first; nothing where it needs none.
+fn needs(row: &FleetRow) -> Option<(u8, String)> {
+    let reason = |what: &str, why: Option<&str>| match why.filter(|why| !why.is_empty()) {
+        Some(why) => format!("{what}: {why}"),
+        None => what.to_string(),
+    };
+    if matches!(row.status.as_str(), "failed" | "rejected") {
+        return Some((0, reason("was not calibrated", row.reason.as_deref())));
+    }
+    if row.verdict.as_deref() == Some("wrong_setup") {
+        return Some((1, reason("its set-up is wrong", row.causes.as_deref())));
+    }
+    if row.before_rms_mm.zip(row.after_rms_mm).is_some_and(|(before, after)| after >= before) {
+        return Some((2, "the calibration did not make it more accurate".into()));
+    }
+    if let Some(flags) = &row.flags {
+        return Some((3, reason("changed beyond its limits since the last calibration", Some(flags))));
+    }
+    (row.verdict.as_deref() == Some("unexplained")).then(|| (4, reason("its error is not explained", row.causes.as_deref())))
 }
 
 fn row<'a>(row: &'a FleetRow, links: &'a BTreeMap<String, String>) -> FleetRowView<'a> {

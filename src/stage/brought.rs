@@ -1,12 +1,15 @@
 //! What identifications know and say of rows in which the target was only brought to something: lengths known from elsewhere, how well
 //! it closes, which rows stand out, and what such data tell of the scale of the arm.
 
+use crate::effect::AnchorShift;
 use crate::error::{Error, Fault, Result, counted};
-use crate::estimate::{Fitted, KnownLength, Model, ParameterStatus, Prior, reseated, scale};
-use crate::observation::{MeasurementKind, kinds};
-use crate::robot::{Measurements, Shape};
+use crate::estimate::{Fitted, KnownLength, Model, ParameterStatus, Prior, align_points, reseated, scale};
+use crate::observation::{MeasurementKind, kinds, only_brought};
+use crate::robot::{Measurements, RobotModel, Shape};
+use crate::spatial::Pose;
 use crate::stage::Context;
 use crate::table::Recording;
+use nalgebra::{Rotation3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -34,9 +37,32 @@ pub struct KnownSphere {
     pub sigma: f64,
 }
 
-/// Faults of known distances and spheres.
-pub(super) fn faults(distances: &[KnownDistance], spheres: &BTreeMap<String, KnownSphere>) -> Vec<Fault> {
+/// The known place of a socket.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct KnownPoint {
+    /// x, y, z in the frame of the cell, which is the tracker's where one was used, mm.
+    pub mm: [f64; 3],
+    /// The standard deviation of each, mm.
+    pub sigma: f64,
+}
+
+/// What is known of a cell from elsewhere.
+pub(super) struct KnownCell<'a> {
+    pub distances: &'a [KnownDistance],
+    pub spheres: &'a BTreeMap<String, KnownSphere>,
+    pub points: &'a BTreeMap<String, KnownPoint>,
+}
+
+/// Faults of known distances, spheres and points.
+pub(super) fn faults(known: &KnownCell) -> Vec<Fault> {
+    let KnownCell { distances, spheres, points } = known;
     let mut faults = Vec::new();
+    for (name, KnownPoint { mm, sigma }) in *points {
+        if !(mm.iter().all(|value| value.is_finite()) && *sigma > 0.0 && sigma.is_finite()) {
+            faults.push(Fault::new(format!("points.{name}"), "expected a place and a sigma above 0, e.g. {mm: [400, 0, 50], sigma: 0.05}"));
+        }
+    }
     for (index, KnownDistance { between: [from, to], mm, sigma }) in distances.iter().enumerate() {
         if from == to || from.matches('*').count() > 1 || from.matches('*').count() != to.matches('*').count() {
             let message = "expected two different names, with one `*` in each or none, e.g. [front/0, front/1]";
@@ -49,7 +75,7 @@ pub(super) fn faults(distances: &[KnownDistance], spheres: &BTreeMap<String, Kno
             faults.push(Fault::new(format!("distances[{index}].sigma"), "expected a standard deviation above 0, e.g. 0.1"));
         }
     }
-    for (name, KnownSphere { diameter, sigma }) in spheres {
+    for (name, KnownSphere { diameter, sigma }) in *spheres {
         if !(*diameter > 0.0 && diameter.is_finite() && *sigma > 0.0 && sigma.is_finite()) {
             faults.push(Fault::new(format!("spheres.{name}"), "expected both above 0, e.g. {diameter: 40, sigma: 0.01}"));
         }
@@ -57,13 +83,44 @@ pub(super) fn faults(distances: &[KnownDistance], spheres: &BTreeMap<String, Kno
     faults
 }
 
+/// The robot standing where it has known points best, with all that it was brought to; as it is where nothing is known, or a tracker
+/// says where it stands. One point shifts it, two turn it too, but not about their line.
+pub(super) fn standing(
+    robot: RobotModel,
+    base: Pose,
+    points: &BTreeMap<String, KnownPoint>,
+    data: &Measurements,
+    rows: &[usize],
+) -> (RobotModel, Pose) {
+    let setup = robot.setup();
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = points
+        .iter()
+        .filter_map(|(name, known)| Some((setup.anchors.get(setup.anchor(name)?)?.place, Vector3::from(known.mm) * 1e-3)))
+        .collect();
+    if pairs.is_empty() || !only_brought(data, rows) {
+        return (robot, base);
+    }
+    let (from, to): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = pairs.into_iter().unzip();
+    let turn = match from.len() {
+        1 => Rotation3::identity(),
+        2 => Rotation3::rotation_between(&(from[1] - from[0]), &(to[1] - to[0])).unwrap_or_else(Rotation3::identity),
+        _ => Rotation3::from_matrix_unchecked(align_points(&from, &to).rotation),
+    };
+    let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let change = Pose::new(*turn.matrix(), middle(&to) - turn * middle(&from));
+    let mut setup = setup.clone();
+    for anchor in &mut setup.anchors {
+        anchor.place = change.point(&anchor.place);
+        if let Shape::Plane(normal) = &mut anchor.shape {
+            *normal = change.rotation * *normal;
+        }
+    }
+    (robot.measured_by(setup), change * base)
+}
+
 /// Tells the model what is known. Fails with a name that the recording does not have.
-pub(super) fn apply(
-    model: &mut Model,
-    distances: &[KnownDistance],
-    spheres: &BTreeMap<String, KnownSphere>,
-    context: &Context,
-) -> Result<()> {
+pub(super) fn apply(model: &mut Model, known: &KnownCell, context: &Context) -> Result<()> {
+    let KnownCell { distances, spheres, points } = *known;
     let setup = model.robot.setup().clone();
     let names: Vec<&str> = setup.anchors.iter().map(|anchor| anchor.name.as_str()).collect();
     let there = || if names.is_empty() { "none".to_string() } else { names.join(", ") };
@@ -90,6 +147,17 @@ pub(super) fn apply(
         let (length, sigma) = (1e-3 * known.mm, 1e-3 * known.sigma * (pairs.len() as f64).sqrt());
         model.lengths.extend(pairs.into_iter().map(|between| KnownLength { between, length, sigma }));
     }
+    for (name, known) in points {
+        let socket = setup.anchors.iter().find(|anchor| anchor.name == *name && anchor.shape == Shape::Point);
+        let socket = socket.ok_or_else(|| wrong(format!("points.{name}"), format!("no socket `{name}`")))?;
+        for (axis, ending) in ["x", "y", "z"].into_iter().enumerate() {
+            let parameter = format!("{}{ending}", AnchorShift::prefix(name));
+            if let Some(k) = model.stack.specs().iter().position(|spec| spec.name == parameter) {
+                let prior = Prior { mean: 1e-3 * known.mm[axis] - socket.place[axis], sigma: 1e-3 * known.sigma };
+                model.known.entry(k).or_default().prior = Some(prior);
+            }
+        }
+    }
     for (name, known) in spheres {
         let sphere = setup.anchors.iter().find(|anchor| anchor.name == *name);
         let Some(Shape::Sphere(radius)) = sphere.map(|anchor| anchor.shape) else {
@@ -110,6 +178,10 @@ const FAR: f64 = 4.0;
 const MORE: f64 = 0.25;
 /// Rows of one name that stand off together in a row are an event from so many on.
 const TOGETHER: usize = 3;
+/// Links that differ by so much more than their priors say are spoken of.
+const TOLD_BEYOND: f64 = 1.05;
+/// A scale that is known so much better where links err independently is told too.
+const LEANING: f64 = 0.95;
 /// Weak directions that are named.
 const NAMED: usize = 4;
 /// What the data know hardly better than the prior.
@@ -130,8 +202,7 @@ pub(super) fn note(
         return;
     }
     note_scale(context, model, fitted, data, rows);
-    note_reseat(context, model, fitted, data, recording, &own, &brought);
-    note_far(context, model, fitted, data, recording, &brought);
+    events(model, fitted, data, recording, rows).into_iter().for_each(|line| context.services.warn(line));
     let weak: Vec<&str> = fitted
         .prior_checks
         .iter()
@@ -149,7 +220,8 @@ pub(super) fn note(
 fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurements, rows: &[usize]) {
     let Some(scale) = scale(model, data, rows, fitted.covariance.as_ref()) else { return };
     let known = match (scale.by_length, scale.by_priors) {
-        (true, _) => "by the lengths that were given",
+        (true, false) => "by the lengths that were given",
+        (true, true) => "by the lengths that were given and the priors of the links",
         (false, true) => "by the priors of the links alone: no length was given",
         (false, false) => {
             context.services.warn(
@@ -161,38 +233,57 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
         }
     };
     match scale.sigma {
-        Some(sigma) => context.services.note(format!(
-            "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base",
-            sigma,
-            1e3 * sigma * scale.reach,
-            1e3 * scale.reach
-        )),
+        Some(sigma) => {
+            let beyond = match scale.beyond > TOLD_BEYOND {
+                true => format!("; links differ {:.1} times as much as their priors say, and so much wider it is stated", scale.beyond),
+                false => String::new(),
+            };
+            let apart = match scale.independent.filter(|independent| *independent < LEANING * sigma) {
+                Some(independent) => format!(", or to {independent:.1e} if no two links lean the same way"),
+                None => String::new(),
+            };
+            context.services.note(format!(
+                "the scale of the arm is known to {:.1e} (one sigma) {known}: {:.2} mm at {:.0} mm from the base{apart}{beyond}",
+                sigma,
+                1e3 * sigma * scale.reach,
+                1e3 * scale.reach
+            ));
+        }
         None => context
             .services
             .note(format!("all rows close at one place: what is known of the scale of the arm, {known}, cannot be stated")),
     }
 }
 
-fn note_reseat(
-    context: &Context,
+/// What befell ball and fixtures by the rows of a recording, a sentence each: the ball was put back elsewhere, rows do not close.
+pub(super) fn events(model: &Model, fitted: &Fitted, data: &Measurements, recording: &Recording, rows: &[usize]) -> Vec<String> {
+    let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
+    let own: Vec<usize> = rows.iter().copied().filter(|row| brought.iter().any(|kind| kind.axes(data, *row) > 0)).collect();
+    if own.is_empty() {
+        return Vec::new();
+    }
+    let put_back = put_back(model, fitted, data, recording, &own, &brought);
+    put_back.into_iter().chain(far(model, fitted, data, recording, &brought)).collect()
+}
+
+fn put_back(
     model: &Model,
     fitted: &Fitted,
     data: &Measurements,
     recording: &Recording,
     own: &[usize],
     brought: &[&'static dyn MeasurementKind],
-) {
+) -> Option<String> {
     let stated = |row: &usize| brought.iter().find_map(|kind| kind.reading(data, *row)).map_or(0.0, |reading| reading.sigma);
     let sigma = (own.iter().map(|row| stated(row).powi(2)).sum::<f64>() / own.len() as f64).sqrt().hypot(fitted.excess_sigma);
-    if let Some(found) = reseated(model, data, own, sigma) {
-        context.services.warn(format!(
-            "from {} on the ball sits elsewhere on the tool, by {:.2} mm or more ({:.0} standard errors): was it taken off? Name it \
-             there as another `target`, and each is placed on its own",
-            recording.point_id[found.row],
-            1e3 * found.shift,
-            found.statistic
-        ));
-    }
+    let found = reseated(model, data, own, sigma)?;
+    Some(format!(
+        "from {} on the ball sits elsewhere on the tool, by {:.2} mm or more ({:.0} standard errors): was it taken off? Name it there as \
+         another `target`, and each is placed on its own",
+        recording.point_id[found.row],
+        1e3 * found.shift,
+        found.statistic
+    ))
 }
 
 /// A row that does not close: its name, place in the recording, how far off (m).
@@ -204,14 +295,13 @@ struct Far {
 }
 
 /// Names the rows that the model does not explain; they are down-weighted where they were fitted.
-fn note_far(
-    context: &Context,
+fn far(
     model: &Model,
     fitted: &Fitted,
     data: &Measurements,
     recording: &Recording,
     brought: &[&'static dyn MeasurementKind],
-) {
+) -> Option<String> {
     let predicted = model.predict(data);
     let errors = model.row_errors(data);
     let places = places(model);
@@ -224,26 +314,26 @@ fn note_far(
         if error.length < limit {
             continue;
         }
-        let near = |(name, place): &&(String, nalgebra::Vector3<f64>)| {
+        let near = |(name, place): &&(String, Vector3<f64>)| {
             *name != reading.anchor && (predicted[row] - place).norm() < limit.min(0.3 * error.length)
         };
         let other = places.iter().find(near).map(|(name, _)| name.clone());
         far.push(Far { row, fixture: reading.anchor.into(), off: error.length, other });
     }
     if far.is_empty() {
-        return;
+        return None;
     }
     let count = far.len();
     let texts: Vec<String> = far
         .chunk_by(|a, b| a.row + 1 == b.row && a.fixture == b.fixture && a.other == b.other)
         .map(|run| run_text(run, recording))
         .collect();
-    context.services.warn(format!(
+    Some(format!(
         "{} not close within their noise, and {} down-weighted: {}",
         if count == 1 { "1 row does".to_string() } else { format!("{count} rows do") },
         if count == 1 { "is" } else { "are" },
         texts.join("; ")
-    ));
+    ))
 }
 
 fn run_text(run: &[Far], recording: &Recording) -> String {
@@ -264,13 +354,13 @@ fn run_text(run: &[Far], recording: &Recording) -> String {
 }
 
 /// Points that anchors are.
-fn places(model: &Model) -> Vec<(String, nalgebra::Vector3<f64>)> {
+fn places(model: &Model) -> Vec<(String, Vector3<f64>)> {
     let setup = model.robot.setup();
-    let first = model.stack.parameters_of(crate::effect::AnchorShift::NAME).next().unwrap_or_default();
+    let first = model.stack.parameters_of(AnchorShift::NAME).next().unwrap_or_default();
     let all = setup.anchors.iter().enumerate().filter(|(_, anchor)| anchor.shape == Shape::Point);
     let place = |(number, anchor): (usize, &crate::robot::Anchor)| {
         let at = first + setup.first_of_anchor(number);
-        let shift = model.x.get(at..at + 3).map_or_else(nalgebra::Vector3::zeros, nalgebra::Vector3::from_column_slice);
+        let shift = model.x.get(at..at + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice);
         (anchor.name.clone(), anchor.place + shift)
     };
     all.map(place).collect()

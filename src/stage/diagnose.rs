@@ -8,6 +8,7 @@ use crate::observation::values;
 use crate::robot::{RobotModel, Visited};
 use crate::stage::blank_payload::blank_payload;
 use crate::stage::doubtful::{self, KnownModel};
+use crate::stage::brought;
 use crate::stage::own_effects::own_effects;
 use crate::stage::rounded::rounded_logs;
 use crate::stage::weightless::{WeightlessLinks, weightless_links};
@@ -178,6 +179,12 @@ impl Stage for Diagnose {
         if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
             let points: Vec<usize> = diagnosis.kept.iter().copied().filter(|row| data.whole(*row)).collect();
             for line in rounded_logs(&diagnosis.model, &data, &points) {
+                diagnosis.statement.push_str(&format!("; {line}"));
+                context.services.warn(line);
+            }
+        }
+        if !matches!(diagnosis.verdict, Said::WrongSetup | Said::NotAsked) {
+            for line in brought::events(&diagnosis.model, &diagnosis.fitted, &data, &reads.recording, &diagnosis.kept) {
                 diagnosis.statement.push_str(&format!("; {line}"));
                 context.services.warn(line);
             }

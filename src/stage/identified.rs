@@ -139,6 +139,8 @@ pub struct Fitting<'a> {
     pub visited: Option<&'a Visited>,
     /// Rows at which the model may say that it does not hold; the arm was fitted to none of them.
     pub doubtful: Vec<usize>,
+    /// Rows of places that none of them was fitted to, with what their errors are to be multiplied by: each has a part in its place.
+    pub placed: &'a BTreeMap<usize, f64>,
 }
 
 impl Identified {
@@ -178,6 +180,7 @@ impl Identified {
         };
         let prediction =
             Prediction::of(step, model, fitting.data, fitting.recording, fitting.split, &held_out, of_model.as_ref())
+                .with_places(fitting.placed)
                 .with_suspects(aside)
                 .with_weights(fitting.rows, fitted)
                 .with_folds(errors)

@@ -5,11 +5,11 @@
 use crate::diagnose::{Question, wrong_setup};
 use crate::effect::{AnchorShift, Effect, EffectContext, EffectStack, JointCompliance, ReductionRatio, identified, whole};
 use crate::error::{Error, Fault, Result, nearest};
-use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge};
+use crate::estimate::{FitOptions, Fitted, Model, ParameterStatus, fit, gauge, known_places, placed_by_left_out};
 use crate::observation;
 use crate::robot::{Measurements, RobotModel, Visited};
 use crate::spatial::Pose;
-use crate::stage::brought::{self, KnownDistance, KnownSphere};
+use crate::stage::brought::{self, KnownCell, KnownDistance, KnownPoint, KnownSphere};
 use crate::stage::identified::{Fitting, Identified, LoadSetting};
 use crate::stage::screened::{fit_rows, numbered};
 use crate::stage::weightless::weightless_links;
@@ -37,6 +37,10 @@ crate::stage::identified::identification! {
         /// Sizes of spheres that are known, by their names in the recording.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub spheres: BTreeMap<String, KnownSphere>,
+        /// Places of sockets that are known, by their names in the recording: one fixes where the cell is, two its scale too, three on no line
+        /// how it is turned.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        pub points: BTreeMap<String, KnownPoint>,
     }
 }
 
@@ -65,7 +69,7 @@ impl Stage for Identify {
 
     fn check(&self) -> Vec<Fault> {
         let mut faults = self.shared_faults("fit");
-        faults.extend(brought::faults(&self.distances, &self.spheres));
+        faults.extend(brought::faults(&self.known_cell()));
         for (name, place) in &self.targets {
             if !place.iter().all(|value| value.is_finite() && value.abs() < FARTHEST_TARGET) {
                 faults.push(Fault::new(
@@ -118,11 +122,12 @@ impl Stage for Identify {
         let mut model = Model::nominal(robot.clone(), EffectStack::new(&robot, setting.base, effects));
         let all: Vec<usize> = (0..model.x.len()).collect();
         let (candidates, held) = self.parameter_set().apply(&mut model, &all, context);
-        brought::apply(&mut model, &self.distances, &self.spheres, context)?;
+        brought::apply(&mut model, &self.known_cell(), context)?;
         let repeatability = self.repeatability.apply(&model, &mut data, &rows, context);
         let options = FitOptions { rows: &rows, candidates: &candidates };
         let (model, fitted, screening) = fit_rows(&model, &data, &options, &reads.split, self.screen);
         let visited = Visited::of(&data, &screening.kept);
+        let (model, placed) = placed_by_left_out(&model, &data, &rows);
         let fitting = Fitting {
             data: &data,
             recording: &reads.recording,
@@ -140,6 +145,7 @@ impl Stage for Identify {
             measured: &data,
             visited: Some(&visited),
             doubtful: (0..data.rows()).filter(|row| rows.binary_search(row).is_err()).collect(),
+            placed: &placed,
         };
         brought::note(context, &model, &fitted, &data, &reads.recording, &screening.kept);
         question_ratios(&model, &fitted, &fitting, &setting, context);
@@ -189,7 +195,12 @@ impl Identify {
             ));
         }
         let stated = self.targets.iter().map(|(name, place)| (name.clone(), Vector3::from(*place) * 1e-3)).collect();
-        gauge(robot, data, rows, &stated).map_err(|message| Error::data("table recording", message))
+        let (robot, base) = gauge(robot, data, rows, &stated).map_err(|message| Error::data("table recording", message))?;
+        Ok(brought::standing(robot, base, &self.points, data, rows))
+    }
+
+    fn known_cell(&self) -> KnownCell<'_> {
+        KnownCell { distances: &self.distances, spheres: &self.spheres, points: &self.points }
     }
 }
 
@@ -213,7 +224,7 @@ fn geometric_rank(model: &Model, data: &Measurements, rows: &[usize], fitted: &F
     let held = model.stack.specs().len() != fitted.singular_all.len();
     // A prior makes its parameter known whatever the data see.
     let told = model.known.values().any(|known| known.prior.is_some());
-    let expected = observation::rank(&model.robot, data, rows, !model.lengths.is_empty())?;
+    let expected = observation::rank(&model.robot, data, rows, !model.lengths.is_empty(), known_places(model))?;
     (asked && !held && !told).then_some((found, expected))
 }
 

@@ -118,7 +118,7 @@ fn longest<'a, T>(patterns: &'a BTreeMap<String, T>, name: &str) -> Option<&'a T
 }
 
 /// Whether a pattern with `*` for anything matches the whole name.
-fn matches(pattern: &str, name: &str) -> bool {
+pub(super) fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((head, tail)) => name

@@ -6,6 +6,7 @@
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::pose_groups::{NEAR, SAME, near};
+use crate::stage::parameter_set::matches;
 use crate::stage::copied::{self, copied_rows};
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
@@ -30,6 +31,22 @@ pub enum SplitBy {
         #[serde(default)]
         offset: Option<u64>,
         /// The set of every n-th row.
+        #[serde(default = "validate")]
+        set: String,
+        /// The set of the other rows.
+        #[serde(default = "fit")]
+        rest: String,
+        /// Rows are counted anew for every name in this column, so that each socket, plane, sphere or target gives its share.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        within: Option<NamedColumn>,
+    },
+    /// Rows with some of the names in a column go to `set`, the others to `rest`: a whole place, target or anchor is left out.
+    Named {
+        /// The column.
+        column: NamedColumn,
+        /// Names; a `*` stands for anything, as of all sockets of a plate: `[front/*]`.
+        names: Vec<String>,
+        /// The set of their rows.
         #[serde(default = "validate")]
         set: String,
         /// The set of the other rows.
@@ -74,6 +91,45 @@ pub enum SplitBy {
     },
 }
 
+/// A column of names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NamedColumn {
+    /// What sockets the target lay in.
+    Socket,
+    /// Planes that it touched.
+    Plane,
+    /// Spheres that it touched.
+    Sphere,
+    /// Ends of distances.
+    Anchor,
+    /// Targets on the tool.
+    Target,
+}
+
+impl NamedColumn {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Socket => "socket",
+            Self::Plane => "plane",
+            Self::Sphere => "sphere",
+            Self::Anchor => "anchor",
+            Self::Target => "target",
+        }
+    }
+
+    /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
+    fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
+        let column = if self == Self::Target { recording.target.as_ref() } else { recording.names.get(self.name()) };
+        let column = column.ok_or_else(|| {
+            let there: Vec<&str> = recording.names.keys().copied().chain(recording.target.as_ref().map(|_| "target")).collect();
+            let there = if there.is_empty() { "none".to_string() } else { there.join(", ") };
+            Error::data(format!("with.{place}"), format!("the recording has no names of `{}`; it has: {there}", self.name()))
+        })?;
+        Ok(column.iter().map(|name| name.as_deref().unwrap_or_default()).collect())
+    }
+}
+
 /// So many rows for one set.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -109,8 +165,8 @@ writes! {
 
 impl Stage for SplitBy {
     const NAME: &'static str = "split";
-    const SUMMARY: &'static str = "deals rows out to named sets: every n-th, blocks, random, by usage, by order";
-    const IMPLEMENTATION: u32 = 3;
+    const SUMMARY: &'static str = "deals rows out to named sets: every n-th, by name, blocks, random, by usage, by order";
+    const IMPLEMENTATION: u32 = 4;
     type Reads = SplitReads;
     type Writes = SplitWrites;
 
@@ -122,12 +178,18 @@ impl Stage for SplitBy {
             }
         }
         match self {
-            Self::Every { n, offset, set, rest } => {
+            Self::Every { n, offset, set, rest, .. } => {
                 if *n < 2 {
                     faults.push(Fault::new("n", "allowed: 2 and above"));
                 }
                 if offset.is_some_and(|offset| offset >= *n) {
                     faults.push(Fault::new("offset", format!("allowed: 0 to {}", n.saturating_sub(1))));
+                }
+                two(set, rest, &mut faults);
+            }
+            Self::Named { names, set, rest, .. } => {
+                if names.is_empty() {
+                    faults.push(Fault::new("names", "name at least one, e.g. [front/*]"));
                 }
                 two(set, rest, &mut faults);
             }
@@ -220,7 +282,7 @@ impl SplitBy {
     /// Sets that must not stay empty.
     fn names(&self) -> BTreeSet<&str> {
         match self {
-            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } => [set.as_str(), rest].into(),
+            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } | Self::Named { set, rest, .. } => [set.as_str(), rest].into(),
             Self::Blocks { sets, .. } => sets.iter().map(String::as_str).collect(),
             Self::Usage { .. } => BTreeSet::new(),
             Self::Order { sets } => sets.iter().map(|stretch| stretch.set.as_str()).collect(),
@@ -232,6 +294,7 @@ impl SplitBy {
         let (setting, advice) = match self {
             Self::Every { offset: None, .. } => ("n", "say a smaller `n`"),
             Self::Every { .. } => ("offset", "say another `offset`, or a smaller `n`"),
+            Self::Named { .. } => ("names", "say other `names`"),
             Self::Random { set, .. } if name == set => ("fraction", "say a larger `fraction`"),
             Self::Random { .. } => ("fraction", "say a smaller `fraction`"),
             Self::Blocks { count: Some(_), .. } => ("count", "say a larger `count`, or fewer `sets`"),
@@ -245,11 +308,26 @@ impl SplitBy {
     fn deal(&self, recording: &Recording, seed: u64) -> Result<Vec<String>> {
         let rows = recording.rows();
         match self {
-            Self::Every { n, offset, set, rest } => {
+            Self::Every { n, offset, set, rest, within } => {
                 let offset = offset.unwrap_or(n - 1);
-                let stops = (0u64..).zip(stops(recording));
-                let dealt = stops.flat_map(|(k, stop)| std::iter::repeat_n(if k % n == offset { set } else { rest }, stop.len()));
+                let names = within.map(|column| column.of(recording, "within")).transpose()?;
+                let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+                let dealt = stops(recording).into_iter().flat_map(|stop| {
+                    let count = counts.entry(names.as_ref().map_or("", |names| names[stop.start])).or_default();
+                    *count += 1;
+                    std::iter::repeat_n(if (*count - 1) % n == offset { set } else { rest }, stop.len())
+                });
                 Ok(dealt.cloned().collect())
+            }
+            Self::Named { column, names: wanted, set, rest } => {
+                let names = column.of(recording, "column")?;
+                if let Some(k) = wanted.iter().position(|pattern| !names.iter().any(|name| matches(pattern, name))) {
+                    let there: BTreeSet<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
+                    let there = there.into_iter().collect::<Vec<_>>().join(", ");
+                    return Err(Error::data(format!("with.names[{k}]"), format!("no row has such a name; there are: {there}")));
+                }
+                let is_wanted = |name: &&str| wanted.iter().any(|pattern| matches(pattern, name));
+                Ok(names.iter().map(|name| if is_wanted(name) { set } else { rest }.clone()).collect())
             }
             Self::Blocks { count, length, sets } => {
                 let mut dealt = Vec::with_capacity(rows);

@@ -91,6 +91,7 @@ impl Stage for Stiffness {
             measured: &data,
             visited: Some(&visited),
             doubtful: (0..data.rows()).filter(|row| !seen_before[*row] && rows.binary_search(row).is_err()).collect(),
+            placed: &std::collections::BTreeMap::new(),
         };
         Ok(Identified::of(context, &model, &fitted, &fitting))
     }

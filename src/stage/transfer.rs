@@ -108,6 +108,7 @@ impl Stage for Transfer {
             measured: source_data.as_ref().unwrap_or(&data),
             visited: visited.as_ref(),
             doubtful: (0..data.rows()).collect(),
+            placed: &std::collections::BTreeMap::new(),
         };
         let identified = Identified::of(context, model, fitted, &fitting);
         let outside = identified.prediction.0.iter().filter(|row| row.remark.is_some()).count();

@@ -33,7 +33,7 @@ use crate::effect::{
 };
 use crate::error::{Error, Result};
 use crate::estimate::{CONFLICT, Fitted, Model, ParameterStatus, PriorCheck};
-use crate::robot::{self, MeasurementSetup, RobotModel, Target};
+use crate::robot::{Anchor, MeasurementSetup, RobotModel, Shape, Target};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -237,8 +237,7 @@ impl Parameters {
     /// The robot with the targets and anchors that the parameters place.
     fn with_setup(&self, robot: RobotModel) -> RobotModel {
         let home = *robot.home();
-        let anchors =
-            self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| robot::Anchor::point(&name, stand.translation));
+        let anchors = self.placed(AnchorShift::NAME).into_iter().map(|(name, stand)| self.anchor(name, &stand));
         let mut setup = MeasurementSetup { targets: Vec::new(), anchors: anchors.collect() };
         let turned = |name: &str| {
             let rx = format!("{}rx", ToolOffset::prefix(name));
@@ -254,6 +253,24 @@ impl Parameters {
             setup.targets = targets.into_iter().map(target).collect();
         }
         robot.measured_by(setup)
+    }
+
+    /// An anchor by its name, and where it stands: with a radius a sphere, with an offset a plane.
+    fn anchor(&self, name: String, stand: &Pose) -> Anchor {
+        let of = |ending: &str| {
+            let full = format!("{}{ending}", AnchorShift::prefix(&name));
+            self.0.iter().find(|row| row.name == full).map(|row| Unit::Millimetre.to_si(row.value))
+        };
+        let (place, shape) = match (of("offset"), of("radius")) {
+            (Some(offset), _) => {
+                let turned = stand.rotation_vector();
+                let normal = Anchor::normal([turned.x, turned.y]);
+                (normal * offset, Shape::Plane(normal))
+            }
+            (None, Some(radius)) => (stand.translation, Shape::Sphere(radius)),
+            (None, None) => (stand.translation, Shape::Point),
+        };
+        Anchor { name, place, shape }
     }
 
     /// Named things of an effect with their translation and rotation vector.

@@ -18,7 +18,7 @@ crate::table::rows! { "prediction",
         dx_mm: f64,
         dy_mm: f64,
         dz_mm: f64,
-        /// Length of the residual.
+        /// Length of the residual; where the row's socket, plane or sphere is placed by held-out rows alone, as if this one had no part.
         error_mm: f64,
         /// One-sigma length of the measurement noise that the row is weighted by (root of the summed variances).
         noise_mm: f64,
@@ -49,6 +49,7 @@ use crate::observation::{KINDS, noise};
 use crate::robot::Measurements;
 use crate::table::{Recording, Split};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 
 /// A measured point that is added up again from prediction and residual is off by less than this.
 const ROUNDING_MM: f64 = 1e-6;
@@ -143,6 +144,12 @@ impl Prediction {
     pub fn mean_square_noise_mm2(&self) -> f64 {
         let (sum, count) = self.fitted_points().fold((0.0, 0usize), |(sum, count), row| (sum + row.noise_mm.powi(2), count + 1));
         sum / count.max(1) as f64
+    }
+
+    /// The same with errors larger by a factor, by row: of rows that had a part in what they were brought to.
+    pub fn with_places(mut self, inflation: &BTreeMap<usize, f64>) -> Self {
+        inflation.iter().filter(|(_, by)| by.is_finite()).for_each(|(row, by)| self.0[*row].error_mm *= by);
+        self
     }
 
     /// The same with the errors of `rows` under fits without them.

@@ -44,7 +44,7 @@ crate::table::rows! { "statistics",
         fold_mean_mm: Option<f64>,
         fold_rms_mm: Option<f64>,
         fold_max_mm: Option<f64>,
-        /// The same with contiguous stretches of the recording as folds.
+        /// The same with contiguous stretches of the recording as folds; of a target that was brought to places, each of these in turn.
         block_mean_mm: Option<f64>,
         block_rms_mm: Option<f64>,
         block_max_mm: Option<f64>,
@@ -66,6 +66,7 @@ crate::table::rows! { "statistics",
 }
 
 use crate::error::counted;
+use crate::observation::KINDS;
 use crate::robot::NoiseBasis;
 
 impl StatisticsRow {
@@ -78,6 +79,12 @@ impl StatisticsRow {
             "{remarked} of {} beyond what was fitted or uncertain by more than half of the correction: mean {mean:.4} mm, max {max:.4} mm there; {points}",
             counted(self.points as usize, "point")
         ))
+    }
+
+    /// Whether it is of rows in which the target was brought to places: blocks that are left out are places then.
+    pub fn is_brought(&self) -> bool {
+        let own = |word: &str| self.set.ends_with(&format!("({word})"));
+        KINDS.iter().any(|kind| kind.is_brought() && own(kind.about().word))
     }
 
     /// Whether its figures of noise rest on nothing that was stated or measured again.

@@ -72,6 +72,15 @@ fn a_broken_robot_file_is_a_fault_with_its_place() {
 }
 
 #[test]
+fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
+    let pipeline = PIPELINE.replace("join: {by: id}", "join: {by: id}\n  - uses: splt");
+    assert_ne!(pipeline, PIPELINE);
+    let (code, _, err) = checked(&ROBOT.replace("tool:", "tol:"), &pipeline, ARM, POINTS);
+    assert_eq!(code, 2, "{err}");
+    assert!(err.contains("did you mean `tool`") && err.contains("did you mean `split`"), "{err}");
+}
+
+#[test]
 fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q_2\n", "ids,x,y,z_mm\n");
     assert_eq!(code, 10, "{err}");

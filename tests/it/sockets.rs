@@ -1,8 +1,13 @@
 //! Calibration without an instrument: a ball that is brought to sockets, planes and spheres, nothing read but the joints.
 
+mod diagnosed;
 mod dirty;
 mod files;
+mod kept;
+mod left_out;
+mod mixed;
 mod mukca;
+mod postures;
 mod rank;
 mod twins;
 
@@ -67,7 +72,13 @@ fn truth(robot: &RobotDescription, seed: usize) -> TrueRobot {
 
 /// What a twin records at fixtures.
 fn touched(robot: &RobotDescription, truth: &TrueRobot, fixtures: &[Fixture], seed: usize) -> Recording {
+    touched_with(robot, truth, "[]", fixtures, seed)
+}
+
+/// The same with effects of the twin, YAML.
+fn touched_with(robot: &RobotDescription, truth: &TrueRobot, effects: &str, fixtures: &[Fixture], seed: usize) -> Recording {
     let settings = Simulate {
+        effects: serde_saphyr::from_str(effects).expect("effects of the twin"),
         truth: truth.clone(),
         fixtures: fixtures.to_vec(),
         seed: Some(seed as u64),
@@ -83,6 +94,17 @@ struct Length<'a>(&'a str, &'a str, f64, f64);
 
 /// A fit of the geometry to all rows, from the nominal robot.
 fn calibrated(robot: &RobotDescription, data: &Measurements, lengths: &[Length], effects: &[&str]) -> (Model, Fitted) {
+    calibrated_knowing(robot, data, lengths, effects, &[])
+}
+
+/// The same with numbers of anchors that are known beforehand: parameter, value and standard deviation, SI.
+fn calibrated_knowing(
+    robot: &RobotDescription,
+    data: &Measurements,
+    lengths: &[Length],
+    effects: &[&str],
+    known: &[(String, f64, f64)],
+) -> (Model, Fitted) {
     let rows: Vec<usize> = (0..data.rows()).collect();
     let (robot, base) = gauge(RobotModel::new(robot.clone()), data, &rows, &BTreeMap::new()).expect("placed");
     let mut model = model(&robot, base, &[&["anchor"][..], &GEOMETRY, effects].concat());
@@ -95,8 +117,18 @@ fn calibrated(robot: &RobotDescription, data: &Measurements, lengths: &[Length],
             sigma: *sigma,
         })
         .collect();
+    for (name, value, sigma) in known {
+        let k = model.stack.specs().iter().position(|spec| spec.name == *name).expect("a parameter");
+        let mean = value - model.standing(k).0;
+        model.known.insert(k, Known { prior: Some(Prior { mean, sigma: *sigma }), bounds: None });
+    }
     let candidates: Vec<usize> = (0..model.x.len()).collect();
     fit(&model, data, &FitOptions { rows: &rows, candidates: &candidates })
+}
+
+/// What a socket's known place (mm) says of its parameters.
+fn known_place(name: &str, place: [f64; 3]) -> Vec<(String, f64, f64)> {
+    ["x", "y", "z"].iter().zip(place).map(|(axis, mm)| (format!("anchor.{name}.{axis}"), 1e-3 * mm, 1e-6)).collect()
 }
 
 fn free(fitted: &Fitted) -> usize {

@@ -4,7 +4,7 @@ use super::types::Question;
 use super::verdict_statement::Ground;
 use crate::effect::PlacementBuffers;
 use crate::estimate::{Model, Screening, noise};
-use crate::observation::{Dimension, KINDS, Residual, dimension, kinds};
+use crate::observation::{Dimension, KINDS, Residual, dimension, kinds, only_brought};
 use crate::robot::{Measurements, NoiseBasis};
 use rayon::prelude::*;
 
@@ -121,12 +121,14 @@ impl Misfit {
             agrees: self.chi_square <= LOUD,
             not_carried: self.not_carried,
             nameless,
+            partly_nameless: false,
             basis,
             repeats,
             noise: self.noise(basis),
             instrument: (data.noise_basis != NoiseBasis::Inferred).then_some(self.instrument),
             left: self.leftover_rms,
             in_motion: data.in_motion(&self.rows),
+            brought: only_brought(data, &self.rows),
         }
     }
 }

@@ -24,8 +24,12 @@ pub(crate) struct Ground {
     pub not_carried: Option<f64>,
     /// Whether only causes without a name were found.
     pub nameless: bool,
+    /// Whether some of what was found, which reproduces the error, has no name.
+    pub partly_nameless: bool,
     /// Whether the arm moved while it was measured: no pose can be measured twice.
     pub in_motion: bool,
+    /// Whether nothing was read but joints with the target brought to places: what is stated is how well that closes.
+    pub brought: bool,
 }
 
 impl Ground {
@@ -33,6 +37,7 @@ impl Ground {
     fn of_noise(&self) -> String {
         match self.basis {
             NoiseBasis::Repeats => format!("the noise that {} show, {}", counted(self.repeats, "repeat"), self.small(self.noise)),
+            NoiseBasis::Instrument if self.brought => format!("the stated repeatability of closing, {}", self.small(self.noise)),
             NoiseBasis::Instrument => format!("the noise that the instrument states, {}", self.small(self.noise)),
             NoiseBasis::Inferred => format!("{}: {}", self.at_random(), self.advice()),
         }
@@ -56,6 +61,9 @@ impl Ground {
                 self.small(held_out)
             ),
             None if self.nameless => format!("the findings reproduce the error, but none has a name: {left} remain"),
+            None if self.partly_nameless => {
+                format!("the findings reproduce the error, but a part of it has no name: {left} remain")
+            }
             None => format!("the findings do not explain everything: {left} remain"),
         }
     }
@@ -64,6 +72,9 @@ impl Ground {
     fn at_random(&self) -> String {
         let scatter = self.small(self.scatter());
         match self.instrument {
+            Some(closing) if self.brought => {
+                format!("{scatter} scatter at random, of which the stated repeatability of closing explains {}", self.number(closing))
+            }
             Some(instrument) => {
                 format!("{scatter} scatter at random, of which the instrument explains {}", self.number(instrument))
             }
@@ -88,6 +99,7 @@ impl Ground {
 
     fn advice(&self) -> &'static str {
         match (self.instrument.is_some(), self.in_motion) {
+            (true, _) if self.brought => "close ten postures twice",
             (true, false) => "measure ten poses twice",
             (true, true) => "measure ten poses twice with the arm at rest",
             (false, false) => "state `instrument` in `ingest`, and measure ten poses twice",
@@ -128,8 +140,23 @@ mod tests {
             agrees: true,
             not_carried: None,
             nameless: false,
+            partly_nameless: false,
             in_motion: false,
+            brought: false,
         }
+    }
+
+    #[test]
+    fn where_joints_alone_were_recorded_the_noise_is_how_well_it_closes() {
+        let ground = Ground { brought: true, ..ground(NoiseBasis::Instrument, Some(17e-6)) };
+        assert_eq!(
+            statement(VerdictKind::Explained, &ground),
+            "the findings explain the error; the residual agrees with the stated repeatability of closing, 31 um"
+        );
+        assert_eq!(
+            statement(VerdictKind::NothingMissing, &Ground { basis: NoiseBasis::Inferred, ..ground }),
+            "nothing found; 31 um scatter at random, of which the stated repeatability of closing explains 17: close ten postures twice"
+        );
     }
 
     #[test]
@@ -206,6 +233,10 @@ mod tests {
             statement(VerdictKind::Unexplained, &Ground { not_carried: Some(80e-6), ..ground }),
             "the findings do not explain everything: 80 um remain of held-out points, 32 um of fitted ones, against the noise that 24 \
              repeats show, 31 um"
+        );
+        assert_eq!(
+            statement(VerdictKind::Unexplained, &Ground { partly_nameless: true, ..ground }),
+            "the findings reproduce the error, but a part of it has no name: 32 um remain, against the noise that 24 repeats show, 31 um"
         );
         assert_eq!(
             statement(VerdictKind::Unexplained, &Ground { nameless: true, ..ground }),

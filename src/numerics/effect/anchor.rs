@@ -1,6 +1,6 @@
 //! `anchor`: what is measured from is elsewhere: the far end of a draw-wire or ballbar, a socket, a plane, a sphere. It moves no point.
 //!
-//! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and `tilt1`, `tilt2` across; of a sphere its
+//! Parameters of a point are x, y, z, tracker axes; of a plane `offset` along its normal and the turns `rx`, `ry` of that; of a sphere its
 //! centre and `radius`.
 
 use super::{ArmState, Cause, CauseDescription, Deflection, Effect, EffectContext, ParameterSpec, Place};
@@ -25,7 +25,7 @@ impl AnchorShift {
     pub fn endings(shape: &Shape) -> &'static [&'static str] {
         match shape {
             Shape::Point => &["x", "y", "z"],
-            Shape::Plane(_) => &["offset", "tilt1", "tilt2"],
+            Shape::Plane(_) => &["offset", "rx", "ry"],
             Shape::Sphere(_) => &["x", "y", "z", "radius"],
         }
     }
@@ -59,7 +59,7 @@ impl Effect for AnchorShift {
             Self::endings(&anchor.shape).iter().map(move |ending| ParameterSpec {
                 name: format!("{}{ending}", Self::prefix(&anchor.name)),
                 place: Place::Anchor,
-                unit: if ending.starts_with("tilt") { Unit::Radian } else { Unit::Millimetre },
+                unit: if matches!(*ending, "rx" | "ry") { Unit::Radian } else { Unit::Millimetre },
                 prior_sigma: 1.0,
             })
         });

@@ -23,7 +23,7 @@ impl Problem<'_> {
 }
 
 /// The measurements with joints that close in these rows; none where no row was brought to a place.
-fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
+pub(super) fn closed(model: &Model, data: &Measurements, rows: &[usize]) -> Option<Measurements> {
     let brought: Vec<&dyn MeasurementKind> = kinds(data).into_iter().filter(|kind| kind.is_brought()).collect();
     if brought.is_empty() {
         return None;

@@ -5,7 +5,7 @@ use super::cluster::clustered;
 use super::covariance::Covariance;
 use super::factor::TriangularFactor;
 use super::known::PriorCheck;
-use super::levenberg::{Effort, Iteration, ROUGH_TOLERANCE, STEP_TOLERANCE, Stop, minimise};
+use super::levenberg::{Effort, FINE, Iteration, ROUGH_TOLERANCE, Stop, minimise};
 use super::model::Model;
 use super::observe::{Visibility, indices, visibility};
 use super::problem::{Evaluation, Problem};
@@ -85,8 +85,6 @@ impl Fitted {
     }
 }
 
-/// To the minimum; calibration problems need four to ten steps.
-const FINE: Effort = Effort { limit: 60, tolerance: STEP_TOLERANCE };
 /// Of rounds whose weights are not settled.
 const ROUGH: Effort = Effort { tolerance: ROUGH_TOLERANCE, ..FINE };
 /// Of the first round, which only finds out how large the residual is and what it lets one see.

@@ -1,19 +1,23 @@
 //! Cross-validation: every fitted row predicted by a fit that has not seen its pose, in folds drawn at random and in contiguous
-//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do.
+//! blocks. Rows of one pose stay together: a pose that was seen is no test; of a moving arm stretches of rows do. Where the target was only
+//! brought to places, a block is a place: sockets of one plate, which names with one beginning (`front/0`, `front/1`) are.
 //!
 //! A fold's fit is the whole one less the fold's rows, one step away ([`NearbyFits`]). Where that step is not small, the fit is repeated
 //! instead.
 
 use super::error_scale::ErrorScale;
 use super::fit::{FitOptions, ParameterStatus, fit};
+use super::left_out::without_places;
 use super::nearby::NearbyFits;
 use super::repeats::Poses;
 use super::session::Session;
+use crate::observation::kinds;
 use crate::robot::Measurements;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Stretches into which the recording of a moving arm is cut.
 const STRETCHES: usize = 40;
@@ -25,7 +29,8 @@ pub struct Folds {
     pub count: usize,
     /// Folds drawn at random: new poses among those that were measured.
     pub random: Vec<f64>,
-    /// Contiguous stretches of the recording: poses of another time and, often, another region.
+    /// Contiguous stretches of the recording: poses of another time and, often, another region. Of a target that was only brought to
+    /// places, each of these in turn.
     pub blocks: Vec<f64>,
 }
 
@@ -36,7 +41,7 @@ pub fn cross_validate(whole: &Session, count: usize, seed: u64) -> Option<Folds>
     let Session { data, rows, .. } = *whole;
     let parts = parts(data, rows);
     let order = whole.divisible(&parts, count)?;
-    let blocks = deal(&order, rows.len(), count);
+    let blocks = positions(data, rows).unwrap_or_else(|| deal(&order, rows.len(), count));
     let random = at_random(order, rows.len(), count, seed);
     let [one, other] = [&random, &blocks].map(|folds| whole.without_each(folds, ErrorScale::Lengths));
     Some(Folds { count, random: gather(data, rows, &random, &one), blocks: gather(data, rows, &blocks, &other) })
@@ -119,6 +124,19 @@ fn parts(data: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
     rows.chunks(rows.len().div_ceil(STRETCHES).max(1)).map(<[usize]>::to_vec).collect()
 }
 
+/// Rows by the place that their target was brought to, where that is all that any measured and there are several.
+fn positions(data: &Measurements, rows: &[usize]) -> Option<Vec<Vec<usize>>> {
+    let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    let kinds = kinds(data);
+    for row in rows {
+        let name = kinds.iter().filter(|kind| kind.axes(data, *row) > 0).try_fold("", |_, kind| {
+            Some(kind.reading(data, *row)?.anchor).filter(|_| kind.is_brought())
+        })?;
+        places.entry(name.rsplit_once('/').map_or(name, |(place, _)| place)).or_default().push(*row);
+    }
+    (places.len() > 1).then(|| places.into_values().collect())
+}
+
 /// Rows of each fold, sorted: poses in the given order, about as many rows in each.
 fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
     let mut folds = vec![Vec::new(); count];
@@ -138,6 +156,9 @@ fn deal(poses: &[&Vec<usize>], rows: usize, count: usize) -> Vec<Vec<usize>> {
 
 /// Errors of the rows `part` under a fit to the others.
 fn without(whole: &Session, candidates: &[usize], part: &[usize], scale: ErrorScale) -> Vec<f64> {
+    if let Some(errors) = without_places(whole, candidates, part, scale) {
+        return errors;
+    }
     let Session { model, data, rows, .. } = *whole;
     let kept: Vec<usize> = rows.iter().copied().filter(|row| part.binary_search(row).is_err()).collect();
     let (other, _) = fit(model, data, &FitOptions { rows: &kept, candidates });

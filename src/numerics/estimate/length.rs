@@ -15,9 +15,9 @@ pub(crate) struct LengthTerm {
 }
 
 /// An anchor as the model has it.
-struct StandingAnchor<'a> {
-    place: Vector3<f64>,
-    shape: Shape,
+pub(super) struct StandingAnchor<'a> {
+    pub place: Vector3<f64>,
+    pub shape: Shape,
     anchor: &'a Anchor,
     /// Of the stack.
     first: usize,
@@ -40,7 +40,8 @@ impl Model {
         })
     }
 
-    fn standing_anchor(&self, number: usize) -> Option<StandingAnchor<'_>> {
+    /// An anchor by its number, corrections included; `None` where nothing places the anchors.
+    pub(super) fn standing_anchor(&self, number: usize) -> Option<StandingAnchor<'_>> {
         let setup = self.robot.setup();
         let anchor = setup.anchors.get(number)?;
         let range = self.stack.effects().find(|(effect, _)| effect.name() == AnchorShift::NAME)?.1;
@@ -53,6 +54,7 @@ impl Model {
                 StandingAnchor { place: anchor.place + normal * x[0], shape, anchor, first, tilt: [x[1], x[2]] }
             }
             shape => {
+                let shape = if let Shape::Sphere(radius) = shape { Shape::Sphere(radius + x[3]) } else { shape };
                 StandingAnchor { place: anchor.place + Vector3::new(x[0], x[1], x[2]), shape, anchor, first, tilt: [0.0; 2] }
             }
         })

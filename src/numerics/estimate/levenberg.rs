@@ -52,6 +52,9 @@ pub(crate) const STEP_TOLERANCE: f64 = 1e-3;
 /// ... and by less than this nothing that the weights of the next round would be learnt from.
 pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
 
+/// To the minimum; calibration problems need four to ten steps.
+pub(crate) const FINE: Effort = Effort { limit: 60, tolerance: STEP_TOLERANCE };
+
 /// How long an iteration goes on.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {

@@ -3,8 +3,9 @@
 use super::covariance::Covariance;
 use super::model::Model;
 use crate::effect::{AnchorShift, ToolOffset};
-use crate::observation::kinds;
+use crate::observation::only_brought;
 use crate::robot::Measurements;
+use crate::units::Unit;
 use nalgebra::{DVector, Vector3};
 
 /// m; places that are no farther apart say nothing of scale.
@@ -13,9 +14,14 @@ const APART: f64 = 0.02;
 /// What is known of the scale of an arm that was brought to places, where nothing else was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmScale {
-    /// Relative standard deviation of the distances between the places; none where all rows close at one.
+    /// Relative standard deviation of the distances between the places; none where all rows close at one. What priors of link lengths
+    /// add to it adds up as if all leaned the same way: nobody who states a tolerance of each says that they do not (GUM 5.2.2).
     pub sigma: Option<f64>,
-    /// Whether a length was given, or a radius.
+    /// The same where no two links lean the same way.
+    pub independent: Option<f64>,
+    /// By how much more than their priors say links differ from nominal; at least 1.
+    pub beyond: f64,
+    /// Whether a length was given, a radius, or the places of two sockets.
     pub by_length: bool,
     /// Whether priors of links hold it.
     pub by_priors: bool,
@@ -25,11 +31,10 @@ pub struct ArmScale {
 
 /// Of rows that were fitted; none where links stay at nominal, or where some measured other than that the target was brought to a place.
 pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Option<&Covariance>) -> Option<ArmScale> {
-    let brought = |row: &usize| kinds(data).iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
     // Links that stay at nominal are the scale.
     let free = covariance.map_or(&[][..], |covariance| covariance.parameters());
     let linked = model.stack.parameters_of("link_geometry").any(|k| free.contains(&k));
-    if rows.is_empty() || !linked || !rows.iter().all(brought) {
+    if rows.is_empty() || !linked || !only_brought(data, rows) {
         return None;
     }
     let mut scratch = model.stack.scratch(&model.robot);
@@ -37,7 +42,9 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         rows.iter().map(|row| model.stack.point(&model.robot, data, *row, &model.x, &mut scratch)).collect();
     let middle = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let square: f64 = points.iter().map(|point| (point - middle).norm_squared()).sum();
-    let sigma = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
+    let links: Vec<usize> = model.stack.parameters_of("link_geometry").collect();
+    let beyond = covariance.map_or(1.0, |covariance| beyond_priors(model, covariance));
+    let sigmas = covariance.filter(|_| (square / points.len() as f64).sqrt() > APART).and_then(|covariance| {
         let mut along = vec![0.0; model.x.len()];
         for (row, point) in rows.iter().zip(&points) {
             let off = (point - middle) / square;
@@ -45,15 +52,47 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         }
         let parameters = covariance.parameters();
         let weights = DVector::from_iterator(parameters.len(), parameters.iter().map(|k| along[*k]));
-        let block = covariance.block(parameters)?;
-        Some(weights.dot(&(block * &weights)).max(0.0).sqrt())
+        let along = covariance.block(parameters)? * &weights;
+        let whole = weights.dot(&along);
+        // How the scale follows the mean of each prior, in standard deviations of that.
+        let lengths = parameters.iter().enumerate().filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
+        let lengths = lengths.filter(|(_, k)| links.contains(k));
+        let parts: Vec<f64> =
+            lengths.filter_map(|(row, k)| Some(along[row].abs() / model.known(*k).prior?.sigma)).collect();
+        let apart: f64 = parts.iter().map(|part| part * part).sum();
+        let together = (whole - apart).max(0.0) + parts.iter().sum::<f64>().powi(2);
+        Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
     });
     let is_told = |k: usize| model.known.get(&k).is_some_and(|known| known.prior.is_some());
+    let is_radius = |k: usize| model.stack.specs()[k].name.ends_with(".radius");
     let told = |name: &'static str| model.stack.parameters_of(name).any(is_told);
     Some(ArmScale {
-        sigma,
-        by_length: !model.lengths.is_empty() || told(AnchorShift::NAME),
+        sigma: sigmas.map(|[together, _]| together),
+        independent: sigmas.map(|[_, independent]| independent),
+        beyond,
+        by_length: !model.lengths.is_empty() || known_places(model) > 1 || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
         by_priors: told("link_geometry") || told(ToolOffset::NAME),
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })
+}
+
+/// Sockets whose places are known beforehand.
+pub fn known_places(model: &Model) -> usize {
+    let specs = model.stack.specs();
+    let told = |k: &usize| specs[*k].name.ends_with(".x") && model.known(*k).prior.is_some();
+    model.stack.parameters_of(AnchorShift::NAME).filter(told).count()
+}
+
+/// Root of the squares of links' deviations from their priors, in standard deviations, over the number of directions that the data see of
+/// them (the ratio of Birge; effective parameters after MacKay, 1992); at least 1.
+fn beyond_priors(model: &Model, covariance: &Covariance) -> f64 {
+    let (mut square, mut seen) = (0.0, 0.0);
+    let links: Vec<usize> = model.stack.parameters_of("link_geometry").collect();
+    for (row, k) in covariance.parameters().iter().enumerate().filter(|(_, k)| links.contains(k)) {
+        if let Some(prior) = model.known(*k).prior {
+            square += ((model.x[*k] - prior.mean) / prior.sigma).powi(2);
+            seen += (1.0 - (covariance.sigma(row) / prior.sigma).powi(2)).max(0.0);
+        }
+    }
+    if seen < 1.0 { 1.0 } else { (square / seen).sqrt().max(1.0) }
 }

@@ -2,7 +2,7 @@
 
 use super::model::Model;
 use crate::effect::{AnchorShift, BaseFrame, ToolOffset};
-use crate::robot::{Shape, Target};
+use crate::robot::{Anchor, Shape, Target};
 use crate::spatial::{Pose, Twist};
 use nalgebra::Vector3;
 
@@ -15,22 +15,27 @@ impl Model {
         let number = parameter - range.start;
         match effect.name() {
             BaseFrame::NAME => (component(self.stack.base(), number), component(&self.base(), number)),
-            AnchorShift::NAME => self.anchored(number).map_or(change, |nominal| (nominal, nominal + change.1)),
+            AnchorShift::NAME => self.anchored(number).unwrap_or(change),
             ToolOffset::NAME => self.seat(number, &self.x[range]).unwrap_or(change),
             _ => change,
         }
     }
 
-    /// Where the `number`-th parameter of anchors stands at the start: a coordinate or a radius; none of a plane's.
-    fn anchored(&self, number: usize) -> Option<f64> {
+    /// The `number`-th parameter of anchors at the start and now: a coordinate or a radius; of a plane its distance from the origin
+    /// along its normal, or a tilt of that.
+    fn anchored(&self, number: usize) -> Option<(f64, f64)> {
         let setup = self.robot.setup();
         let of = (0..setup.anchors.len()).rev().find(|of| setup.first_of_anchor(*of) <= number)?;
         let axis = number - setup.first_of_anchor(of);
         let anchor = setup.anchors.get(of)?;
-        match anchor.shape {
-            Shape::Plane(_) => None,
-            Shape::Sphere(radius) if axis == 3 => Some(radius),
-            _ => Some(anchor.place[axis]),
+        let now = self.standing_anchor(of)?;
+        match (anchor.shape, now.shape) {
+            (Shape::Plane(before), Shape::Plane(normal)) if axis == 0 => {
+                Some((before.dot(&anchor.place), normal.dot(&now.place)))
+            }
+            (Shape::Plane(before), Shape::Plane(normal)) => Some((Anchor::tilts(&before)[axis - 1], Anchor::tilts(&normal)[axis - 1])),
+            (Shape::Sphere(before), Shape::Sphere(radius)) if axis == 3 => Some((before, radius)),
+            _ => Some((anchor.place[axis], now.place[axis])),
         }
     }
 

@@ -26,7 +26,7 @@ pub use sphere::SphereKind;
 pub use weight::Weight;
 
 use crate::effect::{Closing, Direction, PlacedRow, PointMotion};
-use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel};
+use crate::robot::{Anchor, Measurements, Named, Reading, Readings, RobotModel, Shape};
 use crate::spatial::Pose;
 use crate::units::Unit;
 use nalgebra::{Matrix3, Vector3};
@@ -251,6 +251,13 @@ pub fn kinds(data: &Measurements) -> Vec<&'static dyn MeasurementKind> {
     KINDS.iter().copied().filter(|kind| kind.is_in(data)).collect()
 }
 
+/// Whether all that these rows measured is that the target was brought to places: nothing was read but the joints.
+pub fn only_brought(data: &Measurements, rows: &[usize]) -> bool {
+    let kinds = kinds(data);
+    let brought = |row: &usize| kinds.iter().all(|kind| kind.is_brought() || kind.axes(data, *row) == 0);
+    kinds.iter().any(|kind| kind.is_brought()) && rows.iter().all(brought)
+}
+
 /// Numbers that a row measured, of all kinds.
 pub fn values(data: &Measurements, row: usize) -> usize {
     KINDS.iter().map(|kind| kind.axes(data, row)).sum()
@@ -269,11 +276,15 @@ pub fn noise(data: &Measurements, row: usize) -> f64 {
     lengths.find_map(|kind| kind.noise(data, row)).unwrap_or(0.0)
 }
 
+/// Cosine beyond which a plane's normal lies along an axis: within 0.8 deg.
+const ALONG: f64 = 0.9999;
+
 /// Parameters of the geometry that the rows see by theory; none where some saw axes of a point only, of which theory has no word.
 ///
 /// 4R + 2P for the axes (their directions alone are 2R), 3 for a target's place and as many for its orientation, 3 for an anchor (4 for a
-/// sphere); less what moves the whole cell unseen, and its scale where targets are only brought to things and no `length` is known.
-pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool) -> Option<usize> {
+/// sphere); less what moves the whole cell unseen, and its scale where targets are only brought to things and no `length` is known. Sockets
+/// whose place is known, `points` of them on no line, fix the cell: one its translations, two the scale and all turns but about their line.
+pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: bool, points: usize) -> Option<usize> {
     let axes = |kind: &dyn MeasurementKind, wanted: RangeInclusive<usize>| {
         rows.iter().any(|row| wanted.contains(&kind.axes(data, *row)))
     };
@@ -281,7 +292,12 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: boo
     let (whole, rest): (Vec<&dyn MeasurementKind>, Vec<&dyn MeasurementKind>) =
         used.iter().copied().partition(|kind| axes(*kind, kind.about().axes..=kind.about().axes));
     let blind = |k: usize| whole.iter().map(|kind| kind.about().rank.blind[k]).min();
-    let (translations, rotations) = (blind(0)?, blind(1)?);
+    let (translations, rotations) = match points {
+        0 => (blind(0)?, blind(1)?),
+        1 => (0, blind(1)?),
+        2 => (0, blind(1)?.min(1)),
+        _ => (0, 0),
+    };
     // Beside what fixes the whole cell it does not matter what single axes show.
     if translations + rotations > 0 && !rest.is_empty() {
         return None;
@@ -296,6 +312,13 @@ pub fn rank(robot: &RobotModel, data: &Measurements, rows: &[usize], length: boo
     let place = if places { 3 } else { 0 };
     let targets: usize = setup.targets.iter().map(|target| place + if target.oriented { 3 } else { 0 }).sum();
     let seen = (0..robot.joints()).map(axis).sum::<usize>() + targets.max(place) + setup.first_of_anchor(setup.anchors.len());
-    let scale = usize::from(used.iter().all(|kind| kind.is_brought()) && !length);
-    Some(seen - scale - if places { translations } else { 0 } - rotations)
+    // Planes square to the first axis do not show where that stands.
+    let along_first = |anchor: &Anchor| match anchor.shape {
+        Shape::Plane(normal) => normal.dot(robot.axis(0)).abs() > ALONG,
+        _ => false,
+    };
+    let flat = used.iter().all(|kind| kind.about().name == PlaneKind.about().name) && setup.anchors.iter().all(along_first);
+    let unplaced = if flat && robot.is_revolute(0) && points == 0 { 2 } else { 0 };
+    let scale = usize::from(used.iter().all(|kind| kind.is_brought()) && !length && points < 2);
+    Some(seen - scale - unplaced - if places { translations } else { 0 } - rotations)
 }

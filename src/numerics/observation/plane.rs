@@ -78,7 +78,7 @@ impl MeasurementKind for PlaneKind {
             let axes = scatter.symmetric_eigen();
             let normal: Vector3<f64> = axes.eigenvectors.column(axes.eigenvalues.imin()).into();
             // Of the two that are one plane, the normal that points up.
-            let sign = if normal[normal.iamax()] < 0.0 { -1.0 } else { 1.0 };
+            let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
             Ok(Anchor { name: name.into(), place, shape: Shape::Plane(normal.normalize() * sign) })
         };
         touches(self, robot, data, rows, base).into_iter().map(place).collect()

@@ -36,6 +36,17 @@ pub struct Reading<'a> {
 }
 
 impl Readings {
+    /// Of some rows, in their order.
+    pub fn subset(&self, rows: &[usize]) -> Self {
+        Self {
+            kind: self.kind,
+            width: self.width,
+            values: rows.iter().flat_map(|row| &self.values[row * self.width..(row + 1) * self.width]).copied().collect(),
+            sigma: rows.iter().map(|row| self.sigma[*row]).collect(),
+            anchor: self.anchor.as_ref().map(|names| Named::of(rows.iter().map(|row| names.name(*row)))),
+        }
+    }
+
     /// What was read in a row; none where nothing was.
     pub fn row(&self, row: usize) -> Option<Reading<'_>> {
         let values = &self.values[row * self.width..(row + 1) * self.width];

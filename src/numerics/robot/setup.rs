@@ -54,12 +54,39 @@ impl Anchor {
         Self { name: name.into(), place, shape: Shape::Point }
     }
 
-    /// Two unit vectors in a plane of this normal, square to each other.
+    /// The turns (rad) about the x and y axes, as one rotation vector, that bring the z axis to a unit normal.
+    pub fn tilts(normal: &Vector3<f64>) -> [f64; 2] {
+        let flat = normal.x.hypot(normal.y);
+        let per_sine = if flat > 0.0 { libm::atan2(flat, normal.z) / flat } else { 1.0 };
+        [-normal.y * per_sine, normal.x * per_sine]
+    }
+
+    /// The unit normal that such turns make of the z axis.
+    pub fn normal([about_x, about_y]: [f64; 2]) -> Vector3<f64> {
+        let angle = about_x.hypot(about_y);
+        let sine = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
+        Vector3::new(sine * about_y, -sine * about_x, libm::cos(angle))
+    }
+
+    /// How a normal moves with each of its [`Anchor::tilts`], 1/rad: two vectors in the plane.
     pub fn across(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
-        let first = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
-        [first, normal.cross(&first)]
+        let [about_x, about_y] = Self::tilts(normal);
+        let angle = about_x.hypot(about_y);
+        if angle < LEVEL {
+            return [-Vector3::y(), Vector3::x()];
+        }
+        let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+        let share = sine / angle;
+        let bend = (cosine - share) / (angle * angle);
+        [
+            Vector3::new(bend * about_x * about_y, -share - bend * about_x * about_x, -share * about_x),
+            Vector3::new(share + bend * about_y * about_y, -bend * about_x * about_y, -share * about_y),
+        ]
     }
 }
+
+/// A normal that leans less than this, rad, stands on the z axis.
+const LEVEL: f64 = 1e-6;
 
 /// Targets and anchors, each by the order of names.
 #[derive(Debug, Clone, Default, PartialEq)]

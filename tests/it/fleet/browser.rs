@@ -50,6 +50,25 @@ fn five_thousand_robots_make_a_page_of_a_few_megabytes() {
     assert!(page.contains("href=\"..&#x2f;line.12&#x2f;report.html\"") || page.contains("href=\"../line.12/report.html\""));
 }
 
+#[test]
+fn robots_that_need_a_technician_come_first_with_the_reason() {
+    let mut table = FleetTable((0..6).map(row).collect());
+    table.0[2].verdict = Some("unexplained".into());
+    table.0[4].flags = Some("zero of joint 2".into());
+    table.0[5].after_rms_mm = Some(2.5);
+    let page = html("line", &table, &FleetChanges::default(), &BTreeMap::new()).unwrap();
+    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text} is not there"));
+    let told = [
+        "<li>robot 3: was not calibrated: tracker.csv:4: not a number</li>",
+        "<li>robot 5: the calibration did not make it more accurate</li>",
+        "<li>robot 4: changed beyond its limits since the last calibration: zero of joint 2</li>",
+        "<li>robot 2: its error is not explained: gear_cyclic at joint 2</li>",
+    ];
+    assert!(told.windows(2).all(|pair| at(pair[0]) < at(pair[1])));
+    let rows = ["robot 3", "robot 5", "robot 4", "robot 2", "robot 0", "robot 1"].map(|name| at(&format!("<td class=\"name\">{name}<")));
+    assert!(rows.is_sorted(), "{rows:?}");
+}
+
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|folder| folder.join("chromium")).find(|file| file.is_file())

@@ -185,7 +185,7 @@ fn the_rank_of_every_kind_is_that_of_theory() {
             let (model, fitted) = truth.fit(&data, |_| true);
             let free = fitted.statuses.iter().filter(|fate| matches!(fate, ParameterStatus::Free(_))).count();
             let name = format!("{}, {}", truth.description.name, kind.about().name);
-            assert_eq!(Some(free), rank(&model.robot, &data, &rows, false), "{name}");
+            assert_eq!(Some(free), rank(&model.robot, &data, &rows, false, 0), "{name}");
         }
     }
 }

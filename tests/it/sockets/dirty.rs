@@ -8,14 +8,14 @@ use calib::stage::{Identify, IdentifyReads};
 use calib::table::{Parameters, Recording, Robot, Split, SplitRow};
 use nalgebra::Vector3;
 
-const SETTINGS: &str = r#"
+pub const SETTINGS: &str = r#"
 on: [fit]
 effects: [anchor, base_frame, tool_offset, joint_offset, link_geometry]
 prior: {"link_geometry.*": {sigma: 0.3}, "link_geometry.*.r*": {sigma: 0.001}, "joint_offset.*": {sigma: 0.03}}
 distances: [{between: ["*/0", "*/1"], mm: 50, sigma: 0.05}]
 "#;
 
-fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
+pub fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
     [
         socket("a/0", [480.0, 120.0, 300.0], points, 60.0),
         socket("a/1", [480.0, 170.0, 300.0], points, 60.0),
@@ -25,7 +25,7 @@ fn cell(points: usize) -> [calib::twin::touch::Fixture; 4] {
 }
 
 /// Every row to fit.
-fn all(recording: &Recording) -> Split {
+pub fn all(recording: &Recording) -> Split {
     let ids = recording.sequence.iter().zip(&recording.point_id);
     Split(ids.map(|(sequence, id)| SplitRow { sequence: *sequence, point_id: id.clone(), set: "fit".into() }).collect())
 }

@@ -1,7 +1,8 @@
 //! What such data show is what theory says, counted at joints that close; the volume term is the derivative that it claims to be.
 
-use super::{Length, calibrated, fixture, free, plane, socket, sphere, touched, truth};
+use super::{Length, calibrated, calibrated_knowing, fixture, free, known_place, plane, socket, sphere, touched, truth};
 use calib::description::RobotDescription;
+use calib::estimate::ParameterStatus;
 use calib::observation::rank;
 use calib::twin::touch::Fixture;
 
@@ -13,7 +14,7 @@ fn seen(robot: &RobotDescription, fixtures: &[Fixture], lengths: &[Length], effe
     let own = setup.first_of_anchor(setup.anchors.len());
     if effects.is_empty() {
         let rows: Vec<usize> = (0..data.rows()).collect();
-        assert_eq!(rank(&model.robot, &data, &rows, !lengths.is_empty()), Some(free(&fitted)));
+        assert_eq!(rank(&model.robot, &data, &rows, !lengths.is_empty(), 0), Some(free(&fitted)));
     }
     free(&fitted) - own
 }
@@ -50,5 +51,54 @@ fn planes_and_spheres_show_what_theory_says() {
         assert_eq!(seen(&robot, &tilted, &[apart], &[]), 4 * n - 3, "{}: two planes a known distance apart", robot.name);
         let ball = sphere("ball", A, 40.0, 90, 0.0);
         assert_eq!(seen(&robot, &[ball], &[], &[]), 4 * n - 4, "{}: a sphere", robot.name);
+    }
+}
+
+#[test]
+fn a_plane_square_to_the_first_axis_shows_two_less_and_a_known_diameter_one_more() {
+    for robot in arms() {
+        let n = robot.joints.len();
+        let flat = plane("low", A, [0.0, 0.0, 1.0], 90, 0.0);
+        assert_eq!(seen(&robot, &[flat], &[], &[]), 4 * n - 6, "{}: a plane whose normal is along axis 1", robot.name);
+        let data = touched(&robot, &truth(&robot, 1), &[sphere("ball", A, 40.0, 90, 0.0)], 7).measurements();
+        let known = [("anchor.ball.radius".to_string(), 0.04, 1e-6)];
+        let (model, fitted) = calibrated_knowing(&robot, &data, &[], &[], &known);
+        assert_eq!(free(&fitted) - model.robot.setup().first_of_anchor(1), 4 * n - 3, "{}: a known diameter", robot.name);
+    }
+}
+
+#[test]
+fn known_points_show_place_then_scale_and_turns() {
+    for robot in arms() {
+        let n = robot.joints.len();
+        let places = [("a", A), ("b", B), ("c", C)];
+        let sockets = places.map(|(name, place)| socket(name, place, 40, 0.0));
+        for (count, expected) in [(1, 4 * n - 1), (2, 4 * n + 2), (3, 4 * n + 3)] {
+            let data = touched(&robot, &truth(&robot, 1), &sockets[..count], 7).measurements();
+            let known: Vec<_> = places[..count].iter().flat_map(|(name, place)| known_place(name, *place)).collect();
+            let (model, fitted) = calibrated_knowing(&robot, &data, &[], &[], &known);
+            let found = free(&fitted) - model.robot.setup().first_of_anchor(count);
+            assert_eq!(found, expected, "{}: {count} known", robot.name);
+            let rows: Vec<usize> = (0..data.rows()).collect();
+            assert_eq!(rank(&model.robot, &data, &rows, false, count), Some(free(&fitted)), "{}: {count} known", robot.name);
+        }
+    }
+}
+
+#[test]
+fn wind_up_adds_one_for_each_joint_that_gravity_loads() {
+    for robot in arms() {
+        let n = robot.joints.len();
+        let fixtures = [socket("a", A, 60, 0.0), socket("c", C, 60, 0.0)];
+        let data = touched(&robot, &truth(&robot, 1), &fixtures, 7).measurements();
+        let (model, fitted) = calibrated(&robot, &data, &[], &["joint_compliance"]);
+        let wind_up: Vec<&ParameterStatus> =
+            model.stack.parameters_of("joint_compliance").map(|k| &fitted.statuses[k]).collect();
+        assert!(wind_up.iter().all(|status| !matches!(status, ParameterStatus::Redundant(_))), "{}: {wind_up:?}", robot.name);
+        // The first axis is vertical: nothing loads it. Masses near the axes of a wrist load these too little to be seen.
+        assert!(matches!(wind_up[0], ParameterStatus::Unseen), "{}: {wind_up:?}", robot.name);
+        let loaded = wind_up.iter().filter(|status| matches!(status, ParameterStatus::Free(_))).count();
+        assert!(loaded >= 3, "{}: {wind_up:?}", robot.name);
+        assert_eq!(free(&fitted) - model.robot.setup().first_of_anchor(2), 4 * n - 4 + loaded, "{}", robot.name);
     }
 }

@@ -39,7 +39,7 @@ fn stated_sigmas_of_distances_hold_and_the_rank_is_that_of_theory() {
         let length = |from, to, k: usize| Length(from, to, 0.05 + 2e-5 * normal(77 * seed + k), 2e-5);
         let (model, fitted) = calibrated(&robot, &data, &[length("a/0", "a/1", 1), length("b/0", "b/1", 2)], &[]);
         let rows: Vec<usize> = (0..data.rows()).collect();
-        if rank(&model.robot, &data, &rows, true) != Some(free(&fitted)) {
+        if rank(&model.robot, &data, &rows, true, 0) != Some(free(&fitted)) {
             wrong.push(format!("{} {seed}: {} free", robot.name, free(&fitted)));
         }
         let Some(covariance) = &fitted.covariance else { panic!("{} {seed}: singular", robot.name) };

@@ -11,7 +11,7 @@ use crate::diagnose::misfit::{LOUD, Misfit, TOO_LOUD};
 use crate::diagnose::round::{Fitter, REPEATS};
 use crate::diagnose::search::SIGNIFICANT;
 use crate::diagnose::types::{Diagnosis, ErrorLengths, Finding, JointRepeatability, VerdictKind};
-use crate::diagnose::verdict_statement::statement;
+use crate::diagnose::verdict_statement::{Ground, statement};
 use crate::effect::Unknown;
 use crate::estimate::{Model, cross_validate};
 use crate::observation::Dimension;
@@ -48,6 +48,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
         other => other,
     };
     let nameless = !something_left && only_unknown(&findings);
+    let partly_nameless = !something_left && !nameless && nameless_share(&findings) > NAMELESS;
     let signature = signature(&rest, &last, something_left, misfit.not_carried.is_some());
     let mut not_observable = not_observable(last.survey, &last.pool.problem.reach());
     not_observable.extend(not_tried(last.survey, fitter.question.own));
@@ -60,7 +61,7 @@ pub(crate) fn conclude(last: LastRound, fitter: &Fitter, before: &[Option<f64>])
     // The folds' errors are told as lengths.
     let lengths = misfit.dimension == Dimension::Length;
     let folds = if lengths { cross_validate(&state.session(fitter), FOLDS, fitter.question.seed) } else { None };
-    let ground = misfit.ground(data, basis, fitter.repeatability.repeats, nameless);
+    let ground = Ground { partly_nameless, ..misfit.ground(data, basis, fitter.repeatability.repeats, nameless) };
     Diagnosis {
         dimension: misfit.dimension,
         statement: statement(verdict, &ground),

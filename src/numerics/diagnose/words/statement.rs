@@ -3,7 +3,8 @@
 use crate::diagnose::types::Finding;
 use crate::diagnose::whitened::AutocorrelatedNoise;
 use crate::effect::{Cause, Clock, DeclaredCause, DeclaredForm, Measure, Place, Summary, Survey, cause, figure};
-use crate::observation::Dimension;
+use crate::observation::{Dimension, noise, only_brought};
+use crate::robot::Measurements;
 
 /// A size in the small unit of its dimension, e.g. `31 um`.
 pub(super) fn small(size: f64, of: Dimension) -> String {
@@ -84,8 +85,24 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
             if survey.data.sequence.is_some() { "times, since the rows stand in another order" } else { "order of the rows" };
         out.push(format!("direction of approach: taken from the {order}"));
     }
-    out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+    let rows: Vec<usize> = (0..survey.data.rows()).collect();
+    if only_brought(survey.data, &rows) {
+        out.push(format!(
+            "anything below the repeatability of closing, {}: nothing but joints was recorded",
+            small(closing(survey.data, &rows), Dimension::Length)
+        ));
+        out.push("place of the base: it moves with all that the target was brought to; measure three points of the cell".into());
+        out.push("scale of the arm: arm, target and fixtures may all be larger together; state `distances` in `identify`".into());
+    } else {
+        out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+    }
     out
+}
+
+/// Length of one sigma with which the target comes back, rms over rows, m.
+fn closing(data: &Measurements, rows: &[usize]) -> f64 {
+    let square: f64 = rows.iter().map(|row| noise(data, *row).powi(2)).sum();
+    (square / rows.len().max(1) as f64).sqrt()
 }
 
 /// Effects of the user's own that were not tried, since the recording lacks a column.

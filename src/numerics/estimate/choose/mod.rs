@@ -4,6 +4,7 @@
 //! are sums of log determinants: ln |M| for D; for T, what is left of either effect's columns once the rival and all else were
 //! fitted, ln |M| - ln |M without the effect|. Only seen parameters count, so redundant ones change nothing.
 
+mod brought;
 mod exchange;
 mod point_jacobian;
 mod site;
@@ -11,6 +12,7 @@ mod spread;
 mod tell;
 mod visit_order;
 
+pub use brought::{BallOffset, BroughtProposal, BroughtRequest, LeftOutPlace, PriorSigma, propose_brought};
 pub use point_jacobian::{PointJacobian, Score};
 pub use site::{Circumstances, Site};
 pub use spread::spread;
@@ -218,6 +220,7 @@ pub(super) fn subset(data: &Measurements, rows: &[usize]) -> Measurements {
             rows.iter().flat_map(of).collect()
         }),
         target: data.target.as_ref().map(|all| Named::of(rows.iter().map(|row| all.name(*row)))),
+        readings: data.readings.iter().map(|own| own.subset(rows)).collect(),
         ..Measurements::default()
     }
 }

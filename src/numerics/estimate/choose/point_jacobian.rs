@@ -4,7 +4,7 @@ use crate::estimate::factor::{StackedRows, TriangularFactor};
 use crate::estimate::model::Model;
 use crate::estimate::observe::{Visibility, visibility};
 use crate::estimate::problem::Problem;
-use crate::observation::ExcessSigma;
+use crate::observation::{ExcessSigma, MeasurementKind, SocketKind};
 use crate::robot::Measurements;
 use crate::statistics::nearest;
 use faer::linalg::matmul::matmul;
@@ -63,7 +63,8 @@ impl PointJacobian {
         &self.free
     }
 
-    /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma.
+    /// Three rows a pose: derivatives by the free parameters in units of prior sigma, over the point's sigma. Of a target that is brought to
+    /// a socket they are those of what closes there.
     pub(super) fn rows(&self, model: &Model, data: &Measurements) -> Mat<f64> {
         let count = model.stack.specs().len();
         let (mut column, mut size) = (vec![usize::MAX; count], vec![0.0; count]);
@@ -81,7 +82,7 @@ impl PointJacobian {
                 || model.stack.scratch(&model.robot),
                 |scratch, row| {
                     let mut line = vec![Vector3::zeros(); p];
-                    model.stack.derivatives(&model.robot, data, row, &model.x, scratch, |parameter, derivative| {
+                    let add = |parameter: usize, derivative: Vector3<f64>| {
                         if let Some(sum) = line.get_mut(column[parameter]) {
                             *sum += derivative;
                         }
@@ -90,15 +91,22 @@ impl PointJacobian {
                         {
                             *sum += derivative * size[parameter];
                         }
-                    });
+                    };
+                    let mut placed = model.place(data, row, scratch);
+                    match data.reading(SocketKind.about().name, row) {
+                        Some(_) => placed.partials_from_anchor(&Vector3::zeros(), add),
+                        None => placed.partials(add),
+                    }
                     line
                 },
             )
             .collect();
+        let closing = |row: usize| data.reading(SocketKind.about().name, row).map(|reading| Vector3::repeat(reading.sigma));
+        let sigma: Vec<Vector3<f64>> = (0..data.rows()).map(|row| closing(row).unwrap_or(data.sigma[row])).collect();
         let mut out = Mat::zeros(3 * data.rows(), p);
         for (j, scale) in scale.iter().enumerate() {
             let column = out.col_as_slice_mut(j);
-            for (row, (line, sigma)) in poses.iter().zip(&data.sigma).enumerate() {
+            for (row, (line, sigma)) in poses.iter().zip(&sigma).enumerate() {
                 let derivative = line[j] * *scale;
                 column[3 * row] = derivative.x / sigma.x;
                 column[3 * row + 1] = derivative.y / sigma.y;

@@ -1,0 +1,62 @@
+//! Sockets beside points of a tracker in one estimation: the tracker tells scale and place, the sockets add to the arm.
+
+use super::{calibrated, fixture, free, socket, touched, truth};
+use crate::identify::normal;
+use calib::estimate::scale;
+use calib::observation::{only_brought, rank};
+use calib::robot::{Measurements, Named, Readings};
+use calib::twin::arm::Arm;
+use calib::twin::motion::Motion;
+use nalgebra::Vector3;
+
+/// The tracker's noise, m.
+const SIGMA: f64 = 2e-5;
+
+/// Rows with points of a tracker in front of those of sockets.
+fn beside(points: Measurements, sockets: &Measurements) -> Measurements {
+    let (rows, more) = (points.rows(), sockets.rows());
+    let own = &sockets.readings[0];
+    let names: Vec<&str> = std::iter::repeat_n("", rows).chain((0..more).map(|row| own.row(row).expect("a socket").anchor)).collect();
+    let readings = Readings {
+        kind: own.kind,
+        sigma: std::iter::repeat_n(f64::NAN, rows).chain(own.sigma.iter().copied()).collect(),
+        anchor: Some(Named::of(names.iter().copied())),
+        ..Readings::default()
+    };
+    Measurements {
+        joints: points.joints,
+        q: [points.q, sockets.q.clone()].concat(),
+        position: [points.position, sockets.position.clone()].concat(),
+        sigma: [points.sigma, sockets.sigma.clone()].concat(),
+        payload: vec![0.0; rows + more],
+        readings: vec![readings],
+        ..Measurements::default()
+    }
+}
+
+#[test]
+fn points_of_a_tracker_tell_the_scale_of_sockets() {
+    for robot in [fixture::offset_wrist(), fixture::seven()] {
+        let truth = truth(&robot, 21);
+        let cell = [socket("a", [480.0, 120.0, 300.0], 40, 60.0), socket("b", [-250.0, 450.0, 380.0], 40, 60.0)];
+        let elsewhere = [socket("x", [350.0, -350.0, 450.0], 12, 0.0), socket("y", [-200.0, 450.0, 520.0], 12, 0.0)];
+        let mut points = touched(&robot, &truth, &elsewhere, 5).measurements();
+        let arm = Arm::new(&robot, &truth);
+        let there = |data: &Measurements, row: usize| {
+            Vector3::from(arm.posture(&truth.drive(&robot, data.q(row)), &Motion::none(robot.joints.len())).tool)
+        };
+        points.position = (0..points.rows())
+            .map(|row| there(&points, row) + Vector3::new(1.0, -2.0, 0.5) + Vector3::from([0, 1, 2].map(|axis| SIGMA * normal(7 * row + axis))))
+            .collect();
+        points.sigma = vec![Vector3::repeat(SIGMA); points.rows()];
+        let data = beside(points, &touched(&robot, &truth, &cell, 21).measurements());
+        let rows: Vec<usize> = (0..data.rows()).collect();
+        let (model, fitted) = calibrated(&robot, &data, &[], &[]);
+        assert_eq!(rank(&model.robot, &data, &rows, false, 0), Some(free(&fitted)), "{}", robot.name);
+        assert!(!only_brought(&data, &rows) && scale(&model, &data, &rows, fitted.covariance.as_ref()).is_none());
+        let predicted = model.predict(&data);
+        let (first, last) = (30, data.rows() - 1);
+        let apart = (predicted[first] - predicted[last]).norm() - (there(&data, first) - there(&data, last)).norm();
+        assert!(apart.abs() < 1.5e-4, "{}: distances of sockets are {:.3} mm off", robot.name, 1e3 * apart);
+    }
+}
