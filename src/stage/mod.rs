@@ -8,6 +8,8 @@ mod computed;
 mod copied;
 mod curves;
 mod diagnose;
+mod diagnose_torques;
+mod dynamic_arm;
 mod folding;
 mod identified;
 mod identify;
@@ -32,6 +34,7 @@ mod weightless;
 
 pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
+pub use diagnose_torques::{DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
@@ -326,6 +329,9 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
     sets.iter().enumerate().map(|(k, set)| (format!("on[{k}]"), set.clone())).collect()
 }
 
+/// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
+pub const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
+
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<ReadRobot>(),
@@ -336,6 +342,8 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Transfer>(),
     StageEntry::of::<Diagnose>(),
+    StageEntry::of::<ingest::IngestTorques>(),
+    StageEntry::of::<DiagnoseTorques>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Optimise>(),
