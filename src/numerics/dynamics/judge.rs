@@ -1,0 +1,63 @@
+//! Held-out rows in the end: what does not lower their error, or only by stretching tolerances, is no finding.
+
+use super::cause::TorqueForm;
+use super::choice::CauseChoice;
+use super::problem::TorqueProblem;
+use super::sweep::Sweep;
+use super::weighted::Weighing;
+
+/// What each column of a finding must gain.
+const GAIN: f64 = 3.0;
+
+/// A set that held-out rows have confirmed, and what they did not.
+pub(super) struct JudgedSet {
+    pub set: Vec<usize>,
+    /// With what held-out rows gained by each.
+    pub withdrawn: Vec<(usize, f64)>,
+}
+
+/// Squared whitened error of held-out rows of a solution, and what tolerances are stretched by.
+fn held_out_square(problem: &TorqueProblem, weighing: Weighing, sweep: &Sweep) -> f64 {
+    let solution = sweep.solution();
+    let stretched: f64 =
+        solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
+    let left = weighing.measured(&problem.residual(&solution));
+    left.iter().flatten().map(|value| value * value).sum::<f64>() + stretched
+}
+
+/// What held-out rows gain by each of a set.
+fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<f64> {
+    let runs = choice.problem.runs(true);
+    let weighing = choice.problem.weighing(&runs);
+    let whole = held_out_square(choice.problem, weighing, &choice.base.with(set));
+    let without = |place: usize| {
+        let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
+        held_out_square(choice.problem, weighing, &choice.base.with(&rest)) - whole
+    };
+    (0..set.len()).map(without).collect()
+}
+
+/// Withdraws the worst until all are confirmed; nothing where no rows are held out.
+pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
+    let mut withdrawn = Vec::new();
+    if choice.problem.runs(true).is_empty() {
+        return JudgedSet { set, withdrawn };
+    }
+    loop {
+        let gains = gains(choice, &set);
+        let short = |place: &usize| gains[*place] - GAIN * choice.form(set[*place]).width as f64;
+        let needed = |place: &usize| {
+            let form = choice.form(set[*place]);
+            set.iter().any(|other| modifies(choice.form(*other), form))
+        };
+        let worst = (0..set.len()).filter(|place| short(place) < 0.0 && !needed(place));
+        let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
+        withdrawn.push((set.remove(worst), gains[worst]));
+    }
+    JudgedSet { set, withdrawn }
+}
+
+/// Whether one form modifies the friction that another is.
+fn modifies(form: &TorqueForm, friction: &TorqueForm) -> bool {
+    form.place == friction.place && form.cause.modifies().contains(&friction.cause.name())
+}
