@@ -26,8 +26,9 @@ const SHARE: f64 = 0.6;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
 
-/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time.
-pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64]) -> Vec<ContactEvent> {
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time; only fitted rows are
+/// looked at where the residual is of a model too rich for others.
+pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], fitted_only: bool) -> Vec<ContactEvent> {
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
@@ -35,20 +36,23 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
             residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
         })
         .collect();
+    let shown: Vec<usize> = (0..rows).filter(|row| !fitted_only || !problem.is_held_out(*row)).collect();
+    let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
-    let (mut used, mut events) = (vec![false; rows], Vec::new());
+    let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..MOST {
-        let free = (0..rows).filter(|row| !used[*row]);
+        let free = (0..shown.len()).filter(|row| !used[*row]);
         let Some(highest) = free.max_by(|a, b| average[*a].total_cmp(&average[*b])) else { break };
         if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
             break;
         }
-        let found = best_window(problem, residual, sigma, &time, time[highest]);
+        let found = best_window(problem, residual, sigma, &time, time[shown[highest]]);
         events.extend(found.filter(|event| moves(problem, &time, event)));
-        (0..rows).filter(|row| (time[*row] - time[highest]).abs() < APART).for_each(|row| used[row] = true);
+        let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
+        (0..shown.len()).filter(near).for_each(|row| used[row] = true);
     }
     events.sort_by(|a: &ContactEvent, b| a.start.total_cmp(&b.start));
     events

@@ -8,6 +8,8 @@ use super::weighted::Weighing;
 
 /// What each column of a finding must gain.
 const GAIN: f64 = 3.0;
+/// Standard deviations below the gain that the finding itself foretells: where held-out rows hardly show it, nothing is asked.
+const DEVIATIONS: f64 = 2.0;
 
 /// A set that held-out rows have confirmed, and what they did not.
 pub(super) struct JudgedSet {
@@ -16,23 +18,27 @@ pub(super) struct JudgedSet {
     pub withdrawn: Vec<(usize, f64)>,
 }
 
-/// Squared whitened error of held-out rows of a solution, and what tolerances are stretched by.
-fn held_out_square(problem: &TorqueProblem, weighing: Weighing, sweep: &Sweep) -> f64 {
+/// Whitened errors of held-out rows of a solution, and what tolerances are stretched by.
+fn held_out_errors(problem: &TorqueProblem, weighing: Weighing, sweep: &Sweep) -> (Vec<f64>, f64) {
     let solution = sweep.solution();
-    let stretched: f64 =
-        solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
-    let left = weighing.measured(&problem.residual(&solution));
-    left.iter().flatten().map(|value| value * value).sum::<f64>() + stretched
+    let stretched = solution.iter().filter_map(|(column, value)| Some(problem.all.prior.get(*column)? * value * value)).sum();
+    (weighing.measured(&problem.residual(&solution)).concat(), stretched)
 }
 
-/// What held-out rows gain by each of a set.
-fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<f64> {
+/// What held-out rows gain by each of a set, and what they must.
+fn gains(choice: &CauseChoice, set: &[usize]) -> Vec<(f64, f64)> {
     let runs = choice.problem.runs(true);
     let weighing = choice.problem.weighing(&runs);
-    let whole = held_out_square(choice.problem, weighing, &choice.base.with(set));
+    let (whole, stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(set));
     let without = |place: usize| {
         let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
-        held_out_square(choice.problem, weighing, &choice.base.with(&rest)) - whole
+        let (errors, rest_stretched) = held_out_errors(choice.problem, weighing, &choice.base.with(&rest));
+        let pairs = || errors.iter().zip(&whole);
+        let gain = pairs().map(|(without, with)| without * without - with * with).sum::<f64>() + rest_stretched - stretched;
+        let foretold = pairs().map(|(without, with)| (without - with).powi(2)).sum::<f64>() + rest_stretched - stretched;
+        // The gain of a right finding scatters about its own square by twice its root.
+        let least = foretold - DEVIATIONS * 2.0 * foretold.max(0.0).sqrt();
+        (gain, least.min(GAIN * choice.form(set[place]).width as f64))
     };
     (0..set.len()).map(without).collect()
 }
@@ -45,14 +51,14 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
     }
     loop {
         let gains = gains(choice, &set);
-        let short = |place: &usize| gains[*place] - GAIN * choice.form(set[*place]).width as f64;
+        let short = |place: &usize| gains[*place].0 - gains[*place].1;
         let needed = |place: &usize| {
             let form = choice.form(set[*place]);
             set.iter().any(|other| modifies(choice.form(*other), form))
         };
         let worst = (0..set.len()).filter(|place| short(place) < 0.0 && !needed(place));
         let Some(worst) = worst.min_by(|a, b| short(a).total_cmp(&short(b))) else { break };
-        withdrawn.push((set.remove(worst), gains[worst]));
+        withdrawn.push((set.remove(worst), gains[worst].0));
     }
     JudgedSet { set, withdrawn }
 }

@@ -4,6 +4,7 @@ mod arm;
 mod base_parameters;
 mod bootstrap;
 mod cause;
+mod check;
 mod choice;
 mod clock;
 mod columns;
@@ -43,7 +44,7 @@ pub use types::{
     TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
 };
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use clock::Clock;
 
 /// What torques that come late are called.
@@ -52,6 +53,8 @@ const LATENCY: &str = "current_latency";
 const CONTACT: &str = "contact";
 /// Hz: the cut-off of the low-pass, where nothing else is asked.
 const CUTOFF: f64 = 10.0;
+/// Rows of the longest stretch without a jump, at least.
+const LEAST_STRETCH: usize = 200;
 /// At most this share of the rate.
 const HIGHEST_CUTOFF: f64 = 0.3;
 
@@ -66,8 +69,16 @@ pub fn diagnose(
     question: &TorqueQuestion,
     tell: &mut dyn FnMut(String),
 ) -> Result<TorqueDiagnosis> {
+    check::check(arm, recording)?;
     let clock = Clock::of(recording);
+    if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
+        return Err(Error::data(
+            "time",
+            format!("the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"),
+        ));
+    }
+    let remarks = check::remarks(recording, &clock);
     let cutoff = question.cutoff.unwrap_or(CUTOFF).min(HIGHEST_CUTOFF * clock.rate);
     let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
-    Ok(outcome::outcome(&solved, question.seed, Vec::new()))
+    Ok(outcome::outcome(&solved, question.seed, remarks))
 }

@@ -45,7 +45,8 @@ pub(super) fn solve<'a>(
         tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
         problem.shift(latency.seconds);
     }
-    look_for_contacts(&mut problem, &[]);
+    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
+    problem.events = contacts(&problem, &residual, &sigmas(&noise), true);
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
     let mut set = {
@@ -62,7 +63,8 @@ pub(super) fn solve<'a>(
         set.push(form);
         tell(told(&problem, &set));
     }
-    look_for_contacts(&mut problem, &set);
+    let residual = problem.residual(&CauseChoice::new(&problem, &weighted, question.seed).base.with(&set).solution());
+    problem.events = contacts(&problem, &residual, &sigmas(&problem.noise), false);
     learn(&mut problem, &set);
     weighted = problem.weighted();
     let judged = judge(&CauseChoice::new(&problem, &weighted, question.seed), set);
@@ -90,11 +92,9 @@ fn learn(problem: &mut TorqueProblem, set: &[usize]) {
     problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
 }
 
-/// Sets rows with contacts aside.
-fn look_for_contacts(problem: &mut TorqueProblem, set: &[usize]) {
-    let (noise, residual) = noise_beside(problem, &rich_forms(problem, set));
-    let sigma: Vec<f64> = noise.iter().map(|joint: &JointNoise| joint.sigma).collect();
-    problem.events = contacts(problem, &residual, &sigma);
+/// Nm, per joint.
+fn sigmas(noise: &[JointNoise]) -> Vec<f64> {
+    noise.iter().map(|joint| joint.sigma).collect()
 }
 
 /// A set as a line.
