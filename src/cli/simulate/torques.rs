@@ -38,6 +38,12 @@ pub(super) struct TorquesArguments {
     /// Effects beside viscous and Coulomb friction, at most
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=5))]
     most: u8,
+    /// Seconds of a recording: 55 % are to fit, the rest judges
+    #[arg(long, value_name = "S", default_value_t = 48.0)]
+    seconds: f64,
+    /// Rows a second
+    #[arg(long, value_name = "HZ", default_value_t = 100.0)]
+    rate: f64,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -46,8 +52,15 @@ pub(super) struct TorquesArguments {
 pub(super) fn main(arguments: &TorquesArguments) -> Result<()> {
     let shares = [("--nulls", arguments.nulls), ("--other-forms", arguments.other_forms)];
     let wrong = shares.into_iter().filter(|(_, share)| !(0.0..=1.0).contains(share));
-    let faults: Vec<Fault> =
+    let mut faults: Vec<Fault> =
         wrong.map(|(option, share)| Fault::new(option, format!("{share} is no share; allowed: 0 to 1"))).collect();
+    for (option, value, [least, most]) in
+        [("--seconds", arguments.seconds, [16.0, 3600.0]), ("--rate", arguments.rate, [20.0, 5000.0])]
+    {
+        if !(least..=most).contains(&value) {
+            faults.push(Fault::new(option, format!("{value}; allowed: {least} to {most}")));
+        }
+    }
     if !faults.is_empty() {
         return Err(Error::Spec(faults));
     }
@@ -57,6 +70,8 @@ pub(super) fn main(arguments: &TorquesArguments) -> Result<()> {
         nulls: arguments.nulls,
         other_forms: arguments.other_forms,
         most: usize::from(arguments.most),
+        seconds: arguments.seconds,
+        rate: arguments.rate,
     };
     for number in 0..arguments.cases as usize {
         let case = TorqueCase::draw(&design, number);

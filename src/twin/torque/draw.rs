@@ -20,6 +20,10 @@ pub struct TorqueDesign {
     pub other_forms: f64,
     /// Effects beside viscous and Coulomb friction: at most so many.
     pub most: usize,
+    /// Seconds of the recording: two stretches to fit, two that judge.
+    pub seconds: f64,
+    /// Rows a second.
+    pub rate: f64,
 }
 
 /// A recording to be made.
@@ -37,6 +41,8 @@ pub struct TorqueCase {
     pub(super) other_form: Vec<bool>,
     pub(super) stated: Machine,
     pub(super) scattered: Machine,
+    /// Hz of the rows.
+    pub(super) rate: f64,
     pub(super) paths: Vec<Path>,
     /// Paths to fit; the others judge.
     pub(super) fitted: usize,
@@ -55,8 +61,8 @@ pub struct TorqueCase {
 const ARMS: [Kind; 4] = [Kind::Sr210d, Kind::Compact6, Kind::Seven7r, Kind::Five5r];
 /// Of the rated payload.
 const CARRIED: [f64; 2] = [0.2, 0.6];
-/// s of each stretch: two to fit, two that judge.
-const STRETCHES: [f64; 4] = [14.0, 12.0, 12.0, 10.0];
+/// Shares of the recording of each stretch: sines and moves to fit, sines and moves that judge.
+const STRETCHES: [f64; 4] = [0.3, 0.25, 0.25, 0.2];
 const FITTED: usize = 2;
 const TOLERANCE: MassTolerance = MassTolerance { mass: 0.01, centre: 0.004, inertia: 0.05 };
 /// Standard deviations that the truth is off at most.
@@ -72,7 +78,7 @@ impl TorqueCase {
         let stated = machine(&robot);
         let scattered = scattered(&stated, &mut noise);
         let speed = noise.uniform(0.8, 1.5) * if kind == Kind::Sr210d { 0.9 } else { 1.2 };
-        let (paths, fitted) = paths(&robot, speed, &mut Noise::new(seed, Purpose::Poses));
+        let (paths, fitted) = paths(&robot, speed, design.seconds, &mut Noise::new(seed, Purpose::Poses));
         let sensors = kind == Kind::Seven7r;
         let n = robot.joints.len();
         let per_unit = robot.joints.iter().map(|joint| match sensors {
@@ -86,6 +92,7 @@ impl TorqueCase {
             other_form: Vec::new(),
             stated,
             scattered,
+            rate: design.rate,
             paths,
             fitted,
             white: vec![0.0; n],
@@ -308,7 +315,7 @@ fn scattered(stated: &Machine, noise: &mut Noise) -> Machine {
 }
 
 /// Sines to fit, moves to fit, sines and moves that judge.
-fn paths(robot: &RobotDescription, speed: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
+fn paths(robot: &RobotDescription, speed: f64, seconds: f64, noise: &mut Noise) -> (Vec<Path>, usize) {
     let ranges: Vec<[f64; 2]> = robot
         .joints
         .iter()
@@ -318,9 +325,9 @@ fn paths(robot: &RobotDescription, speed: f64, noise: &mut Noise) -> (Vec<Path>,
             [middle - reach, middle + reach]
         })
         .collect();
-    let paths = STRETCHES.iter().enumerate().map(|(k, duration)| match k % 2 {
-        0 => Path::sines(noise, &ranges, speed, *duration),
-        _ => Path::moves(noise, &ranges, speed, *duration),
+    let paths = STRETCHES.iter().enumerate().map(|(k, share)| match k % 2 {
+        0 => Path::sines(noise, &ranges, speed, share * seconds),
+        _ => Path::moves(noise, &ranges, speed, share * seconds),
     });
     (paths.collect(), FITTED)
 }

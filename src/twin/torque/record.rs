@@ -5,10 +5,8 @@ use super::law::{Law, Moment};
 use super::rigid::{JointState, Machine};
 use crate::noise::{Noise, Purpose};
 
-/// Steps of the simulation in a row.
-const FINE: usize = 5;
-/// Hz of the rows.
-pub(super) const RATE: f64 = 100.0;
+/// Hz of the simulation, at least.
+const FINE: f64 = 500.0;
 /// s between two stretches, in which nothing is recorded.
 const PAUSE: f64 = 2.0;
 /// Of the lasting part of noise, from row to row.
@@ -46,14 +44,15 @@ impl TorqueCase {
         let laws: Vec<&Law> = laws.iter().map(|index| &self.laws[*index]).collect();
         let machine = self.true_machine(laws.iter().copied());
         let n = machine.axes.len();
-        let step = 1.0 / (RATE * FINE as f64);
+        let fine_steps = (FINE / self.rate).ceil().max(1.0) as usize;
+        let step = 1.0 / (self.rate * fine_steps as f64);
         let late = laws.iter().map(|law| if let Law::Latency { time } = law { *time } else { 0.0 }).sum::<f64>();
         let mut rows = TorqueRows::default();
         let mut begin = 0.0;
         for (number, path) in self.paths.iter().enumerate() {
             let mut past: Vec<_> = Vec::new();
             let mut fine: Vec<Vec<f64>> = Vec::new();
-            for k in 0..(path.duration * RATE) as usize * FINE {
+            for k in 0..(path.duration * self.rate) as usize * fine_steps {
                 let time = k as f64 * step;
                 let state = path.at(time);
                 let rigid = machine.torque(&state);
@@ -78,7 +77,7 @@ impl TorqueCase {
                     }
                 }
                 fine.push(torque);
-                if k.is_multiple_of(FINE) {
+                if k.is_multiple_of(fine_steps) {
                     rows.time.push(begin + time);
                     rows.trajectory.push(number + 1);
                     rows.validate.push(number >= self.fitted);
@@ -86,7 +85,7 @@ impl TorqueCase {
                     rows.rigid.extend(rigid);
                 }
             }
-            for k in (0..fine.len()).step_by(FINE) {
+            for k in (0..fine.len()).step_by(fine_steps) {
                 // Logged late: a row holds what the torque was.
                 let at = (k as f64 - late / step).clamp(0.0, (fine.len() - 1) as f64);
                 let (low, part) = (at.floor() as usize, at.fract());

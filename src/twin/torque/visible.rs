@@ -3,7 +3,7 @@
 
 use super::draw::TorqueCase;
 use super::law::{Law, Moment};
-use super::record::{LASTS, RATE, TorqueRows};
+use super::record::{LASTS, TorqueRows};
 use super::rigid::Machine;
 
 /// Rows that are averaged into one: as a low-pass does.
@@ -160,7 +160,7 @@ impl<'a> Columns<'a> {
         for (row, state) in self.rows.state.iter().enumerate() {
             let rigid = &self.rows.rigid[row * n..(row + 1) * n];
             let mut torque = vec![0.0; n];
-            let now = Moment { time: self.rows.time[row], step: 1.0 / RATE, state, rigid, friction: &friction };
+            let now = Moment { time: self.rows.time[row], step: 1.0 / self.case.rate, state, rigid, friction: &friction };
             law.add(&now, &mut past, &mut torque);
             all.extend(torque);
         }
