@@ -35,6 +35,9 @@ impl<'a> CauseChoice<'a> {
     /// Gain beyond the penalty of a form, given a swept set.
     pub fn worth(&self, sweep: &Sweep, number: usize) -> f64 {
         let gain = sweep.gain(number);
+        if self.form(number).cause.is_positive() && !sweep.rises(number) {
+            return f64::NEG_INFINITY;
+        }
         gain.square - self.penalty(number, gain.rank.max(1))
     }
 
@@ -92,6 +95,17 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
     loop {
         let sweep = choice.base.with(set);
         let solution = sweep.solution();
+        let impossible = |number: &usize| {
+            let value = solution
+                .iter()
+                .find(|(column, _)| *column == choice.problem.all.of(*number).start)
+                .map_or(0.0, |(_, value)| *value);
+            choice.form(*number).cause.is_positive() && value <= 0.0
+        };
+        if let Some(place) = set.iter().position(impossible) {
+            set.remove(place);
+            continue;
+        }
         let worth_of = |place: usize| {
             let mut rest = set.clone();
             let number = rest.remove(place);

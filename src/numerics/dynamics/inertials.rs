@@ -37,6 +37,10 @@ pub(super) struct DeclaredInertials {
     pub theta: Vec<f64>,
     /// The last link's numbers of a payload of 1 kg as declared (of a point at the tool where none is).
     pub payload: [f64; INERTIAL_NUMBERS],
+    /// Change of the last link's numbers per kg m by which a payload's centre is elsewhere, in three coordinates.
+    pub payload_shift: [[f64; INERTIAL_NUMBERS]; 3],
+    /// Per link: change of its numbers per m of its centre, in three coordinates.
+    pub centre_shift: Vec<[[f64; INERTIAL_NUMBERS]; 3]>,
     /// Per link, 10 x 10 by columns: change of its numbers by one standard deviation of mass, centre (3), inertia (6).
     pub tolerance: Vec<[[f64; INERTIAL_NUMBERS]; INERTIAL_NUMBERS]>,
 }
@@ -59,17 +63,38 @@ impl DeclaredInertials {
             };
             tolerance(arm, &whole, &point(link))
         });
-        Self { tolerance: tolerance.collect(), payload: unit_payload(arm, &point(last)), links, theta }
+        let payload = unit_payload(arm);
+        Self {
+            tolerance: tolerance.collect(),
+            payload: numbers(&payload, &point(last)),
+            payload_shift: shifts(&payload, &point(last)),
+            centre_shift: bodies.iter().enumerate().map(|(link, body)| shifts(body, &point(link))).collect(),
+            links,
+            theta,
+        }
     }
 }
 
 /// Of 1 kg.
-fn unit_payload(arm: &DynamicArm, point: &Vector3<f64>) -> [f64; INERTIAL_NUMBERS] {
-    let body = match &arm.payload {
+fn unit_payload(arm: &DynamicArm) -> Inertial {
+    match &arm.payload {
         Some(payload) if payload.mass > 0.0 => Inertial { mass: 1.0, inertia: payload.inertia / payload.mass, ..*payload },
         _ => Inertial { mass: 1.0, centre: arm.tool, inertia: Matrix3::zeros() },
-    };
-    numbers(&body, point)
+    }
+}
+
+/// Change of a body's numbers per m of its centre.
+fn shifts(body: &Inertial, point: &Vector3<f64>) -> [[f64; INERTIAL_NUMBERS]; 3] {
+    let arm = body.centre.coords - point;
+    std::array::from_fn(|axis| {
+        let along = Vector3::ith(axis, body.mass);
+        let inertia = Matrix3::identity() * (2.0 * arm.dot(&along)) - arm * along.transpose() - along * arm.transpose();
+        let mut ten = [0.0, along.x, along.y, along.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        for (number, (row, column)) in INERTIA_ENTRIES.into_iter().enumerate() {
+            ten[4 + number] = inertia[(row, column)];
+        }
+        ten
+    })
 }
 
 /// Change of a body's numbers by one standard deviation of each of its own.

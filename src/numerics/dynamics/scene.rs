@@ -157,7 +157,7 @@ impl<'a> DynamicScene<'a> {
 /// m/s^2.
 pub(super) const GRAVITY: f64 = 9.81;
 /// rad/s, candidates of the width of a sign.
-pub(super) const SIGN_WIDTHS: [f64; 5] = [0.003, 0.006, 0.012, 0.025, 0.05];
+pub(super) const SIGN_WIDTHS: [f64; 6] = [0.003, 0.006, 0.012, 0.025, 0.05, 0.1];
 
 /// The parts of 3 n numbers.
 pub(super) fn split(motion: &[f64], n: usize) -> JointMotion<'_> {

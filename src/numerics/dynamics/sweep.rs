@@ -92,6 +92,11 @@ impl<'a> Sweep<'a> {
         self.gain_of(form, &self.right)
     }
 
+    /// Whether the first coefficient of a form would be positive.
+    pub fn rises(&self, form: usize) -> bool {
+        self.right[self.all.of(form).start] > 0.0
+    }
+
     /// The same with other inner products of its columns with a residual.
     pub fn gain_with(&self, form: usize, right: &[f64]) -> f64 {
         self.gain_of(form, right).square

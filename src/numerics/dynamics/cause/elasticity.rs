@@ -26,6 +26,10 @@ impl TorqueCause for Elasticity {
         8.0
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.shape == [5.0, 0.05] || form.shape == [8.5, 0.05]
     }

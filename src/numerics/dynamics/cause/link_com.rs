@@ -7,7 +7,7 @@ use crate::dynamics::scene::DynamicScene;
 use crate::dynamics::types::TorqueParameter;
 use crate::effect::Place;
 
-/// Mass times centre, in three coordinates.
+/// Displacement of the centre, in three coordinates.
 pub(super) struct LinkCom;
 
 const WIDTH: usize = 3;
@@ -39,17 +39,17 @@ impl TorqueCause for LinkCom {
         out.fill(0.0);
     }
 
-    fn inertial(&self, form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
-        let unit = |axis: usize| std::array::from_fn(|entry| f64::from(u8::from(entry == 1 + axis)));
-        Some((0..WIDTH).map(|axis| (form.link(), unit(axis))).collect())
+    fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+        Some(declared.centre_shift[form.link()].iter().map(|ten| (form.link(), *ten)).collect())
     }
 
     fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
-        ["moment_x", "moment_y", "moment_z"].iter().zip(fitted).map(|(name, value)| plain(name, *value, "kg m")).collect()
+        let in_mm = |number: &Fitted| Fitted { value: 1e3 * number.value, sigma: 1e3 * number.sigma };
+        ["centre_x", "centre_y", "centre_z"].iter().zip(fitted).map(|(name, number)| plain(name, in_mm(number), "mm")).collect()
     }
 
     fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
-        let [x, y, z] = [fitted[0].value, fitted[1].value, fitted[2].value];
-        format!("the centre of {} is off: mass times displacement is ({x:.2}, {y:.2}, {z:.2}) kg m", form.place)
+        let [x, y, z] = [0, 1, 2].map(|axis| 1e3 * fitted[axis].value);
+        format!("the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared", form.place)
     }
 }

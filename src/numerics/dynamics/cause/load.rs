@@ -20,6 +20,10 @@ impl TorqueCause for Load {
         6.0
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         true
     }

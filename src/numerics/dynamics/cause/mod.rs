@@ -99,6 +99,10 @@ pub(super) trait TorqueCause: Sync {
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         false
     }
+    /// Whether its one coefficient can only be positive: a friction that falls with speed, a rotor.
+    fn is_positive(&self) -> bool {
+        false
+    }
     /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
     fn is_inertial(&self) -> bool {
         false

@@ -30,6 +30,10 @@ impl TorqueCause for Presliding {
         &[COULOMB]
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.shape == [USUAL]
     }

@@ -23,6 +23,10 @@ impl TorqueCause for Rotor {
         2.0
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, _form: &TorqueForm) -> bool {
         true
     }

@@ -24,6 +24,10 @@ impl TorqueCause for Stribeck {
         &[COULOMB]
     }
 
+    fn is_positive(&self) -> bool {
+        true
+    }
+
     fn is_rich(&self, form: &TorqueForm) -> bool {
         form.shape == [USUAL]
     }
