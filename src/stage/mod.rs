@@ -21,6 +21,7 @@ mod parameter_set;
 mod registry;
 mod repeated;
 mod report;
+mod report_torques;
 mod robot;
 mod rounded;
 mod screened;
@@ -41,6 +42,7 @@ pub use learn::{Learn, LearnReads, LearnWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Accepted, Report, ReportReads};
+pub use report_torques::{ReportTorques, ReportTorquesReads, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
@@ -344,6 +346,7 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Diagnose>(),
     StageEntry::of::<ingest::IngestTorques>(),
     StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<ReportTorques>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Optimise>(),
