@@ -46,3 +46,59 @@ pub(super) fn base_parameters(regressor: &ReducedRegressor) -> Vec<usize> {
     kept.sort_unstable();
     kept
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm::{DynamicArm, InertialTolerance};
+    use super::super::clock::Clock;
+    use super::super::recording::TorqueRecording;
+    use super::super::reduce::Reduction;
+    use super::super::scene::DynamicScene;
+    use super::*;
+    use nalgebra::{Point3, Vector3};
+
+    /// Of six turning joints that have nothing in common, the first one along `first`.
+    fn count(first: Vector3<f64>) -> usize {
+        let axes = [[0.2, -1.0, 0.3], [0.1, -0.9, 0.5], [1.0, 0.2, -0.4], [0.3, 1.0, 0.6], [0.9, -0.1, 0.7]];
+        let arm = DynamicArm {
+            axes: [first.normalize()].into_iter().chain(axes.map(|axis| Vector3::from(axis).normalize())).collect(),
+            points: (0..6)
+                .map(|joint| Point3::new(0.3 * f64::from(joint), 0.1 * f64::from(joint % 3), 0.4 - 0.05 * f64::from(joint)))
+                .collect(),
+            prismatic: vec![false; 6],
+            tool: Point3::new(2.0, 0.0, 0.3),
+            links: None,
+            payload: None,
+            gravity: Vector3::new(0.0, 0.0, -9.81),
+            ratio: vec![100.0; 6],
+            coupled: Vec::new(),
+            tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+        };
+        let rows = 1500;
+        let angle = |row: usize, joint: usize| {
+            let (time, pace) = (row as f64 / 100.0, 1.0 + 0.37 * joint as f64);
+            0.8 * (pace * time + joint as f64).sin() + 0.4 * (1.9 * pace * time).cos()
+        };
+        let recording = TorqueRecording {
+            joints: 6,
+            time: (0..rows).map(|row| row as f64 / 100.0).collect(),
+            position: (0..rows).flat_map(|row| (0..6).map(move |joint| angle(row, joint))).collect(),
+            velocity: None,
+            torque: vec![0.0; 6 * rows],
+            temperature: None,
+            trajectory: vec![1; rows],
+            held_out: vec![false; rows],
+            from_current: false,
+        };
+        let clock = Clock::of(&recording);
+        let scene = DynamicScene::new(&arm, &recording, &clock, 10.0, true);
+        base_parameters(&ReducedRegressor::of(&scene, &Reduction::new(&clock, 10.0))).len()
+    }
+
+    #[test]
+    fn a_general_arm_of_six_turning_joints_has_38_base_parameters_of_60() {
+        // Gautier & Khalil: 7 a joint, 3 of the first; 1 of it where its axis is along gravity.
+        assert_eq!(count(Vector3::new(0.3, 0.5, 1.0)), 38);
+        assert_eq!(count(Vector3::z()), 36);
+    }
+}

@@ -41,6 +41,13 @@ impl<'a> CauseChoice<'a> {
         gain.square - self.penalty(number, gain.rank.max(1))
     }
 
+    /// Whether a coefficient has a sign that its cause cannot have.
+    pub fn is_impossible(&self, number: usize, solution: &[(usize, f64)]) -> bool {
+        let first = self.problem.all.of(number).start;
+        let value = solution.iter().find(|(column, _)| *column == first).map_or(0.0, |(_, value)| *value);
+        self.form(number).cause.is_positive() && value <= 0.0
+    }
+
     /// Criterion of a set: whitened squared residual, tolerances stretched, and penalties.
     pub fn criterion(&self, set: &[usize]) -> f64 {
         let mut sweep = self.base.clone();
@@ -95,14 +102,7 @@ pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
     loop {
         let sweep = choice.base.with(set);
         let solution = sweep.solution();
-        let impossible = |number: &usize| {
-            let value = solution
-                .iter()
-                .find(|(column, _)| *column == choice.problem.all.of(*number).start)
-                .map_or(0.0, |(_, value)| *value);
-            choice.form(*number).cause.is_positive() && value <= 0.0
-        };
-        if let Some(place) = set.iter().position(impossible) {
+        if let Some(place) = set.iter().position(|number| choice.is_impossible(*number, &solution)) {
             set.remove(place);
             continue;
         }

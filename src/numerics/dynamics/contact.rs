@@ -18,6 +18,11 @@ const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// s beside the highest point that are tried as middles: steps on either side, and their length.
 const STEPS: i32 = 6;
 const STEP: f64 = 0.1;
+/// s by which start and end are then moved, so many steps on either side.
+const FINE: [f64; 2] = [0.08, 0.02];
+const FINE_STEPS: i32 = 3;
+/// Judged rows of an event, at least.
+const FEWEST: usize = 4;
 /// s on either side of an event where no other is looked for.
 const APART: f64 = 1.6;
 /// What a force must gain, and which share of the residual it must explain.
@@ -61,18 +66,28 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
 /// The window about `middle` in which a force gains most, if it explains the residual there.
 fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], time: &[f64], middle: f64) -> Option<ContactEvent> {
     let mut best: Option<(ContactEvent, f64)> = None;
-    for duration in DURATIONS {
-        for step in -STEPS..=STEPS {
-            let start = middle + STEP * f64::from(step) - 0.5 * duration;
-            let first = time.partition_point(|time| *time < start);
-            let last = time.partition_point(|time| *time <= start + duration);
-            if last < first + 4 {
-                continue;
-            }
+    let mut look = |start: f64, duration: f64| {
+        let first = time.partition_point(|time| *time < start);
+        let last = time.partition_point(|time| *time <= start + duration);
+        if last >= first + FEWEST {
             let (event, share) = pushed(problem, residual, sigma, time, start, duration, first..last);
             if best.as_ref().is_none_or(|(known, _)| event.gain > known.gain) {
                 best = Some((event, share));
             }
+        }
+        best.as_ref().map(|(event, _)| (event.start, event.end - event.start))
+    };
+    let mut now = None;
+    for duration in DURATIONS {
+        for step in -STEPS..=STEPS {
+            now = look(middle + STEP * f64::from(step) - 0.5 * duration, duration);
+        }
+    }
+    for fine in FINE {
+        let (start, duration) = now?;
+        for steps in (-FINE_STEPS..=FINE_STEPS).flat_map(|begin| (-FINE_STEPS..=FINE_STEPS).map(move |end| [begin, end])) {
+            let [begin, end] = steps.map(|steps| fine * f64::from(steps));
+            now = look(start + begin, duration + end - begin);
         }
     }
     best.filter(|(event, share)| event.gain > GAIN && *share > SHARE).map(|(event, _)| event)

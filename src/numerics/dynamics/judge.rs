@@ -50,6 +50,11 @@ pub(super) fn judge(choice: &CauseChoice, mut set: Vec<usize>) -> JudgedSet {
         return JudgedSet { set, withdrawn };
     }
     loop {
+        let solution = choice.base.with(&set).solution();
+        if let Some(place) = set.iter().position(|number| choice.is_impossible(*number, &solution)) {
+            set.remove(place);
+            continue;
+        }
         let gains = gains(choice, &set);
         let short = |place: &usize| gains[*place].0 - gains[*place].1;
         let needed = |place: &usize| {

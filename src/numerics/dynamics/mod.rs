@@ -3,6 +3,8 @@
 mod arm;
 mod base_parameters;
 mod bootstrap;
+#[cfg(test)]
+mod cases;
 mod cause;
 mod check;
 mod choice;

@@ -192,3 +192,143 @@ pub fn inertia_matrix(six: &[f64]) -> Matrix3<f64> {
     }
     matrix
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm::{Inertial, InertialTolerance};
+    use super::super::inertials::numbers;
+    use super::*;
+    use nalgebra::{Point3, Rotation3};
+
+    /// An arm of links whose numbers have nothing in common; the third joint slides.
+    fn arm() -> (DynamicArm, Vec<Inertial>) {
+        let axis = |x: f64, y: f64, z: f64| Vector3::new(x, y, z).normalize();
+        let body =
+            |mass: f64, at: [f64; 3], six: [f64; 6]| Inertial { mass, centre: Point3::from(at), inertia: inertia_matrix(&six) };
+        let links = vec![
+            body(8.0, [0.1, -0.05, 0.2], [0.3, 0.02, -0.01, 0.4, 0.03, 0.2]),
+            body(5.0, [0.4, 0.1, 0.5], [0.2, -0.03, 0.02, 0.15, 0.01, 0.1]),
+            body(3.0, [0.7, 0.0, 0.6], [0.05, 0.01, 0.0, 0.06, -0.01, 0.04]),
+            body(2.0, [0.9, 0.1, 0.7], [0.02, 0.0, 0.005, 0.03, 0.002, 0.01]),
+        ];
+        let arm = DynamicArm {
+            axes: vec![axis(0.1, 0.2, 1.0), axis(0.3, -1.0, 0.1), axis(1.0, 0.2, 0.0), axis(0.2, 1.0, 0.5)],
+            points: [[0.0, 0.0, 0.1], [0.2, 0.0, 0.4], [0.5, 0.1, 0.6], [0.8, 0.0, 0.6]].map(Point3::from).to_vec(),
+            prismatic: vec![false, false, true, false],
+            tool: Point3::new(1.0, 0.1, 0.8),
+            links: Some(links.clone()),
+            payload: None,
+            gravity: Vector3::new(1.0, -2.0, -9.0),
+            ratio: vec![100.0; 4],
+            coupled: Vec::new(),
+            tolerance: InertialTolerance { mass_relative: 0.01, centre: 0.001, inertia_relative: 0.05 },
+        };
+        (arm, links)
+    }
+
+    /// Centre and rotation of each link, by plain products of motions from the base.
+    fn placed(arm: &DynamicArm, links: &[Inertial], q: &[f64]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
+        let (mut rotation, mut shift) = (Matrix3::identity(), Vector3::zeros());
+        (0..q.len())
+            .map(|joint| {
+                let point = arm.points[joint].coords;
+                if arm.prismatic[joint] {
+                    shift += rotation * arm.axes[joint] * q[joint];
+                } else {
+                    let turn = Rotation3::new(arm.axes[joint] * q[joint]).into_inner();
+                    shift += rotation * (point - turn * point);
+                    rotation *= turn;
+                }
+                (rotation * links[joint].centre.coords + shift, rotation)
+            })
+            .collect()
+    }
+
+    /// Kinetic minus potential energy, with velocities by differences of places.
+    fn lagrangian(arm: &DynamicArm, links: &[Inertial], q: &[f64], dq: &[f64]) -> f64 {
+        const STEP: f64 = 1e-5;
+        let at = |sign: f64| {
+            let moved: Vec<f64> = q.iter().zip(dq).map(|(q, dq)| q + sign * STEP * dq).collect();
+            placed(arm, links, &moved)
+        };
+        let (here, before, after) = (placed(arm, links, q), at(-1.0), at(1.0));
+        (0..q.len())
+            .map(|link| {
+                let velocity = (after[link].0 - before[link].0) / (2.0 * STEP);
+                let turning = (after[link].1 - before[link].1) / (2.0 * STEP) * here[link].1.transpose();
+                let spin = Vector3::new(turning[(2, 1)], turning[(0, 2)], turning[(1, 0)]);
+                let inertia = here[link].1 * links[link].inertia * here[link].1.transpose();
+                let mass = links[link].mass;
+                0.5 * mass * velocity.norm_squared() + 0.5 * spin.dot(&(inertia * spin)) + mass * arm.gravity.dot(&here[link].0)
+            })
+            .sum()
+    }
+
+    #[test]
+    fn torques_are_those_of_lagrange_and_the_regressor_says_the_same() {
+        const STEP: f64 = 1e-3;
+        let (arm, links) = arm();
+        let (q, dq, ddq) = ([0.3, -0.5, 0.2, 0.7], [0.8, -0.4, 0.3, 1.1], [1.5, 0.7, -0.9, 2.0]);
+        let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
+        let mut dynamics = InverseDynamics::new(&arm);
+        let mut torque = [0.0; 4];
+        let motion = JointMotion { position: &q, velocity: &dq, acceleration: &ddq };
+        dynamics.torque(motion, &arm.gravity, &theta, &mut torque);
+        let mut by_regressor = [0.0; 4];
+        dynamics.regressor(motion, &arm.gravity, |joint, link, numbers| {
+            by_regressor[joint] += numbers.iter().zip(&theta[10 * link..]).map(|(a, b)| a * b).sum::<f64>();
+        });
+        // d/dt dL/d(dq) - dL/dq along the motion, by central differences.
+        let shifted = |values: &[f64; 4], joint: usize, by: f64| {
+            let mut moved = *values;
+            moved[joint] += by;
+            moved
+        };
+        for joint in 0..4 {
+            let momentum = |time: f64| {
+                let q: [f64; 4] = std::array::from_fn(|k| q[k] + time * dq[k] + 0.5 * time * time * ddq[k]);
+                let dq: [f64; 4] = std::array::from_fn(|k| dq[k] + time * ddq[k]);
+                let l = |by: f64| lagrangian(&arm, &links, &q, &shifted(&dq, joint, by));
+                (l(STEP) - l(-STEP)) / (2.0 * STEP)
+            };
+            let change = (momentum(STEP) - momentum(-STEP)) / (2.0 * STEP);
+            let l = |by: f64| lagrangian(&arm, &links, &shifted(&q, joint, by), &dq);
+            let expected = change - (l(STEP) - l(-STEP)) / (2.0 * STEP);
+            assert!(
+                (torque[joint] - expected).abs() < 1e-3 * (1.0 + expected.abs()),
+                "joint {}: {} {expected}",
+                joint + 1,
+                torque[joint]
+            );
+            assert!((torque[joint] - by_regressor[joint]).abs() < 1e-11 * (1.0 + expected.abs()));
+        }
+    }
+
+    #[test]
+    fn a_planar_arm_of_two_point_masses_has_the_torques_of_the_textbook() {
+        // Craig, section 6.7: masses at the ends of two links, gravity along -y.
+        let (m1, m2, l1, l2, g) = (2.0, 1.5, 0.7, 0.4, 9.81);
+        let point = |mass: f64, x: f64| Inertial { mass, centre: Point3::new(x, 0.0, 0.0), inertia: Matrix3::zeros() };
+        let (mut arm, _) = arm();
+        arm.axes = vec![Vector3::z(); 2];
+        arm.points = vec![Point3::origin(), Point3::new(l1, 0.0, 0.0)];
+        arm.prismatic = vec![false; 2];
+        arm.gravity = Vector3::new(0.0, -g, 0.0);
+        let links = [point(m1, l1), point(m2, l1 + l2)];
+        let theta: Vec<f64> = links.iter().zip(&arm.points).flat_map(|(link, point)| numbers(link, &point.coords)).collect();
+        let (q, dq, ddq) = ([0.4, -0.9], [1.2, 0.5], [-0.8, 2.1]);
+        let mut torque = [0.0; 2];
+        let motion = JointMotion { position: &q, velocity: &dq, acceleration: &ddq };
+        InverseDynamics::new(&arm).torque(motion, &arm.gravity, &theta, &mut torque);
+        let (s2, c2) = q[1].sin_cos();
+        let (c1, c12) = (q[0].cos(), (q[0] + q[1]).cos());
+        let second =
+            m2 * l1 * l2 * c2 * ddq[0] + m2 * l1 * l2 * s2 * dq[0] * dq[0] + m2 * l2 * g * c12 + m2 * l2 * l2 * (ddq[0] + ddq[1]);
+        let first = m2 * l2 * l2 * (ddq[0] + ddq[1]) + m2 * l1 * l2 * c2 * (2.0 * ddq[0] + ddq[1]) + (m1 + m2) * l1 * l1 * ddq[0]
+            - m2 * l1 * l2 * s2 * dq[1] * dq[1]
+            - 2.0 * m2 * l1 * l2 * s2 * dq[0] * dq[1]
+            + m2 * l2 * g * c12
+            + (m1 + m2) * l1 * g * c1;
+        assert!((torque[0] - first).abs() < 1e-12 && (torque[1] - second).abs() < 1e-12, "{torque:?} {first} {second}");
+    }
+}

@@ -72,3 +72,30 @@ impl JointNoise {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn a_course_that_remembers_is_told_with_its_memory_and_whitened() {
+        let mut dice = ChaCha8Rng::seed_from_u64(1);
+        let mut now = 0.0;
+        let course: Vec<f64> = (0..20_000)
+            .map(|_| {
+                now = 0.8 * now + (0..12).map(|_| dice.random::<f64>() - 0.5).sum::<f64>();
+                now
+            })
+            .collect();
+        let noise = JointNoise::of(&course, &[0..course.len()], 0.0);
+        assert!((noise.memory[0] - 0.8).abs() < 0.03 && (noise.innovation - 1.0).abs() < 0.02, "{noise:?}");
+        // (1 + 0.8) / (1 - 0.8).
+        assert!((noise.autocorrelation() / 9.0 - 1.0).abs() < 0.15, "{}", noise.autocorrelation());
+        let mut white = Vec::new();
+        noise.whiten(&course, &[0..course.len()], &mut white);
+        let lag = white.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / white.len() as f64;
+        assert!(lag.abs() < 0.03, "{lag}");
+    }
+}
