@@ -3,14 +3,14 @@
 use crate::error::{Error, Result, nearest};
 use crate::pipeline::{Manifest, StageReport, StageStatus, find_run};
 use crate::shell::typed;
-use crate::stage::{Diagnose, Stage};
 use crate::store::Store;
 
-/// A run by its name, and its stage `diagnose`: `step` where it has several. Fails with what to type where there is none.
-pub fn diagnosis(store: &Store, run: &str, step: Option<&str>) -> Result<(Manifest, StageReport)> {
+/// A run by its name, and its stage that diagnoses, one of the kinds `uses`: `step` where it has several. Fails with what to type where
+/// there is none.
+pub fn diagnosis(store: &Store, run: &str, step: Option<&str>, uses: &[&str]) -> Result<(Manifest, StageReport)> {
     let manifest = Manifest::of(store, &find_run(store, run)?)?;
     let place = format!("run {}", manifest.run_id);
-    let own = manifest.stages.iter().filter(|stage| stage.uses == Diagnose::NAME);
+    let own = manifest.stages.iter().filter(|stage| uses.contains(&stage.uses.as_str()));
     let own: Vec<(&StageReport, &str)> = own.map(|stage| (stage, stage.id.as_str())).collect();
     let sets: String =
         manifest.overrides.iter().map(|set| format!(" --set {}", typed(&format!("{}={}", set.target, set.value)))).collect();

@@ -8,8 +8,8 @@ use crate::audit::{diagnosis, the_stage};
 use crate::error::{Error, Result};
 use crate::pipeline::{Purpose, Selection};
 use crate::raw::ending;
-use crate::stage::{Diagnose, Stage};
-use crate::summary::DiagnosisSummary;
+use crate::stage::DIAGNOSES;
+use crate::summary::Diagnosed;
 use clap::Args;
 use std::ffi::OsString;
 use std::io::Write;
@@ -69,10 +69,10 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
     let told = if is_pipeline(&arguments.what) {
         let file = arguments.what.display().to_string();
         let plan = arguments.means.plan(&arguments.what)?;
-        let own = plan.stages.iter().enumerate().filter(|(_, stage)| stage.entry.name == Diagnose::NAME);
+        let own = plan.stages.iter().enumerate().filter(|(_, stage)| DIAGNOSES.contains(&stage.entry.name));
         let own: Vec<(usize, &str)> = own.map(|(at, stage)| (at, stage.id.as_str())).collect();
         let Some((at, id)) = the_stage(&file, &own, arguments.step.as_deref())? else {
-            return Err(Error::spec(file, "has no stage `diagnose`; put `- uses: diagnose` after the split"));
+            return Err(Error::spec(file, "has no stage `diagnose`; put `- uses: diagnose` after the split, or `- uses: diagnose_torques` after `ingest_torques`"));
         };
         let id = id.to_string();
         let plan = plan.needed_for(at);
@@ -80,7 +80,7 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
         let task = CommandTask { purpose: Purpose::Diagnose, selection: Selection::default(), shown };
         let outcome = arguments.means.run(&plan, &store, task, command_line)?;
         let stage = outcome.manifest.stage(&id).ok_or_else(|| Error::Bug(format!("a run without its stage `{id}`")))?;
-        DiagnosisSummary::read(&outcome.manifest.run_id, stage, &store)?
+        Diagnosed::read(&outcome.manifest.run_id, stage, &store)?
     } else {
         if arguments.means.overrides() {
             return Err(Error::spec("--set", "a finished run cannot be changed; give its pipeline instead"));
@@ -90,8 +90,8 @@ fn execute(arguments: &DiagnoseArguments, command_line: &[OsString]) -> Result<u
             Some((run, step)) => (run, Some(step)),
             None => (&*name, arguments.step.as_deref()),
         };
-        let (manifest, stage) = diagnosis(&store, run, step)?;
-        DiagnosisSummary::read(&manifest.run_id, &stage, &store)?
+        let (manifest, stage) = diagnosis(&store, run, step, &DIAGNOSES)?;
+        Diagnosed::read(&manifest.run_id, &stage, &store)?
     };
     if let Some(file) = &arguments.export_effect {
         write_new(file, &told.effect_file(arguments.finding)?)?;

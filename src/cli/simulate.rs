@@ -4,6 +4,7 @@ mod conceal;
 mod prove;
 mod record;
 mod reveal;
+mod torques;
 
 use crate::error::Result;
 use clap::{Args, Subcommand};
@@ -22,6 +23,7 @@ enum SimulateVerb {
     Conceal(conceal::ConcealArguments),
     Reveal(reveal::RevealArguments),
     Prove(prove::ProveArguments),
+    Torques(torques::TorquesArguments),
 }
 
 pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> Result<()> {
@@ -30,5 +32,6 @@ pub(super) fn main(arguments: &SimulateArguments, command_line: &[OsString]) -> 
         SimulateVerb::Conceal(verb) => conceal::main(verb),
         SimulateVerb::Reveal(verb) => reveal::main(verb),
         SimulateVerb::Prove(verb) => prove::main(verb),
+        SimulateVerb::Torques(verb) => torques::main(verb),
     }
 }

@@ -43,6 +43,31 @@ pub struct Coupling {
     pub ratio: f64,
 }
 
+/// Moments of inertia about a body's centre of mass, kg m2, base axes at the zero pose: xx, xy, xz, yy, yz, zz (tensor elements).
+pub type InertiaMoments = [f64; 6];
+
+/// How far declared masses may be off without being a finding: one standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassTolerance {
+    /// Of a mass, as a share of it.
+    pub mass: f64,
+    /// Of each coordinate of a centre, m.
+    pub centre: f64,
+    /// Of an inertia, as a share of it.
+    pub inertia: f64,
+}
+
+/// What is declared of the bodies beyond masses and centres, for an arm whose torques are simulated.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct DeclaredInertias {
+    /// Of each link; empty, or one for each joint.
+    pub links: Vec<Option<InertiaMoments>>,
+    /// Of the payload.
+    pub payload: Option<InertiaMoments>,
+    /// Of links, and of last link and payload together.
+    pub tolerance: Option<MassTolerance>,
+}
+
 /// A serial robot: joints from the base to the tool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotDescription {
@@ -62,4 +87,6 @@ pub struct RobotDescription {
     pub payload_centre: [f64; 3],
     /// Acceleration of gravity in the base frame, m/s2.
     pub gravity: [f64; 3],
+    /// Inertias of the bodies, as far as they are declared.
+    pub inertias: DeclaredInertias,
 }

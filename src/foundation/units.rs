@@ -45,6 +45,12 @@ pub enum Unit {
     NewtonMetre,
     /// kg m, of a first moment.
     KilogramMetre,
+    /// kg m2, of an inertia.
+    KilogramSquareMetre,
+    /// N.
+    Newton,
+    /// Hz.
+    Hertz,
     /// Degrees Celsius.
     Celsius,
     /// K.
@@ -90,6 +96,12 @@ pub enum Quantity {
     Torque,
     /// SI: kg m.
     FirstMoment,
+    /// SI: kg m2.
+    Inertia,
+    /// SI: N.
+    Force,
+    /// SI: Hz.
+    Frequency,
     /// Stored in degrees Celsius.
     Temperature,
     /// SI: Nm/A.
@@ -129,6 +141,9 @@ const UNITS: &[(Unit, &str, Quantity, f64, f64)] = &[
     (Unit::Milliampere, "mA", Q::Current, 1e-3, 0.0),
     (Unit::KilogramMetre, "kg m", Q::FirstMoment, 1.0, 0.0),
     (Unit::NewtonMetre, "Nm", Q::Torque, 1.0, 0.0),
+    (Unit::KilogramSquareMetre, "kg m2", Q::Inertia, 1.0, 0.0),
+    (Unit::Newton, "N", Q::Force, 1.0, 0.0),
+    (Unit::Hertz, "Hz", Q::Frequency, 1.0, 0.0),
     // Celsius is kept as the base of temperature: effects need differences, people need degrees.
     (Unit::Celsius, "C", Q::Temperature, 1.0, 0.0),
     (Unit::Kelvin, "K", Q::Temperature, 1.0, -273.15),

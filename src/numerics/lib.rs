@@ -21,3 +21,5 @@ pub mod estimate;
 pub mod compensate;
 
 pub mod diagnose;
+
+pub mod dynamics;

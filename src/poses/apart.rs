@@ -13,6 +13,7 @@ use crate::estimate::choose::{Aim, Circumstances, Discrimination, Site, median, 
 use crate::identified::convention_of;
 use crate::pipeline::StageReport;
 use crate::robot::{JointConvention, Measurements, RobotModel};
+use crate::stage::{Diagnose, Stage};
 use crate::store::{Store, TableRef};
 use crate::table::{FindingRow, Findings, Parameters, Prediction, Recording, Rivals, Robot, Table};
 use nalgebra::Vector3;
@@ -51,7 +52,7 @@ pub struct RunStage<'a> {
 
 /// Proposes poses that tell a finding from a rival; `names` say which, or nothing for the first that has one.
 pub fn apart<'a>(request: &'a PoseRequest, store: &Store, of: &RunStage, names: &[String]) -> Result<Apart<'a>> {
-    let (manifest, stage) = diagnosis(store, of.run, of.step)?;
+    let (manifest, stage) = diagnosis(store, of.run, of.step, &[Diagnose::NAME])?;
     let place = format!("run {}", manifest.run_id);
     let findings: Findings = written(store, &stage)?;
     let rivals: Rivals = written(store, &stage)?;

@@ -19,9 +19,11 @@ mod number;
 mod page;
 mod parameters;
 mod svg;
+mod torques;
 mod workspace;
 
 pub use limits::AcceptanceLimits;
+pub use torques::{TorqueTables, torque_page};
 
 use crate::error::Result;
 use crate::table::{

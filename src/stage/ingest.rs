@@ -6,6 +6,7 @@
 mod arm;
 mod axes;
 mod bind;
+mod channel;
 mod check;
 mod clock;
 mod columns;
@@ -26,6 +27,8 @@ mod rejections;
 mod row;
 mod scan;
 mod slots;
+mod stretch;
+mod torques;
 mod twice;
 mod verdict;
 mod wide;
@@ -41,6 +44,7 @@ pub use mapped::{
     UncertaintyColumn, last_number,
 };
 pub use motion::VelocitySettings;
+pub use torques::{IngestTorques, IngestTorquesReads, IngestTorquesWrites, TorqueSide};
 pub use noise::{InstrumentSetting, instruments};
 pub use wide::WideTargets;
 

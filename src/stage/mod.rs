@@ -9,7 +9,9 @@ mod copied;
 mod curves;
 mod dependence;
 mod diagnose;
+mod diagnose_torques;
 mod doubtful;
+mod dynamic_arm;
 mod folding;
 mod identified;
 mod identify;
@@ -21,6 +23,7 @@ mod parameter_set;
 mod registry;
 mod repeated;
 mod report;
+mod report_torques;
 mod robot;
 mod rounded;
 mod screened;
@@ -34,12 +37,14 @@ mod weightless;
 
 pub use compare::{Compare, CompareReads};
 pub use diagnose::{Diagnose, DiagnoseReads};
+pub use diagnose_torques::{DiagnoseTorques, DiagnoseTorquesReads, DiagnoseTorquesWrites, HoldOut, InertialSetting};
 pub use folding::FoldSetting;
 pub use identify::{Identify, IdentifyReads};
 pub use learn::{Learn, LearnReads, LearnWrites};
 pub use optimise::{BenchmarkProblem, Optimise, OptimiseReads};
 pub use registry::{ErasedStage, StageEntry};
 pub use report::{Accepted, Report, ReportReads};
+pub use report_torques::{ReportTorques, ReportTorquesReads, ReportTorquesWrites};
 pub use robot::{ReadRobot, RobotFormat, RobotReads, RobotWrites};
 pub use simulate::{Remainder, Simulate, SimulateReads, SimulateWrites};
 pub use stiffness::{Stiffness, StiffnessReads};
@@ -328,6 +333,9 @@ fn on(sets: &[String]) -> Vec<(String, String)> {
     sets.iter().enumerate().map(|(k, set)| (format!("on[{k}]"), set.clone())).collect()
 }
 
+/// Stages whose tables are a diagnosis, as `calib diagnose` runs and shows them.
+pub const DIAGNOSES: [&str; 2] = [Diagnose::NAME, DiagnoseTorques::NAME];
+
 /// Every kind of stage, one line each.
 pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<ReadRobot>(),
@@ -338,6 +346,9 @@ pub const STAGES: &[StageEntry] = &[
     StageEntry::of::<Stiffness>(),
     StageEntry::of::<Transfer>(),
     StageEntry::of::<Diagnose>(),
+    StageEntry::of::<ingest::IngestTorques>(),
+    StageEntry::of::<DiagnoseTorques>(),
+    StageEntry::of::<ReportTorques>(),
     StageEntry::of::<Compare>(),
     StageEntry::of::<Learn>(),
     StageEntry::of::<Optimise>(),

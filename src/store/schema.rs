@@ -16,6 +16,7 @@ use crate::units::Unit;
 /// The schema files, one per table kind.
 const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/changes.json"),
+    include_str!("../../schemas/contacts.json"),
     include_str!("../../schemas/convention.json"),
     include_str!("../../schemas/corrections.json"),
     include_str!("../../schemas/covariance.json"),
@@ -27,7 +28,11 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/fleet.json"),
     include_str!("../../schemas/fleet_changes.json"),
     include_str!("../../schemas/forms.json"),
+    include_str!("../../schemas/friction_curves.json"),
+    include_str!("../../schemas/inertials.json"),
     include_str!("../../schemas/intake.json"),
+    include_str!("../../schemas/joint_torques.json"),
+    include_str!("../../schemas/motion.json"),
     include_str!("../../schemas/network.json"),
     include_str!("../../schemas/observability.json"),
     include_str!("../../schemas/parameters.json"),
@@ -44,6 +49,11 @@ const SCHEMAS: &[&str] = &[
     include_str!("../../schemas/split.json"),
     include_str!("../../schemas/statistics.json"),
     include_str!("../../schemas/suspects.json"),
+    include_str!("../../schemas/torque_course.json"),
+    include_str!("../../schemas/torque_findings.json"),
+    include_str!("../../schemas/torque_numbers.json"),
+    include_str!("../../schemas/torque_rivals.json"),
+    include_str!("../../schemas/torque_verdict.json"),
     include_str!("../../schemas/training.json"),
     include_str!("../../schemas/truth.json"),
     include_str!("../../schemas/verdict.json"),
@@ -323,6 +333,10 @@ mod tests {
             ("m/s2", "_m_s2"),
             ("rad/s", "_rad_s"),
             ("mm/s", "_mm_s"),
+            ("Nm", "_nm"),
+            ("N", "_n"),
+            ("Hz", "_hz"),
+            ("kg m2", "_kg_m2"),
         ];
         for schema in all() {
             for field in &schema.fields {

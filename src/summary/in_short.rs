@@ -1,10 +1,10 @@
 //! A run in the few lines that matter: the error before and after, the noise, the verdict, the findings.
 
 use super::statistics::rows;
-use super::{DiagnosisSummary, labelled};
+use super::{Diagnosed, labelled};
 use crate::error::{Result, counted};
 use crate::pipeline::CompletedRun;
-use crate::stage::{Diagnose, Stage, Transfer};
+use crate::stage::{DIAGNOSES, Stage, Transfer};
 use crate::store::Store;
 use crate::table::{Standing, StatisticsRow};
 
@@ -25,7 +25,15 @@ pub fn in_short(
     // What a model does elsewhere is what a carried one is asked for; its sets may bear the names of those that it was fitted to.
     let carried = ran(Transfer::NAME).filter(|stage| rows.iter().any(|row| row.step == stage.id));
     let stands = || standing.map(|stands| stands.step.as_str()).or_else(last);
-    let Some(step) = carried.map(|stage| stage.id.as_str()).or_else(stands) else { return Ok(None) };
+    let diagnosed = || -> Result<String> {
+        let Some(stage) = DIAGNOSES.iter().find_map(|name| ran(name)) else { return Ok(String::new()) };
+        let told = Diagnosed::read(&outcome.manifest.run_id, stage, store)?;
+        let findings = told.strongest().map_or_else(String::new, |findings| labelled("findings", &findings));
+        Ok(labelled("verdict", &told.verdict()) + &findings)
+    };
+    let Some(step) = carried.map(|stage| stage.id.as_str()).or_else(stands) else {
+        return Ok(Some(diagnosed()?).filter(|text| !text.is_empty()));
+    };
     let own = rows.iter().filter(|row| row.step == step);
     let Some(after) = own.max_by_key(|row| (row.held_out, row.points)) else { return Ok(None) };
     let earlier = rows.iter().filter(|row| carried.is_none() && row.set == after.set && row.order < after.order);
@@ -43,11 +51,7 @@ pub fn in_short(
     if let Some(standing) = standing.filter(|stands| !stands.withdrawn.is_empty()) {
         text.push_str(&labelled("", &format!("`calib compensate` and `calib export` take the step `{}`", standing.model)));
     }
-    if let Some(stage) = ran(Diagnose::NAME) {
-        let told = DiagnosisSummary::read(&outcome.manifest.run_id, stage, store)?;
-        text.push_str(&labelled("verdict", &told.verdict()));
-        text.push_str(&told.strongest().map_or_else(String::new, |findings| labelled("findings", &findings)));
-    }
+    text.push_str(&diagnosed()?);
     Ok(Some(text))
 }
 

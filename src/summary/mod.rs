@@ -2,6 +2,7 @@
 
 mod columns;
 mod corrections;
+mod diagnosed;
 mod diagnosis;
 mod explanation;
 mod first_look;
@@ -19,9 +20,11 @@ mod run;
 mod run_diff;
 mod searches;
 mod statistics;
+mod torques;
 
 pub use columns::{columns, columns_json};
 pub use corrections::{corrections, corrections_json};
+pub use diagnosed::Diagnosed;
 pub use diagnosis::DiagnosisSummary;
 pub use explanation::explanation;
 pub use first_look::first_look;
@@ -38,3 +41,4 @@ pub use run::{run, stage, status};
 pub use run_diff::run_diff;
 pub use searches::{searches, searches_json};
 pub use statistics::{rejected, rejected_rows, statistics, statistics_json};
+pub use torques::TorqueSummary;

@@ -68,6 +68,7 @@ macro_rules! rows {
 pub(crate) use rows;
 
 mod changes;
+mod contacts;
 mod convention;
 mod corrections;
 mod covariance;
@@ -77,8 +78,12 @@ mod findings;
 mod fit;
 mod fleet;
 mod forms;
+mod friction_curves;
+mod inertials;
 mod intake;
+mod joint_torques;
 mod located;
+mod motion;
 mod network;
 mod observability;
 mod parameters;
@@ -92,11 +97,15 @@ mod split;
 mod standing;
 mod statistics;
 mod suspects;
+mod torque_course;
+mod torque_findings;
+mod torque_verdict;
 mod training;
 mod truth;
 mod verdict;
 
 pub use changes::{ChangeRow, Changes};
+pub use contacts::{ContactRow, Contacts};
 pub use convention::{JointConventionRow, JointConventions};
 pub use corrections::{Corrections, CorrectionsRow};
 pub use covariance::{CovarianceRow, CovarianceTable};
@@ -106,8 +115,12 @@ pub use findings::{FindingNumberRow, FindingNumbers, FindingRow, Findings, Rival
 pub use fit::{Fit, FitRow};
 pub use fleet::{FleetChangeRow, FleetChanges, FleetRow, FleetTable};
 pub use forms::{FormRow, Forms, formula_in_words};
+pub use friction_curves::{FrictionCurveRow, FrictionCurves};
+pub use inertials::{InertialRow, Inertials};
 pub use intake::{Intake, IntakeRow};
+pub use joint_torques::{JointTorqueRow, JointTorques};
 pub use located::{ShareRow, Shares, Spectrum, SpectrumRow};
+pub use motion::Motion;
 pub use network::{Network, NetworkRow};
 pub use observability::{FitContext, Observability, ObservabilityRow, UNFOLDED};
 pub use parameters::{Corrected, ParameterRow, Parameters};
@@ -122,6 +135,11 @@ pub use standing::{Contradicted, Standing, Step, Unseen, Withdrawn, standing};
 pub use statistics::{Statistics, StatisticsRow};
 pub(crate) use suspects::slip;
 pub use suspects::{Suspects, SuspectsRow};
+pub use torque_course::TorqueCourse;
+pub use torque_findings::{
+    TorqueFindingRow, TorqueFindings, TorqueNumberRow, TorqueNumbers, TorqueRivalRow, TorqueRivals,
+};
+pub use torque_verdict::{TorqueVerdict, TorqueVerdictRow};
 pub use training::{Training, TrainingRow};
 pub use truth::{Truth, TruthRow};
 pub use verdict::{Verdict, VerdictRow};
@@ -129,6 +147,7 @@ pub use verdict::{Verdict, VerdictRow};
 /// Every table kind; `schemas/<kind>.json` holds its schema.
 pub const TABLES: &[&str] = &[
     Changes::KIND,
+    Contacts::KIND,
     JointConventions::KIND,
     Corrections::KIND,
     CovarianceTable::KIND,
@@ -140,7 +159,11 @@ pub const TABLES: &[&str] = &[
     FleetTable::KIND,
     FleetChanges::KIND,
     Forms::KIND,
+    FrictionCurves::KIND,
+    Inertials::KIND,
     Intake::KIND,
+    JointTorques::KIND,
+    Motion::KIND,
     Network::KIND,
     Observability::KIND,
     Parameters::KIND,
@@ -157,6 +180,11 @@ pub const TABLES: &[&str] = &[
     Split::KIND,
     Statistics::KIND,
     Suspects::KIND,
+    TorqueCourse::KIND,
+    TorqueFindings::KIND,
+    TorqueNumbers::KIND,
+    TorqueRivals::KIND,
+    TorqueVerdict::KIND,
     Training::KIND,
     Truth::KIND,
     Verdict::KIND,

@@ -1,6 +1,8 @@
 //! The robot as a table: base, joints, tool; at the zero pose in the base frame.
 
-use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use crate::description::{
+    Coupling, DeclaredInertias, InertiaMoments, JointDescription, JointKind, MassTolerance, RobotDescription,
+};
 use crate::error::{Error, Result};
 use crate::robot::Bound;
 use crate::units::Unit;
@@ -41,6 +43,17 @@ crate::table::rows! { "robot",
         gravity_m_s2: Option<f64>,
         /// Joints that move this one, JSON `[{"by": 5, "ratio": 0.0}]`, joints from 1.
         couplings: Option<String>,
+        /// About the centre of mass, base axes.
+        inertia_xx_kg_m2: Option<f64>,
+        inertia_xy_kg_m2: Option<f64>,
+        inertia_xz_kg_m2: Option<f64>,
+        inertia_yy_kg_m2: Option<f64>,
+        inertia_yz_kg_m2: Option<f64>,
+        inertia_zz_kg_m2: Option<f64>,
+        /// Base only: how far masses may be off, one standard deviation.
+        tolerance_mass: Option<f64>,
+        tolerance_centre_mm: Option<f64>,
+        tolerance_inertia: Option<f64>,
     }
 }
 
@@ -58,6 +71,11 @@ impl Robot {
         let mut base = empty(0, &robot.name, "base");
         [base.axis_x, base.axis_y, base.axis_z] = some((gravity.norm() > 0.0).then(|| gravity.normalize().into()));
         base.gravity_m_s2 = Some(gravity.norm());
+        if let Some(tolerance) = &robot.inertias.tolerance {
+            base.tolerance_mass = Some(tolerance.mass);
+            base.tolerance_centre_mm = Some(Unit::Millimetre.from_si(tolerance.centre));
+            base.tolerance_inertia = Some(tolerance.inertia);
+        }
 
         let mut tool = empty(robot.joints.len() + 1, "tool", "tool");
         [tool.point_x_mm, tool.point_y_mm, tool.point_z_mm] = millimetres(Some(robot.tool));
@@ -65,10 +83,15 @@ impl Robot {
         [tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm] = millimetres(Some(robot.payload_centre));
         let rotation = Matrix3::from_fn(|i, j| robot.tool_rotation[i][j]);
         let orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        set_inertia(&mut tool, robot.inertias.payload);
         tool.orientation_w = Some(orientation.w);
         [tool.orientation_x, tool.orientation_y, tool.orientation_z] = some(Some([orientation.i, orientation.j, orientation.k]));
 
-        let joints = robot.joints.iter().enumerate().map(|(i, joint)| joint_row(i, joint, &robot.couplings));
+        let joints = robot.joints.iter().enumerate().map(|(i, joint)| {
+            let mut row = joint_row(i, joint, &robot.couplings);
+            set_inertia(&mut row, robot.inertias.links.get(i).copied().flatten());
+            row
+        });
         Self(std::iter::once(base).chain(joints).chain(std::iter::once(tool)).collect())
     }
 
@@ -102,6 +125,7 @@ impl Robot {
             payload_mass: need(tool.mass_kg, tool, "mass_kg")?,
             payload_centre: metres([tool.centre_x_mm, tool.centre_y_mm, tool.centre_z_mm], tool, "centre")?,
             gravity: down.map(|x| x * size),
+            inertias: inertias(base, joints, tool),
         })
     }
 }
@@ -154,6 +178,40 @@ fn joint(row: &RobotRow) -> Result<JointDescription> {
     })
 }
 
+fn set_inertia(row: &mut RobotRow, moments: Option<InertiaMoments>) {
+    [
+        row.inertia_xx_kg_m2,
+        row.inertia_xy_kg_m2,
+        row.inertia_xz_kg_m2,
+        row.inertia_yy_kg_m2,
+        row.inertia_yz_kg_m2,
+        row.inertia_zz_kg_m2,
+    ] = moments.map_or([None; 6], |moments| moments.map(Some));
+}
+
+fn inertias(base: &RobotRow, joints: &[RobotRow], tool: &RobotRow) -> DeclaredInertias {
+    let moments = |row: &RobotRow| {
+        Some([
+            row.inertia_xx_kg_m2?,
+            row.inertia_xy_kg_m2?,
+            row.inertia_xz_kg_m2?,
+            row.inertia_yy_kg_m2?,
+            row.inertia_yz_kg_m2?,
+            row.inertia_zz_kg_m2?,
+        ])
+    };
+    let links: Vec<_> = joints.iter().map(moments).collect();
+    let tolerance = || {
+        let centre = Unit::Millimetre.to_si(base.tolerance_centre_mm?);
+        Some(MassTolerance { mass: base.tolerance_mass?, centre, inertia: base.tolerance_inertia? })
+    };
+    DeclaredInertias {
+        links: if links.iter().any(Option::is_some) { links } else { Vec::new() },
+        payload: moments(tool),
+        tolerance: tolerance(),
+    }
+}
+
 fn couplings_of(moved: usize, row: &RobotRow, joints: usize) -> Result<Vec<Coupling>> {
     let Some(text) = &row.couplings else { return Ok(Vec::new()) };
     let cells: Vec<CouplingCell> = serde_json::from_str(text).map_err(|e| fault(row, &format!("couplings: {e}")))?;
@@ -192,6 +250,15 @@ fn empty(body: usize, name: &str, kind: &str) -> RobotRow {
         orientation_z: None,
         gravity_m_s2: None,
         couplings: None,
+        inertia_xx_kg_m2: None,
+        inertia_xy_kg_m2: None,
+        inertia_xz_kg_m2: None,
+        inertia_yy_kg_m2: None,
+        inertia_yz_kg_m2: None,
+        inertia_zz_kg_m2: None,
+        tolerance_mass: None,
+        tolerance_centre_mm: None,
+        tolerance_inertia: None,
     }
 }
 

@@ -22,6 +22,7 @@ pub mod polar;
 pub mod recorder;
 pub mod reveal;
 pub mod statics;
+pub mod torque;
 pub mod touch;
 pub mod tracker;
 pub mod true_value;

@@ -88,6 +88,7 @@ impl Case {
             payload_mass: 0.0,
             payload_centre: vector(&robot["tool"]),
             gravity: [0.0, 0.0, -9.81],
+            inertias: Default::default(),
         };
         let position: Vec<Vector3<f64>> = numbers(&value["position"]).chunks(3).map(Vector3::from_column_slice).collect();
         let sigma = value["sigma"].as_f64().expect("sigma");

@@ -44,6 +44,7 @@ fn lever() -> RobotDescription {
         payload_mass: 100.0,
         payload_centre: [2.0, 0.0, 0.0],
         gravity: [0.0, 0.0, -10.0],
+        inertias: Default::default(),
     }
 }
 

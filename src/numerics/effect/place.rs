@@ -1,4 +1,4 @@
-//! Where an effect sits, in the words of the interface: `joint 3`, `joint 4->5`, `link 2-4`, `base`, `tool`, `tracker`, `recording`.
+//! Where an effect sits, in the words of the interface: `joint 3`, `joint 4->5`, `link 2-4`, `base`, `tool`, `tracker`, `recording`, `arm`.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -23,6 +23,8 @@ pub enum Place {
     Recording,
     /// The far end of a draw-wire or ballbar.
     Anchor,
+    /// The whole arm, wherever it is touched.
+    Arm,
 }
 
 impl Place {
@@ -59,6 +61,7 @@ impl fmt::Display for Place {
             Self::Tracker => f.write_str("tracker"),
             Self::Recording => f.write_str("recording"),
             Self::Anchor => f.write_str("anchor"),
+            Self::Arm => f.write_str("arm"),
         }
     }
 }
@@ -78,7 +81,7 @@ impl FromStr for Place {
             Some((by, moved)) => two(by, moved).map(|(by, moved)| Self::Coupled(by, moved)),
             None => one(numbers).map(Self::Joint),
         };
-        let whole = [Self::Base, Self::Tool, Self::Tracker, Self::Recording, Self::Anchor];
+        let whole = [Self::Base, Self::Tool, Self::Tracker, Self::Recording, Self::Anchor, Self::Arm];
         if let Some(place) = whole.into_iter().find(|place| place.to_string() == text) {
             return Ok(place);
         }
@@ -107,6 +110,7 @@ mod tests {
             (Place::Tracker, "tracker", "tracker"),
             (Place::Recording, "recording", "recording"),
             (Place::Anchor, "anchor", "anchor"),
+            (Place::Arm, "arm", "arm"),
         ];
         for (place, words, tag) in all {
             assert_eq!((words.parse(), tag.parse()), (Ok(place), Ok(place)));

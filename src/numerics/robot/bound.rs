@@ -14,6 +14,8 @@ pub enum Bound {
     Angle,
     /// kg.
     Mass,
+    /// kg m2.
+    Inertia,
     /// Motor turns per turn of the joint, torque per current, turns of one joint by another.
     Factor,
 }
@@ -30,6 +32,7 @@ impl Bound {
             Self::Angle => (63.0, "rad", ", ten turns; is it in another unit?"),
             // The heaviest robots are 10 t.
             Self::Mass => (1e6, "kg", "; is it in another unit?"),
+            Self::Inertia => (1e7, "kg m2", "; is it in another unit?"),
             Self::Factor => (1e6, "", ""),
         }
     }

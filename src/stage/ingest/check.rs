@@ -34,7 +34,7 @@ pub(super) fn faults(settings: &Ingest) -> Vec<Fault> {
     faults
 }
 
-fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
+pub(super) fn file_faults(file: &FileLayout, place: &str, faults: &mut Vec<Fault>) {
     if delimiter(&file.delimiter).is_none() {
         let message = format!("delimiter `{}`; allowed: one ASCII character, `tab` or `whitespace`", file.delimiter);
         faults.push(Fault::new(format!("{place}.delimiter"), message));

@@ -1,7 +1,7 @@
 //! Every column of the recording, declared once: what kinds of measurement own, and the circumstances that are here.
 
 use crate::observation::{ColumnShape, DeclaredColumn, KINDS};
-use crate::units::Quantity::{Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time};
+use crate::units::Quantity::{Angle, AngularRate, Current, Length, LinearRate, Mass, Number, Temperature, Time, Torque};
 
 const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
 
@@ -19,6 +19,10 @@ static CIRCUMSTANCES: &[DeclaredColumn] = &[
         )
     },
     DeclaredColumn::text("usage", "What the recording itself says a row is for, e.g. `fit` or `validate`."),
+    DeclaredColumn::text(
+        "trajectory",
+        "Which trajectory of several a row belongs to, of an arm that moves: nothing is filtered from one into the next.",
+    ),
     DeclaredColumn::text("target", "Which of several targets on the tool was measured; blank for the robot's tool point."),
     DeclaredColumn::number("time", &["time"], Time, [f64::MIN, f64::MAX], "When the row was recorded."),
     DeclaredColumn::number("payload", &["payload"], Mass, [0.0, 1e4], "Mass at the tool."),
@@ -37,6 +41,10 @@ static CIRCUMSTANCES: &[DeclaredColumn] = &[
     DeclaredColumn {
         shape: ColumnShape::Joints { prismatic: None },
         ..DeclaredColumn::number("current", &["i{j}"], Current, [-1e4, 1e4], "Motor currents.")
+    },
+    DeclaredColumn {
+        shape: ColumnShape::Joints { prismatic: None },
+        ..DeclaredColumn::number("torque", &["tau{j}"], Torque, [-1e7, 1e7], "Joint torques, by a sensor or as the drive states them.")
     },
     DeclaredColumn {
         shape: ColumnShape::Joints { prismatic: None },

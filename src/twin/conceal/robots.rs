@@ -1,6 +1,6 @@
 //! The robots of concealed recordings: nominal descriptions typed from data sheets, with plausible masses and motors.
 
-use calib_foundation::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use calib_foundation::description::{Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription};
 
 /// A robot that recordings are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -108,6 +108,7 @@ impl Kind {
             payload_mass: payload,
             payload_centre: metres(std::array::from_fn(|i| point[i] + offset[i])),
             gravity: [0.0, 0.0, -9.81],
+            inertias: DeclaredInertias::default(),
         }
     }
 

@@ -2,18 +2,14 @@
 
 use super::dh::{self, DhConvention};
 use super::place::{DocumentNode, Faults};
-use super::{FrameChain, Imported, RobotFileText, about, screws, urdf};
-use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use super::{ChainBody, FrameChain, Imported, RobotFileText, about, inertia, screws, urdf};
+use crate::description::{Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::units::{Quantity, Unit};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 const FORMAT: f64 = 1.0;
-// m/s2, downwards along z, where the file says nothing.
-const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-// m/s2; no robot works where gravity is outside (zero, for "none", is allowed): it catches mm/s2 and g.
-const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
 const FORMATS: [&str; 4] = ["screws", "dh", "mdh", "urdf"];
 
 #[derive(Clone, Copy)]
@@ -35,6 +31,7 @@ pub(super) fn read(file: RobotFileText, urdf: Option<RobotFileText>) -> Result<I
         "couplings",
         "links",
         "payload",
+        "mass_tolerance",
         "gravity",
     ]);
     let format = root.get("calib_robot");
@@ -112,8 +109,8 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             limits: joint.limits,
             reduction_ratio: None,
             motor_constant: None,
-            mass: joint.body.map(|(mass, _)| mass),
-            centre: joint.body.map(|(_, centre)| centre.into()),
+            mass: joint.body.as_ref().map(|body| body.mass),
+            centre: joint.body.as_ref().map(|body| body.centre.into()),
         })
         .collect();
     if let Some(list) = root.get("joints").given() {
@@ -122,18 +119,22 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         }
     }
     distinct(root, &joints);
+    let mut inertias: Vec<_> = chain.joints.iter().map(|joint| joint.body.as_ref().and_then(|body| body.inertia)).collect();
     if let Some(list) = root.get("links").given() {
         for (i, value) in list.per_joint(joints.len()).into_iter().enumerate().take(joints.len()) {
             if value.given().is_some() {
-                let (mass, centre) = link(value, chain.joints[i].frame, units);
-                joints[i].mass = Some(mass);
-                joints[i].centre = Some(centre.into());
+                let body = link(value, chain.joints[i].frame, units);
+                joints[i].mass = Some(body.mass);
+                joints[i].centre = Some(body.centre.into());
+                inertias[i] = body.inertia;
             }
         }
     }
+    let tolerance = root.get("mass_tolerance");
+    let tolerance = tolerance.given().map(|value| inertia::tolerance(value, ["mass", "centre", "inertia"], units.length));
     let couplings = root.get("couplings");
     let couplings = couplings.given().map_or_else(Vec::new, |list| self::couplings(list, joints.len()));
-    let (payload_mass, payload_centre) = payload(root.get("payload"), &tool, units);
+    let ChainBody { mass: payload_mass, centre: payload_centre, inertia: payload_inertia } = payload(root.get("payload"), &tool, units);
     RobotDescription {
         name,
         joints,
@@ -142,7 +143,8 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         couplings,
         payload_mass,
         payload_centre: payload_centre.into(),
-        gravity: gravity(root.get("gravity")),
+        gravity: root.get("gravity").given().map_or(super::GRAVITY, super::gravity),
+        inertias: DeclaredInertias { links: inertias, payload: payload_inertia, tolerance },
     }
 }
 
@@ -233,8 +235,8 @@ fn distinct(root: &DocumentNode, joints: &[JointDescription]) {
     }
 }
 
-fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> (f64, Point3<f64>) {
-    let value = value.map(&["mass", "centre", "frame"]);
+fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) -> ChainBody {
+    let value = value.map(&["mass", "centre", "inertia", "frame"]);
     let centre = Point3::from(value.get("centre").sized_vector::<3>(Bound::Length, units.length));
     let of_link = value.get("frame");
     let in_link = of_link.given().and_then(|f| f.choice(&[("base", false), ("link", true)])).unwrap_or(false);
@@ -246,7 +248,12 @@ fn link(value: DocumentNode, frame: Option<Isometry3<f64>>, units: FileUnits) ->
         }
         _ => centre,
     };
-    (value.get("mass").not_negative(), centre)
+    let moments = value.get("inertia").given().map(inertia::moments);
+    let moments = match frame {
+        Some(frame) if in_link => moments.map(|moments| inertia::turned(&moments, &frame.rotation.to_rotation_matrix())),
+        _ => moments,
+    };
+    ChainBody { mass: value.get("mass").not_negative(), centre, inertia: moments }
 }
 
 fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
@@ -268,27 +275,19 @@ fn couplings(list: &DocumentNode, joints: usize) -> Vec<Coupling> {
     couplings
 }
 
-/// Rated mass, kg, and its centre, m, zero pose, base frame.
-fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> (f64, Point3<f64>) {
+/// Rated payload, zero pose, base frame.
+fn payload(value: DocumentNode, tool: &Isometry3<f64>, units: FileUnits) -> ChainBody {
     let point = Point3::from(tool.translation.vector);
     if value.given().is_none() {
-        return (0.0, point);
+        return ChainBody { mass: 0.0, centre: point, inertia: None };
     }
-    let value = value.map(&["mass", "offset", "frame"]);
+    let value = value.map(&["mass", "offset", "inertia", "frame"]);
     let offset = value.get("offset").given().map_or([0.0; 3], |offset| offset.sized_vector(Bound::Length, units.length));
     let offset = Vector3::from(offset);
     let in_tool = value.get("frame").given().and_then(|f| f.choice(&[("base", false), ("tool", true)])).unwrap_or(false);
-    (value.get("mass").not_negative(), point + if in_tool { tool.rotation * offset } else { offset })
-}
-
-fn gravity(value: DocumentNode) -> [f64; 3] {
-    let Some(value) = value.given() else { return GRAVITY };
-    let gravity = value.vector();
-    let size = Vector3::from(gravity).norm();
-    if size != 0.0 && !size.is_nan() && !GRAVITY_RANGE.contains(&size) {
-        value.fault(format!("is {size} m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"));
-    }
-    gravity
+    let rotation = if in_tool { tool.rotation.to_rotation_matrix() } else { Rotation3::identity() };
+    let moments = value.get("inertia").given().map(|value| inertia::turned(&inertia::moments(value), &rotation));
+    ChainBody { mass: value.get("mass").not_negative(), centre: point + rotation * offset, inertia: moments }
 }
 
 fn rows(rotation: &UnitQuaternion<f64>) -> [[f64; 3]; 3] {

@@ -1,15 +1,37 @@
-//! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg and Nm/A.
+//! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg, kg m2 and Nm/A.
 
 use super::place::{DocumentNode, Faults};
 use super::screws::direction;
-use super::{Imported, RobotFileText};
-use crate::description::{Coupling, JointDescription, JointKind, RobotDescription};
+use super::{Imported, RobotFileText, inertia};
+use crate::description::{Coupling, DeclaredInertias, JointDescription, JointKind, RobotDescription};
 use crate::error::Result;
 use crate::robot::Bound;
 use crate::units::Unit;
 use nalgebra::{Point3, Vector3};
 
-const KEYS: [&str; 11] = ["name", "axes", "points", "tool", "mass", "com", "ratio", "kt", "payload", "payload_com", "coupling"];
+const KEYS: [&str; 19] = [
+    "name",
+    "axes",
+    "points",
+    "tool",
+    "mass",
+    "com",
+    "inertia",
+    "ratio",
+    "kt",
+    "payload",
+    "payload_com",
+    "payload_inertia",
+    "gravity",
+    "coupling",
+    "inertia_tolerance",
+    // What the recording itself shows.
+    "signal",
+    "encoder_deg",
+    "resolution",
+    "rate_hz",
+];
+const TOLERANCE: [&str; 3] = ["mass_rel", "com_mm", "inertia_rel"];
 
 pub(super) fn read(file: RobotFileText) -> Result<Imported> {
     let (node, faults) = Faults::parse(file)?;
@@ -48,7 +70,15 @@ pub(super) fn read(file: RobotFileText) -> Result<Imported> {
         couplings: root.get("coupling").given().map_or_else(Vec::new, |list| couplings(list, n)),
         payload_mass: root.get("payload").given().map_or(0.0, DocumentNode::not_negative),
         payload_centre: (tool + offset).into(),
-        gravity: [0.0, 0.0, -9.81],
+        gravity: root.get("gravity").given().map_or(super::GRAVITY, super::gravity),
+        inertias: DeclaredInertias {
+            links: per_joint("inertia").iter().map(|value| value.given().map(inertia::moments)).collect(),
+            payload: root.get("payload_inertia").given().map(inertia::moments),
+            tolerance: root
+                .get("inertia_tolerance")
+                .given()
+                .map(|value| inertia::tolerance(value, TOLERANCE, Unit::Millimetre)),
+        },
     };
     let unused = root.keys().filter(|key| !KEYS.contains(key));
     let notes = unused.map(|key| format!("{}: the key `{key}` is not used", file.label)).collect();

@@ -5,7 +5,7 @@
 
 pub use about::About;
 
-use crate::description::{JointKind, RobotDescription};
+use crate::description::{InertiaMoments, JointKind, RobotDescription};
 use crate::error::Result;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -13,9 +13,12 @@ mod about;
 mod calib;
 mod case;
 mod dh;
+mod inertia;
 mod place;
 mod screws;
 mod urdf;
+
+use place::DocumentNode;
 
 /// A file's content and the name by which messages call it.
 #[derive(Debug, Clone, Copy)]
@@ -63,6 +66,28 @@ struct ChainJoint {
     limits: Option<[f64; 2]>,
     /// The frame of the moved link; none where the format knows no link frames.
     frame: Option<Isometry3<f64>>,
-    /// Mass, kg, and centre of the moved body where the format knows them.
-    body: Option<(f64, Point3<f64>)>,
+    /// The moved body where the format knows it.
+    body: Option<ChainBody>,
+}
+
+/// Mass, kg, centre, and moments about it in base axes where all parts of the body state them.
+struct ChainBody {
+    mass: f64,
+    centre: Point3<f64>,
+    inertia: Option<InertiaMoments>,
+}
+
+/// m/s2, downwards along z, where a file says nothing.
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+/// m/s2; no robot works where gravity is outside (zero, for "none", is allowed): it catches mm/s2 and g.
+const GRAVITY_RANGE: std::ops::Range<f64> = 1.0..30.0;
+
+/// Gravity of a file, m/s2, base frame.
+fn gravity(value: &DocumentNode) -> [f64; 3] {
+    let gravity = value.vector();
+    let size = Vector3::from(gravity).norm();
+    if size != 0.0 && !size.is_nan() && !GRAVITY_RANGE.contains(&size) {
+        value.fault(format!("is {size} m/s2 long; expected about 9.81 m/s2, or [0, 0, 0] for none"));
+    }
+    gravity
 }

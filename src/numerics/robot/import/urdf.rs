@@ -3,7 +3,7 @@
 //! branches that move by themselves (a gripper) add as they are at their zero. Mimic, floating and planar joints are refused.
 
 use super::screws::unit;
-use super::{ChainJoint, FrameChain, RobotFileText};
+use super::{ChainBody, ChainJoint, FrameChain, RobotFileText, inertia};
 use crate::description::JointKind;
 use crate::error::{Error, Fault, Result, nearest};
 use crate::robot::Bound;
@@ -198,7 +198,7 @@ impl<'a> Reader<'a> {
         Some([lower, upper])
     }
 
-    /// Mass and centre of what moves with `link`: itself and every branch that the chain does not move on.
+    /// What moves with `link`: itself and every branch that the chain does not move on.
     fn body(
         &mut self,
         joints: &BTreeMap<&'a str, UrdfJoint<'a>>,
@@ -206,22 +206,13 @@ impl<'a> Reader<'a> {
         path: &[&'a str],
         link: &'a str,
         frame: Isometry3<f64>,
-    ) -> Option<(f64, Point3<f64>)> {
-        let (mut mass, mut moment) = (0.0, Vector3::zeros());
+    ) -> Option<ChainBody> {
+        let mut parts = Vec::new();
         // Every link has one parent and lies below `link`, so this ends.
         let mut open = vec![(link, frame)];
         while let Some((link, frame)) = open.pop() {
             if let Some(inertial) = links[link].children().find(|node| node.has_tag_name("inertial")) {
-                let centre = frame * self.origin(inertial) * Point3::origin();
-                let own = match self.child(inertial, "mass") {
-                    Some(node) => self.numbers(node, "value", [f64::NAN], Some(Bound::Mass))[0],
-                    None => f64::NAN,
-                };
-                if own < 0.0 {
-                    self.fault(inertial, format!("link `{link}`: expected a mass in kg, not less than 0, found {own}"));
-                }
-                mass += own;
-                moment += own * centre.coords;
+                parts.push(self.part(link, inertial, frame));
             }
             for joint in joints.values().filter(|joint| joint.parent == link) {
                 let moves_on = path.contains(&joint.child) && joint.node.attribute("type") != Some("fixed");
@@ -230,7 +221,40 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        (mass != 0.0).then(|| (mass, Point3::from(moment / mass)))
+        let mass: f64 = parts.iter().map(|part| part.mass).sum();
+        if mass == 0.0 {
+            return None;
+        }
+        let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre.coords).sum();
+        let centre = Point3::from(moment / mass);
+        let about = |part: &ChainBody| {
+            Some(inertia::tensor(&part.inertia?) + inertia::offset(part.mass, &(part.centre - centre)))
+        };
+        let tensors: Option<Vec<_>> = parts.iter().map(about).collect();
+        let inertia = tensors.map(|all| inertia::of_tensor(&all.iter().sum()));
+        Some(ChainBody { mass, centre, inertia })
+    }
+
+    /// The `<inertial>` of a link whose frame stands so at the zero pose.
+    fn part(&mut self, link: &str, inertial: Node<'a, 'a>, frame: Isometry3<f64>) -> ChainBody {
+        let place = frame * self.origin(inertial);
+        let mass = match self.child(inertial, "mass") {
+            Some(node) => self.numbers(node, "value", [f64::NAN], Some(Bound::Mass))[0],
+            None => f64::NAN,
+        };
+        if mass < 0.0 {
+            self.fault(inertial, format!("link `{link}`: expected a mass in kg, not less than 0, found {mass}"));
+        }
+        let tensor = inertial.children().find(|node| node.has_tag_name("inertia"));
+        let moments = tensor.map(|node| {
+            let moments = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]
+                .map(|name| self.numbers(node, name, [if name == "ixx" { f64::NAN } else { 0.0 }], Some(Bound::Inertia))[0]);
+            if let Some(message) = inertia::impossible(&moments) {
+                self.fault(node, format!("link `{link}`: {message}"));
+            }
+            inertia::turned(&moments, &place.rotation.to_rotation_matrix())
+        });
+        ChainBody { mass, centre: place * Point3::origin(), inertia: moments }
     }
 
     fn child(&mut self, node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {

@@ -1,0 +1,75 @@
+//! A joint that swings: its torque is that of the rigid arm behind a resonance.
+
+use super::{Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+use std::f64::consts::PI;
+
+/// G tau - tau with G = (2 z w s + w^2) / (s^2 + 2 z w s + w^2); shape: Hz and z.
+pub(super) struct Elasticity;
+
+const HERTZ: [f64; 8] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0];
+const DAMPING: [f64; 2] = [0.05, 0.15];
+
+impl TorqueCause for Elasticity {
+    fn name(&self) -> &'static str {
+        "joint_elasticity"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let shapes: Vec<[f64; 2]> = HERTZ.iter().flat_map(|hertz| DAMPING.map(|damping| [*hertz, damping])).collect();
+        let shapes: Vec<&[f64]> = shapes.iter().map(|shape| &shape[..]).collect();
+        at_each_joint_with(&Elasticity, scene, 1, &shapes)
+    }
+
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        8.0
+    }
+
+    fn is_positive(&self) -> bool {
+        true
+    }
+
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.shape == [5.0, 0.05] || form.shape == [8.5, 0.05]
+    }
+
+    fn is_of_rigid(&self) -> bool {
+        true
+    }
+
+    fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
+        let hertz = ShapeSpan { index: 0, least: 2.0, most: 20.0, by_ratio: true };
+        vec![hertz, ShapeSpan { index: 1, least: 0.005, most: 0.6, by_ratio: true }, hertz]
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        let (torque, rate, damping) = (&scene.rigid[form.joint()], scene.rate, form.shape[1]);
+        // Bilinear, with the resonance where it is said to be.
+        let w = 2.0 * rate * (PI * form.shape[0] / rate).tan();
+        let k = 2.0 * rate;
+        let (n1, n0) = (2.0 * damping * w, w * w);
+        let d = k * k + n1 * k + n0;
+        let b = [(n1 * k + n0) / d, 2.0 * n0 / d, (n0 - n1 * k) / d];
+        let a = [2.0 * (n0 - k * k) / d, (k * k - n1 * k + n0) / d];
+        for stretch in &scene.stretches {
+            let first = torque[stretch.start];
+            let mut state = [0.0; 2];
+            for row in stretch.clone() {
+                let input = torque[row] - first;
+                let output = b[0] * input + state[0];
+                state = [b[1] * input - a[0] * output + state[1], b[2] * input - a[1] * output];
+                out[row] = output - input;
+            }
+        }
+    }
+
+    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        vec![shape("resonance", form.shape[0], "Hz"), shape("damping", form.shape[1], "1"), plain("share", fitted[0], "1")]
+    }
+
+    fn statement(&self, form: &TorqueForm, _fitted: &[Fitted]) -> String {
+        let [hertz, damping] = [form.shape[0], form.shape[1]];
+        format!("{} swings at {hertz:.1} Hz with a damping ratio of {damping:.2}", form.place)
+    }
+}

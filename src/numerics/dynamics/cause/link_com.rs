@@ -1,0 +1,55 @@
+//! A link whose centre of mass is elsewhere.
+
+use super::{Fitted, TorqueCause, TorqueForm, plain};
+use crate::dynamics::inertials::DeclaredInertials;
+use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+use crate::effect::Place;
+
+/// Displacement of the centre, in three coordinates.
+pub(super) struct LinkCom;
+
+const WIDTH: usize = 3;
+
+impl TorqueCause for LinkCom {
+    fn name(&self) -> &'static str {
+        "link_com"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let links = if scene.declared.is_some() { scene.joints() } else { 0 };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&LinkCom, link, WIDTH) };
+        (0..links).map(form).collect()
+    }
+
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        8.0
+    }
+
+    fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
+        (0..=form.link()).collect()
+    }
+
+    fn is_inertial(&self) -> bool {
+        true
+    }
+
+    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        out.fill(0.0);
+    }
+
+    fn inertial(&self, form: &TorqueForm, declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+        Some(declared.centre_shift[form.link()].iter().map(|ten| (form.link(), *ten)).collect())
+    }
+
+    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        let in_mm = |number: &Fitted| Fitted { value: 1e3 * number.value, sigma: 1e3 * number.sigma };
+        ["centre_x", "centre_y", "centre_z"].iter().zip(fitted).map(|(name, number)| plain(name, in_mm(number), "mm")).collect()
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let [x, y, z] = [0, 1, 2].map(|axis| 1e3 * fitted[axis].value);
+        format!("the centre of mass of {} is ({x:.1}, {y:.1}, {z:.1}) mm from where it is declared", form.place)
+    }
+}

@@ -1,0 +1,56 @@
+//! A link whose inertia is not the declared one.
+
+use super::{Fitted, TorqueCause, TorqueForm, plain};
+use crate::dynamics::inertials::DeclaredInertials;
+use crate::dynamics::newton_euler::INERTIAL_NUMBERS;
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+use crate::effect::Place;
+
+/// Six numbers about the joint's point.
+pub(super) struct LinkInertia;
+
+const WIDTH: usize = 6;
+
+impl TorqueCause for LinkInertia {
+    fn name(&self) -> &'static str {
+        "link_inertia"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let links = if scene.declared.is_some() { scene.joints() } else { 0 };
+        let form = |link| TorqueForm { place: Place::Links(link, link), ..TorqueForm::at_joint(&LinkInertia, link, WIDTH) };
+        (0..links).map(form).collect()
+    }
+
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        8.0
+    }
+
+    fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
+        (0..=form.link()).collect()
+    }
+
+    fn is_inertial(&self) -> bool {
+        true
+    }
+
+    fn write(&self, _form: &TorqueForm, _scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        out.fill(0.0);
+    }
+
+    fn inertial(&self, form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+        let unit = |number: usize| std::array::from_fn(|entry| f64::from(u8::from(entry == 4 + number)));
+        Some((0..WIDTH).map(|number| (form.link(), unit(number))).collect())
+    }
+
+    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        let names = ["inertia_xx", "inertia_xy", "inertia_xz", "inertia_yy", "inertia_yz", "inertia_zz"];
+        names.iter().zip(fitted).map(|(name, value)| plain(name, *value, "kg m2")).collect()
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let largest = fitted.iter().map(|number| number.value).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        format!("the inertia of {} is off, by up to {largest:.3} kg m2", form.place)
+    }
+}

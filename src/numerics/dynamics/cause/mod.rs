@@ -1,0 +1,207 @@
+//! What a rigid arm lacks: each cause in a file of its own, one line each in [`TORQUE_CAUSES`].
+//!
+//! A cause proposes forms: itself at a place with shape numbers. A form is a group of columns, torques at joints that enter linearly.
+
+mod asymmetric;
+mod coulomb;
+mod elasticity;
+mod gravity_direction;
+mod link_com;
+mod link_inertia;
+mod link_mass;
+mod load;
+mod offset;
+mod payload;
+mod presliding;
+mod ripple;
+mod rotor;
+mod spikes;
+mod spring;
+mod stribeck;
+mod torque_constant;
+mod unknown;
+mod viscous;
+mod warmup;
+mod wrist_coupling;
+
+use super::inertials::DeclaredInertials;
+use super::newton_euler::INERTIAL_NUMBERS;
+use super::scene::DynamicScene;
+use super::types::TorqueParameter;
+use crate::effect::Place;
+pub(super) use coulomb::COULOMB;
+pub(super) use offset::OFFSET;
+pub(super) use rotor::ROTOR;
+pub(super) use viscous::VISCOUS;
+
+/// All causes with columns; latency and contacts are looked for before.
+pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
+    &viscous::Viscous,
+    &coulomb::Coulomb,
+    &offset::Offset,
+    &asymmetric::Asymmetric,
+    &stribeck::Stribeck,
+    &presliding::Presliding,
+    &load::Load,
+    &warmup::Warmup,
+    &rotor::Rotor,
+    &torque_constant::TorqueConstant,
+    &spring::SPRING_BALANCE,
+    &spring::CABLE_STIFFNESS,
+    &ripple::Ripple,
+    &elasticity::Elasticity,
+    &spikes::Spikes,
+    &wrist_coupling::WristCoupling,
+    &payload::Payload,
+    &link_mass::LinkMass,
+    &link_com::LinkCom,
+    &link_inertia::LinkInertia,
+    &gravity_direction::GravityDirection,
+    &unknown::Unnamed,
+];
+
+/// A shape number that is refined.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ShapeSpan {
+    /// Position in the form's shape.
+    pub index: usize,
+    pub least: f64,
+    pub most: f64,
+    /// Refined by ratios instead of differences.
+    pub by_ratio: bool,
+}
+
+/// A physical reason why measured torques differ from those of the rigid arm.
+pub(super) trait TorqueCause: Sync {
+    /// Canonical.
+    fn name(&self) -> &'static str;
+    /// All that are tried on a recording.
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm>;
+    /// -2 ln of how common it is beside a common one.
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        6.0
+    }
+    /// Joints whose torque it changes.
+    fn acts_on(&self, form: &TorqueForm, _joints: usize) -> Vec<usize> {
+        vec![form.joint()]
+    }
+    /// Writes a column of the torque at a joint (Nm per unit of its coefficient), rows as recorded.
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, joint: usize, column: usize, out: &mut [f64]);
+    /// Link and change of its numbers per coefficient, for causes that are wrong masses: these write nothing.
+    fn inertial(&self, _form: &TorqueForm, _declared: &DeclaredInertials) -> Option<Vec<(usize, [f64; INERTIAL_NUMBERS])>> {
+        None
+    }
+    /// Frictions of the same joint that it modifies, and without which it is none.
+    fn modifies(&self) -> &'static [&'static str] {
+        &[]
+    }
+    /// Whether the form is part of the rich model, which noise is taken from.
+    fn is_rich(&self, _form: &TorqueForm) -> bool {
+        false
+    }
+    /// Whether its one coefficient can only be positive: a friction that falls with speed, a rotor.
+    fn is_positive(&self) -> bool {
+        false
+    }
+    /// Whether it is, like others of its kind, a wrong mass, drive or mounting: one such error looks like several of others.
+    fn is_inertial(&self) -> bool {
+        false
+    }
+    /// Whether its columns are made of the rigid torque.
+    fn is_of_rigid(&self) -> bool {
+        false
+    }
+    /// Whether several forms of it may stand at a place.
+    fn may_repeat(&self) -> bool {
+        false
+    }
+    /// Shape numbers that are refined once it is found.
+    fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
+        Vec::new()
+    }
+    /// Torque per coefficient at a velocity and its smoothed sign, for causes of one column that are friction over velocity.
+    fn friction(&self, _form: &TorqueForm, _velocity: f64, _sign: f64) -> Option<f64> {
+        None
+    }
+    /// Its numbers as people read them.
+    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter>;
+    /// A sentence without a full stop, with its size.
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String;
+}
+
+/// A coefficient and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fitted {
+    pub value: f64,
+    pub sigma: f64,
+}
+
+/// A cause at a place with its shape numbers.
+#[derive(Clone)]
+pub(super) struct TorqueForm {
+    pub cause: &'static dyn TorqueCause,
+    pub place: Place,
+    /// Further joints (from 0) or an order, as the cause reads them.
+    pub with: [usize; 2],
+    pub shape: Vec<f64>,
+    /// Columns.
+    pub width: usize,
+}
+
+impl TorqueForm {
+    /// Of a joint, without shape numbers.
+    pub fn at_joint(cause: &'static dyn TorqueCause, joint: usize, width: usize) -> Self {
+        Self { cause, place: Place::Joint(joint), with: [0; 2], shape: Vec::new(), width }
+    }
+
+    /// The same with shape numbers.
+    pub fn shaped(mut self, shape: &[f64]) -> Self {
+        self.shape = shape.to_vec();
+        self
+    }
+
+    /// Its joint, from 0; that of its link elsewhere.
+    pub fn joint(&self) -> usize {
+        match self.place {
+            Place::Joint(joint) => joint,
+            Place::Links(link, _) => link,
+            _ => 0,
+        }
+    }
+
+    /// Its link, from 0.
+    pub fn link(&self) -> usize {
+        self.joint()
+    }
+
+    /// Whether both are the same cause at the same place.
+    pub fn is_called_as(&self, other: &Self) -> bool {
+        self.cause.name() == other.cause.name() && self.place == other.place
+    }
+}
+
+/// A parameter that is one coefficient.
+fn plain(name: &str, fitted: Fitted, unit: &'static str) -> TorqueParameter {
+    TorqueParameter { name: name.into(), value: fitted.value, unit, sigma: Some(fitted.sigma) }
+}
+
+/// A shape number.
+fn shape(name: &str, value: f64, unit: &'static str) -> TorqueParameter {
+    TorqueParameter { name: name.into(), value, unit, sigma: None }
+}
+
+/// The forms of a cause that sits at each joint.
+fn at_each_joint(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize) -> Vec<TorqueForm> {
+    (0..scene.joints()).map(|joint| TorqueForm::at_joint(cause, joint, width)).collect()
+}
+
+/// The forms of a cause at each joint with each of some shape numbers.
+fn at_each_joint_with(cause: &'static dyn TorqueCause, scene: &DynamicScene, width: usize, shapes: &[&[f64]]) -> Vec<TorqueForm> {
+    let of = |joint| shapes.iter().map(move |shape| TorqueForm::at_joint(cause, joint, width).shaped(shape));
+    (0..scene.joints()).flat_map(of).collect()
+}
+
+/// Writes a function of the row.
+fn fill(out: &mut [f64], of: impl Fn(usize) -> f64) {
+    out.iter_mut().enumerate().for_each(|(row, value)| *value = of(row));
+}

@@ -1,0 +1,67 @@
+//! Friction that turns with the direction of motion only after a travel, and is kept at rest.
+
+use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, at_each_joint_with, plain, shape};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+
+/// z - sgn v with z' = (v - |v| z) / travel (Dahl, 1968).
+pub(super) struct Presliding;
+
+/// rad: the one that stands in the rich model, and all that are tried.
+const USUAL: f64 = 0.004;
+const TRAVELS: [&[f64]; 5] = [&[0.0006], &[0.0015], &[USUAL], &[0.01], &[0.025]];
+/// rad/s below which a joint is at rest.
+const REST: f64 = 2e-3;
+
+impl TorqueCause for Presliding {
+    fn name(&self) -> &'static str {
+        "presliding_friction"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        at_each_joint_with(&Presliding, scene, 1, &TRAVELS)
+    }
+
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        25.0
+    }
+
+    fn modifies(&self) -> &'static [&'static str] {
+        &[COULOMB]
+    }
+
+    fn is_positive(&self) -> bool {
+        true
+    }
+
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.shape == [USUAL]
+    }
+
+    fn spans(&self, _form: &TorqueForm) -> Vec<ShapeSpan> {
+        vec![ShapeSpan { index: 0, least: 3e-4, most: 0.05, by_ratio: true }]
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        let (velocity, travel) = (&scene.velocity[form.joint()], form.shape[0]);
+        for stretch in &scene.stretches {
+            let mut kept = 0.0;
+            for row in stretch.clone() {
+                let moved = if velocity[row].abs() > REST { velocity[row] / scene.rate } else { 0.0 };
+                if moved != 0.0 {
+                    kept = moved.signum() + (kept - moved.signum()) * (-moved.abs() / travel).exp();
+                }
+                out[row] = kept - scene.sign(velocity[row]);
+            }
+        }
+    }
+
+    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        vec![plain("kept", fitted[0], "Nm"), shape("travel", form.shape[0], "rad")]
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let [value, travel] = [fitted[0].value, form.shape[0]];
+        format!("friction of {} turns over a travel of {travel:.2e} rad and is kept at rest, {value:.3} Nm of it", form.place)
+    }
+}

@@ -1,0 +1,81 @@
+//! Torque that comes back with every turn, or part of a turn, of a joint or its motor.
+
+use super::{Fitted, TorqueCause, TorqueForm, fill, shape};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+
+/// Cosine and sine of an order; `with` holds the order and whether it is of the motor.
+pub(super) struct Ripple;
+
+/// Per turn of the joint.
+const ORDERS: usize = 8;
+/// Per turn of the motor.
+const MOTOR_ORDERS: usize = 2;
+/// Lowest orders stand in the rich model.
+const USUAL: usize = 4;
+
+impl Ripple {
+    fn periods(form: &TorqueForm) -> f64 {
+        form.with[0] as f64 * if form.with[1] == 1 { form.shape[0] } else { 1.0 }
+    }
+}
+
+impl TorqueCause for Ripple {
+    fn name(&self) -> &'static str {
+        "torque_ripple"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let mut forms = Vec::new();
+        for joint in 0..scene.joints() {
+            let mut add = |order: usize, motor: usize| {
+                let form = TorqueForm::at_joint(&Ripple, joint, 2).shaped(&[scene.arm.ratio[joint].abs()]);
+                forms.push(TorqueForm { with: [order, motor], ..form });
+            };
+            (1..=ORDERS).for_each(|order| add(order, 0));
+            if scene.arm.ratio[joint].abs() > ORDERS as f64 {
+                (1..=MOTOR_ORDERS).for_each(|order| add(order, 1));
+            }
+        }
+        forms
+    }
+
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.with[1] == 0 && form.with[0] <= USUAL
+    }
+
+    fn may_repeat(&self) -> bool {
+        true
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+        let (angle, periods) = (&scene.position[form.joint()], Self::periods(form));
+        match column {
+            0 => fill(out, |row| (periods * angle[row]).cos()),
+            _ => fill(out, |row| (periods * angle[row]).sin()),
+        }
+    }
+
+    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        let (amplitude, sigma) = amplitude(fitted);
+        let of = if form.with[1] == 1 { "motor_order" } else { "order" };
+        vec![
+            TorqueParameter { name: "amplitude".into(), value: amplitude, unit: "Nm", sigma: Some(sigma) },
+            shape("phase", fitted[1].value.atan2(fitted[0].value), "rad"),
+            shape(of, form.with[0] as f64, "1"),
+        ]
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let of = if form.with[1] == 1 { "its motor" } else { "the joint" };
+        let (amplitude, _) = amplitude(fitted);
+        format!("the torque of {} ripples by {amplitude:.3} Nm, {} times a turn of {of}", form.place, form.with[0])
+    }
+}
+
+/// Of a cosine and a sine, with its standard deviation.
+fn amplitude(fitted: &[Fitted]) -> (f64, f64) {
+    let amplitude = fitted[0].value.hypot(fitted[1].value);
+    let weighted = (fitted[0].value * fitted[0].sigma).hypot(fitted[1].value * fitted[1].sigma);
+    (amplitude, weighted / amplitude.max(f64::MIN_POSITIVE))
+}

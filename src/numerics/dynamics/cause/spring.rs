@@ -1,0 +1,50 @@
+//! Torque that grows with the angle of a joint: a balancing spring at joint 2, a cable or hose elsewhere.
+
+use super::{Fitted, TorqueCause, TorqueForm, plain};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+
+/// q and 1.
+pub(super) struct Spring {
+    name: &'static str,
+    balances: bool,
+}
+
+/// At the joint that arms balance.
+pub(super) static SPRING_BALANCE: Spring = Spring { name: "spring_balance", balances: true };
+/// At the others.
+pub(super) static CABLE_STIFFNESS: Spring = Spring { name: "cable_stiffness", balances: false };
+/// From 0.
+const BALANCED: usize = 1;
+
+impl TorqueCause for Spring {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let cause: &'static dyn TorqueCause = if self.balances { &SPRING_BALANCE } else { &CABLE_STIFFNESS };
+        let joints = (0..scene.joints()).filter(|joint| (*joint == BALANCED) == self.balances);
+        joints.map(|joint| TorqueForm::at_joint(cause, joint, 2)).collect()
+    }
+
+    fn is_rich(&self, _form: &TorqueForm) -> bool {
+        true
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+        match column {
+            0 => out.copy_from_slice(&scene.position[form.joint()]),
+            _ => out.fill(1.0),
+        }
+    }
+
+    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        vec![plain("stiffness", fitted[0], "Nm/rad"), plain("at_zero", fitted[1], "Nm")]
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let what = if self.balances { "a balancing spring" } else { "a cable or hose" };
+        format!("{what} acts on {} with {:.3} Nm/rad and {:.3} Nm at zero", form.place, fitted[0].value, fitted[1].value)
+    }
+}

@@ -1,0 +1,51 @@
+//! A current that stands for another torque than declared.
+
+use super::{Fitted, TorqueCause, TorqueForm, at_each_joint, plain};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+
+/// A current that stands for another torque than declared.
+pub(super) struct TorqueConstant;
+
+impl TorqueCause for TorqueConstant {
+    fn name(&self) -> &'static str {
+        "torque_constant"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        at_each_joint(&TorqueConstant, scene, 1)
+    }
+
+    fn price(&self, _form: &TorqueForm) -> f64 {
+        4.0
+    }
+
+    fn is_rich(&self, _form: &TorqueForm) -> bool {
+        true
+    }
+
+    fn is_inertial(&self) -> bool {
+        true
+    }
+
+    fn is_of_rigid(&self) -> bool {
+        true
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, _column: usize, out: &mut [f64]) {
+        let joint = form.joint();
+        out.copy_from_slice(&scene.rigid[joint]);
+    }
+
+    fn parameters(&self, _form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        vec![plain("relative", fitted[0], "1")]
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        format!(
+            "torques of {} read {:+.1} % off: its torque constant is not the declared one",
+            form.place,
+            100.0 * fitted[0].value
+        )
+    }
+}

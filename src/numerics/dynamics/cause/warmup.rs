@@ -1,0 +1,69 @@
+//! Friction that falls while the gear warms up.
+
+use super::{COULOMB, Fitted, ShapeSpan, TorqueCause, TorqueForm, VISCOUS, fill, plain, shape};
+use crate::dynamics::scene::DynamicScene;
+use crate::dynamics::types::TorqueParameter;
+
+/// exp(-t / T) times velocity and its sign.
+pub(super) struct Warmup;
+
+/// s.
+const TIMES: [f64; 9] = [2.0, 4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 120.0, 400.0];
+/// Of the recording: what lasts longer is friction that stays.
+const LONGEST: f64 = 0.45;
+/// s, the longest that stands in the rich model.
+const USUAL: f64 = 18.0;
+
+impl TorqueCause for Warmup {
+    fn name(&self) -> &'static str {
+        "warmup_friction"
+    }
+
+    fn forms(&self, scene: &DynamicScene) -> Vec<TorqueForm> {
+        let longest = LONGEST * scene.duration();
+        let times: Vec<f64> = TIMES.into_iter().filter(|time| *time <= longest).collect();
+        // The longest time serves the rich model; the second number marks it.
+        let rich = times.iter().copied().filter(|time| *time <= USUAL.max(longest / 3.0)).next_back();
+        let of = |joint| {
+            let form = move |time: &f64| {
+                TorqueForm::at_joint(&Warmup, joint, 2).shaped(&[*time, f64::from(u8::from(Some(*time) == rich)), longest])
+            };
+            times.iter().map(form).collect::<Vec<_>>()
+        };
+        (0..scene.joints()).flat_map(of).collect()
+    }
+
+    fn modifies(&self) -> &'static [&'static str] {
+        &[VISCOUS, COULOMB]
+    }
+
+    fn is_rich(&self, form: &TorqueForm) -> bool {
+        form.shape[1] == 1.0
+    }
+
+    fn spans(&self, form: &TorqueForm) -> Vec<ShapeSpan> {
+        vec![ShapeSpan { index: 0, least: 1.0, most: form.shape[2], by_ratio: true }]
+    }
+
+    fn write(&self, form: &TorqueForm, scene: &DynamicScene, _joint: usize, column: usize, out: &mut [f64]) {
+        let velocity = &scene.velocity[form.joint()];
+        let decay = |row: usize| (-scene.time[row] / form.shape[0]).exp();
+        match column {
+            0 => fill(out, |row| decay(row) * velocity[row]),
+            _ => fill(out, |row| decay(row) * scene.sign(velocity[row])),
+        }
+    }
+
+    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter> {
+        vec![
+            plain("viscous_cold", fitted[0], "Nm s/rad"),
+            plain("coulomb_cold", fitted[1], "Nm"),
+            shape("time", form.shape[0], "s"),
+        ]
+    }
+
+    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String {
+        let [viscous, coulomb, time] = [fitted[0].value, fitted[1].value, form.shape[0]];
+        format!("friction of {} begins {coulomb:.3} Nm and {viscous:.3} Nm s/rad higher and falls over {time:.1} s", form.place)
+    }
+}

@@ -1,0 +1,121 @@
+//! Sets of forms compared: what a form must gain, which may stand together, which in each other's place.
+
+use super::cause::{COULOMB, TorqueForm, VISCOUS};
+use super::problem::TorqueProblem;
+use super::sweep::Sweep;
+use super::weighted::WeightedColumns;
+
+/// The forms of one problem, and what each would gain.
+pub(super) struct CauseChoice<'a> {
+    pub problem: &'a TorqueProblem<'a>,
+    pub weighted: &'a WeightedColumns,
+    pub base: Sweep<'a>,
+    pub seed: u64,
+    /// Forms that may be chosen; trial forms of a refinement are none of them.
+    pub open: usize,
+}
+
+impl<'a> CauseChoice<'a> {
+    /// Over all forms of a problem.
+    pub fn new(problem: &'a TorqueProblem<'a>, weighted: &'a WeightedColumns, seed: u64) -> Self {
+        let base = Sweep::base(&problem.all, weighted);
+        Self { problem, weighted, base, seed, open: problem.all.listed }
+    }
+
+    pub fn form(&self, number: usize) -> &TorqueForm {
+        &self.problem.all.forms[number]
+    }
+
+    /// What a form of `rank` columns must gain.
+    pub fn penalty(&self, number: usize, rank: usize) -> f64 {
+        let form = self.form(number);
+        form.cause.price(form) + rank as f64 * (self.weighted.rows as f64).ln() + 2.0 * (self.open as f64).ln()
+    }
+
+    /// Gain beyond the penalty of a form, given a swept set.
+    pub fn worth(&self, sweep: &Sweep, number: usize) -> f64 {
+        let gain = sweep.gain(number);
+        if self.form(number).cause.is_positive() && !sweep.rises(number) {
+            return f64::NEG_INFINITY;
+        }
+        gain.square - self.penalty(number, gain.rank.max(1))
+    }
+
+    /// Whether a coefficient has a sign that its cause cannot have.
+    pub fn is_impossible(&self, number: usize, solution: &[(usize, f64)]) -> bool {
+        let first = self.problem.all.of(number).start;
+        let value = solution.iter().find(|(column, _)| *column == first).map_or(0.0, |(_, value)| *value);
+        self.form(number).cause.is_positive() && value <= 0.0
+    }
+
+    /// Criterion of a set: whitened squared residual, tolerances stretched, and penalties.
+    pub fn criterion(&self, set: &[usize]) -> f64 {
+        let mut sweep = self.base.clone();
+        let mut penalties = 0.0;
+        for number in set {
+            let rank = sweep.gain(*number).rank;
+            penalties += self.penalty(*number, rank);
+            sweep.add(*number);
+        }
+        sweep.square + penalties
+    }
+
+    /// Whether a form may join a set: once a name and place, and what modifies a friction after it.
+    pub fn may_join(&self, number: usize, set: &[usize]) -> bool {
+        let form = self.form(number);
+        let taken = |other: &usize| {
+            let other_form = self.form(*other);
+            *other == number || (form.is_called_as(other_form) && (!form.cause.may_repeat() || form.with == other_form.with))
+        };
+        !set.iter().any(taken) && self.has_what_it_modifies(number, set)
+    }
+
+    /// Whether the frictions that a form modifies are in a set.
+    fn has_what_it_modifies(&self, number: usize, set: &[usize]) -> bool {
+        let form = self.form(number);
+        let has = |name: &&str| {
+            set.iter().any(|other| self.form(*other).cause.name() == *name && self.form(*other).place == form.place)
+        };
+        form.cause.modifies().iter().all(has)
+    }
+
+    /// Whether all of a set have what they modify.
+    pub fn is_whole(&self, set: &[usize]) -> bool {
+        set.iter().all(|number| self.has_what_it_modifies(*number, set))
+    }
+
+    /// Viscous and Coulomb friction of every joint: hardly an arm is without.
+    pub fn common(&self) -> Vec<usize> {
+        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name());
+        (0..self.open).filter(common).collect()
+    }
+
+    /// Whether two forms may stand in each other's place: on one joint, or both wrong masses, drives or mounting.
+    pub fn compete(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (self.form(a), self.form(b));
+        a.place == b.place || (a.cause.is_inertial() && b.cause.is_inertial())
+    }
+}
+
+/// Removes what is not worth its penalty.
+pub(super) fn backward(choice: &CauseChoice, set: &mut Vec<usize>) {
+    loop {
+        let sweep = choice.base.with(set);
+        let solution = sweep.solution();
+        if let Some(place) = set.iter().position(|number| choice.is_impossible(*number, &solution)) {
+            set.remove(place);
+            continue;
+        }
+        let worth_of = |place: usize| {
+            let mut rest = set.clone();
+            let number = rest.remove(place);
+            let loss = sweep.loss(number, &solution);
+            choice.is_whole(&rest).then(|| (place, loss.square - choice.penalty(number, loss.rank.max(1))))
+        };
+        let least = (0..set.len()).filter_map(worth_of).min_by(|a, b| a.1.total_cmp(&b.1));
+        match least {
+            Some((place, worth)) if worth <= 0.0 => _ = set.remove(place),
+            _ => break,
+        }
+    }
+}

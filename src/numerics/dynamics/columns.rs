@@ -1,0 +1,114 @@
+//! Judged rows of the base and of every form, filtered and decimated alike.
+
+use super::base_parameters::base_parameters;
+use super::cause::{TORQUE_CAUSES, TorqueForm};
+use super::newton_euler::INERTIAL_NUMBERS;
+use super::reduce::Reduction;
+use super::regressor::{ReducedRegressor, TorqueColumn};
+use super::scene::DynamicScene;
+
+/// Base columns, then those of all forms, form after form.
+pub(super) struct TorqueColumns {
+    pub columns: Vec<TorqueColumn>,
+    /// Number of base columns.
+    pub base: usize,
+    /// Of the base: the link, and the change of its numbers per coefficient.
+    pub base_changes: Vec<(usize, [f64; INERTIAL_NUMBERS])>,
+    /// Of the base: 1 / variance of each coefficient beforehand.
+    pub prior: Vec<f64>,
+    pub forms: Vec<TorqueForm>,
+    /// Forms that causes list; later ones are trials of a refinement.
+    pub listed: usize,
+    /// First column of each form.
+    first: Vec<usize>,
+}
+
+/// 1 / variance, over the squared size of its column, of a coefficient of which nothing is known.
+const UNKNOWN_BEFOREHAND: f64 = 1e-9;
+
+impl TorqueColumns {
+    /// None.
+    pub fn empty() -> Self {
+        Self {
+            columns: Vec::new(),
+            base: 0,
+            base_changes: Vec::new(),
+            prior: Vec::new(),
+            forms: Vec::new(),
+            listed: 0,
+            first: Vec::new(),
+        }
+    }
+
+    /// The base, and all forms of all causes but `without`.
+    pub fn new(scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor, without: &[String]) -> Self {
+        let (base_changes, columns, prior) = base_columns(scene, regressor);
+        let mut all = Self { base: columns.len(), base_changes, columns, prior, forms: Vec::new(), listed: 0, first: Vec::new() };
+        let causes = TORQUE_CAUSES.iter().filter(|cause| without.iter().all(|name| name != cause.name()));
+        for form in causes.flat_map(|cause| cause.forms(scene)) {
+            all.push(form, scene, reduction, regressor);
+        }
+        all.listed = all.forms.len();
+        all
+    }
+
+    /// Takes another form; its number.
+    pub fn push(&mut self, form: TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> usize {
+        self.first.push(self.columns.len());
+        self.columns.extend(columns_of(&form, scene, reduction, regressor));
+        self.forms.push(form);
+        self.forms.len() - 1
+    }
+
+    /// Columns of forms that are made of the rigid torque, anew.
+    pub fn renew(&mut self, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) {
+        for number in 0..self.forms.len() {
+            if self.forms[number].cause.is_of_rigid() {
+                let fresh = columns_of(&self.forms[number], scene, reduction, regressor);
+                let range = self.of(number);
+                self.columns[range].clone_from_slice(&fresh);
+            }
+        }
+    }
+
+    /// Columns of a form.
+    pub fn of(&self, form: usize) -> std::ops::Range<usize> {
+        self.first[form]..self.first[form] + self.forms[form].width
+    }
+}
+
+/// A form's columns.
+fn columns_of(form: &TorqueForm, scene: &DynamicScene, reduction: &Reduction, regressor: &ReducedRegressor) -> Vec<TorqueColumn> {
+    if let Some(changes) = scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared)) {
+        return changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
+    }
+    let (mut whole, mut room) = (vec![0.0; scene.rows()], Vec::new());
+    let joints = form.cause.acts_on(form, scene.joints());
+    let mut columns = vec![TorqueColumn { joints: joints.clone(), courses: Vec::new() }; form.width];
+    for (number, column) in columns.iter_mut().enumerate() {
+        for joint in &joints {
+            form.cause.write(form, scene, *joint, number, &mut whole);
+            column.courses.push(reduction.reduce(&mut whole, &mut room));
+        }
+    }
+    columns
+}
+
+/// Changes of links' numbers with their columns and 1 / variance beforehand.
+type Base = (Vec<(usize, [f64; INERTIAL_NUMBERS])>, Vec<TorqueColumn>, Vec<f64>);
+
+/// One standard deviation of each declared number, or the base parameters where none are declared.
+fn base_columns(scene: &DynamicScene, regressor: &ReducedRegressor) -> Base {
+    let unit = |number: usize| std::array::from_fn(|entry| f64::from(u8::from(entry == number % INERTIAL_NUMBERS)));
+    let changes: Vec<(usize, [f64; INERTIAL_NUMBERS])> = match &scene.declared {
+        Some(declared) => {
+            declared.tolerance.iter().enumerate().flat_map(|(link, all)| all.iter().map(move |ten| (link, *ten))).collect()
+        }
+        None => base_parameters(regressor).into_iter().map(|number| (number / INERTIAL_NUMBERS, unit(number))).collect(),
+    };
+    let columns: Vec<TorqueColumn> = changes.iter().map(|(link, ten)| regressor.column(*link, ten)).collect();
+    let square = |column: &TorqueColumn| column.courses.iter().flatten().map(|value| value * value).sum::<f64>();
+    let of = |column: &TorqueColumn| if scene.declared.is_some() { 1.0 } else { UNKNOWN_BEFOREHAND * square(column) };
+    let prior = columns.iter().map(of).collect();
+    (changes, columns, prior)
+}

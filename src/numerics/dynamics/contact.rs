@@ -1,0 +1,158 @@
+//! Pushes on the arm: times whose residual stands far above the rest and which one force at the tool explains.
+
+use super::problem::TorqueProblem;
+use super::types::ContactEvent;
+use crate::statistics::nearest;
+use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::PI;
+
+/// s over which the squared residual is averaged.
+const AVERAGED: f64 = 0.8;
+/// Events of a recording, at most.
+const MOST: usize = 4;
+/// Median absolute deviations above the median, and times the median, at which a time is looked at.
+const DEVIATIONS: f64 = 8.0;
+const TIMES_USUAL: f64 = 3.0;
+/// s that are tried.
+const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
+/// s beside the highest point that are tried as middles: steps on either side, and their length.
+const STEPS: i32 = 6;
+const STEP: f64 = 0.1;
+/// s by which start and end are then moved, so many steps on either side.
+const FINE: [f64; 2] = [0.08, 0.02];
+const FINE_STEPS: i32 = 3;
+/// Judged rows of an event, at least.
+const FEWEST: usize = 4;
+/// s on either side of an event where no other is looked for.
+const APART: f64 = 1.6;
+/// What a force must gain, and which share of the residual it must explain.
+const GAIN: f64 = 150.0;
+const SHARE: f64 = 0.6;
+/// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
+const MOVING: f64 = 0.3;
+
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time; only fitted rows are
+/// looked at where the residual is of a model too rich for others.
+pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], fitted_only: bool) -> Vec<ContactEvent> {
+    let rows = problem.reduction.rows.len();
+    let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
+    let energy: Vec<f64> = (0..rows)
+        .map(|row| {
+            residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
+        })
+        .collect();
+    let shown: Vec<usize> = (0..rows).filter(|row| !fitted_only || !problem.is_held_out(*row)).collect();
+    let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
+    let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
+    let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
+    let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
+    let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
+    let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
+    for _ in 0..MOST {
+        let free = (0..shown.len()).filter(|row| !used[*row]);
+        let Some(highest) = free.max_by(|a, b| average[*a].total_cmp(&average[*b])) else { break };
+        if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
+            break;
+        }
+        let found = best_window(problem, residual, sigma, &time, time[shown[highest]]);
+        events.extend(found.filter(|event| moves(problem, &time, event)));
+        let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
+        (0..shown.len()).filter(near).for_each(|row| used[row] = true);
+    }
+    events.sort_by(|a: &ContactEvent, b| a.start.total_cmp(&b.start));
+    events
+}
+
+/// The window about `middle` in which a force gains most, if it explains the residual there.
+fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], time: &[f64], middle: f64) -> Option<ContactEvent> {
+    let mut best: Option<(ContactEvent, f64)> = None;
+    let mut look = |start: f64, duration: f64| {
+        let first = time.partition_point(|time| *time < start);
+        let last = time.partition_point(|time| *time <= start + duration);
+        if last >= first + FEWEST {
+            let (event, share) = pushed(problem, residual, sigma, time, start, duration, first..last);
+            if best.as_ref().is_none_or(|(known, _)| event.gain > known.gain) {
+                best = Some((event, share));
+            }
+        }
+        best.as_ref().map(|(event, _)| (event.start, event.end - event.start))
+    };
+    let mut now = None;
+    for duration in DURATIONS {
+        for step in -STEPS..=STEPS {
+            now = look(middle + STEP * f64::from(step) - 0.5 * duration, duration);
+        }
+    }
+    for fine in FINE {
+        let (start, duration) = now?;
+        for steps in (-FINE_STEPS..=FINE_STEPS).flat_map(|begin| (-FINE_STEPS..=FINE_STEPS).map(move |end| [begin, end])) {
+            let [begin, end] = steps.map(|steps| fine * f64::from(steps));
+            now = look(start + begin, duration + end - begin);
+        }
+    }
+    best.filter(|(event, share)| event.gain > GAIN && *share > SHARE).map(|(event, _)| event)
+}
+
+/// A push that rises and falls as sin^2 over a window, fitted; and the share of the squared residual that it explains.
+fn pushed(
+    problem: &TorqueProblem,
+    residual: &[Vec<f64>],
+    sigma: &[f64],
+    time: &[f64],
+    start: f64,
+    duration: f64,
+    rows: std::ops::Range<usize>,
+) -> (ContactEvent, f64) {
+    let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    let mut by_joint = vec![0.0; sigma.len()];
+    for row in rows {
+        let push = (PI * (time[row] - start) / duration).sin().powi(2);
+        let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
+        for (joint, along) in jacobian.iter().enumerate() {
+            let (column, value) = (-along * push / sigma[joint], residual[joint][row] / sigma[joint]);
+            gram += column * column.transpose();
+            right += column * value;
+            square += value * value;
+            by_joint[joint] += value * value;
+        }
+    }
+    let ridge = 1e-8 * gram.trace();
+    let inverse = (gram + Matrix3::identity() * ridge).try_inverse().unwrap_or_else(Matrix3::zeros);
+    let force = inverse * right;
+    let gain = 2.0 * force.dot(&right) - force.dot(&(gram * force));
+    let mut joints: Vec<usize> = (0..sigma.len()).collect();
+    joints.sort_by(|a, b| by_joint[*b].total_cmp(&by_joint[*a]));
+    joints.truncate(2);
+    let event = ContactEvent {
+        start,
+        end: start + duration,
+        joints,
+        force: force.into(),
+        sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
+        gain,
+    };
+    (event, gain / square.max(f64::MIN_POSITIVE))
+}
+
+/// Whether the arm moves in a good part of an event.
+fn moves(problem: &TorqueProblem, time: &[f64], event: &ContactEvent) -> bool {
+    let rows: Vec<usize> = (0..time.len()).filter(|row| time[*row] >= event.start && time[*row] <= event.end).collect();
+    let scene = &problem.scene;
+    let moving = rows.iter().filter(|row| {
+        let row = problem.reduction.rows[**row];
+        scene.velocity.iter().any(|course| course[row].abs() > 2.0 * scene.sign_width)
+    });
+    moving.count() as f64 >= MOVING * rows.len() as f64
+}
+
+/// Mean over `width` values about each; beyond the ends there is nothing.
+fn averaged(values: &[f64], width: usize) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    values.iter().for_each(|value| sums.push(sums[sums.len() - 1] + value));
+    let of = |row: usize| {
+        let first = (row + 1).saturating_sub(width - width / 2).min(values.len());
+        let last = (row + width / 2 + 1).min(values.len());
+        (sums[last] - sums[first.min(last)]) / width as f64
+    };
+    (0..values.len()).map(of).collect()
+}

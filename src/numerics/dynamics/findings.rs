@@ -1,0 +1,174 @@
+//! What was found in words and numbers: sizes, evidence, rivals, probabilities.
+
+use super::cause::Fitted;
+use super::choice::CauseChoice;
+use super::problem::TorqueProblem;
+use super::sweep::Sweep;
+use super::types::{ContactEvent, TorqueEvidence, TorqueFinding, TorqueParameter, TorqueRival};
+use crate::diagnose::Probabilities;
+use crate::effect::Place;
+use crate::estimate::tail;
+
+/// A rival whose criterion is worse by more is none.
+const FARTHEST: f64 = 14.0;
+/// True shapes differ a little from those of the library: differences of the criterion count for less than their exponent.
+const TEMPERATURE: f64 = 2.0;
+/// Residual rows of a test, at most: beyond it the tail does not change.
+const FREEDOM: f64 = 1e4;
+
+/// Findings of a judged set, strongest first.
+pub(super) fn findings(choice: &CauseChoice, set: &[usize], held_out: &[usize]) -> Vec<TorqueFinding> {
+    let sweep = choice.base.with(set);
+    let solution = sweep.solution();
+    let mut found: Vec<TorqueFinding> =
+        set.iter().map(|number| finding(choice, set, &sweep, &solution, *number, held_out)).collect();
+    found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
+    found
+}
+
+fn finding(
+    choice: &CauseChoice,
+    set: &[usize],
+    sweep: &Sweep,
+    solution: &[(usize, f64)],
+    number: usize,
+    held_out: &[usize],
+) -> TorqueFinding {
+    let (problem, form) = (choice.problem, choice.form(number));
+    let fitted = fitted(problem, sweep, solution, number);
+    let rest: Vec<usize> = set.iter().copied().filter(|other| *other != number).collect();
+    let without = choice.base.with(&rest);
+    let loss = sweep.loss(number, solution);
+    let rank = loss.rank.max(1) as f64;
+    let delta_bic = loss.square - rank * (choice.weighted.rows as f64).ln();
+    let own: Vec<(usize, f64)> = solution.iter().copied().filter(|(column, _)| problem.all.of(number).contains(column)).collect();
+    let effect = problem.predicted(&own);
+    let count =
+        effect.iter().filter(|course| course.iter().any(|value| *value != 0.0)).count().max(1) * problem.reduction.rows.len();
+    let square: f64 = effect.iter().flatten().map(|value| value * value).sum();
+    let mut finding = TorqueFinding {
+        effect: form.cause.name(),
+        place: form.place,
+        statement: form.cause.statement(form, &fitted),
+        parameters: form.cause.parameters(form, &fitted),
+        evidence: TorqueEvidence {
+            gain: loss.square,
+            f_statistic: loss.square / rank,
+            p_value: tail(loss.square / rank, rank, FREEDOM),
+            delta_bic,
+            heldout_gain: (!held_out.is_empty()).then(|| held_out_gain(problem, &without, solution, held_out)),
+            effect_rms: (square / count as f64).sqrt(),
+        },
+        rivals: rivals(choice, &rest, &without, number, loss.square),
+        probabilities: Probabilities::default(),
+    };
+    weigh(&mut finding, loss.square - choice.penalty(number, loss.rank.max(1)));
+    finding
+}
+
+/// Coefficients of a form with their standard deviations.
+fn fitted(problem: &TorqueProblem, sweep: &Sweep, solution: &[(usize, f64)], number: usize) -> Vec<Fitted> {
+    let columns: Vec<usize> = problem.all.of(number).collect();
+    let covariance = sweep.covariance(&columns);
+    let of = |(place, column): (usize, &usize)| Fitted {
+        value: solution.iter().find(|(pivot, _)| pivot == column).map_or(0.0, |(_, value)| *value),
+        sigma: covariance[place * (columns.len() + 1)].max(0.0).sqrt(),
+    };
+    columns.iter().enumerate().map(of).collect()
+}
+
+/// Fall of the rms of held-out rows, Nm, over all joints.
+fn held_out_gain(problem: &TorqueProblem, without: &Sweep, solution: &[(usize, f64)], rows: &[usize]) -> f64 {
+    let rms = |residual: &[Vec<f64>]| {
+        let square: f64 = residual.iter().flat_map(|course| rows.iter().map(|row| course[*row].powi(2))).sum();
+        (square / (rows.len() * residual.len()) as f64).sqrt()
+    };
+    rms(&problem.residual(&without.solution())) - rms(&problem.residual(solution))
+}
+
+/// Other names or places that explain nearly as much, the best form of each; closest first.
+fn rivals(choice: &CauseChoice, rest: &[usize], without: &Sweep, number: usize, gain: f64) -> Vec<TorqueRival> {
+    let own = gain - choice.penalty(number, choice.form(number).width);
+    let mut rivals: Vec<TorqueRival> = Vec::new();
+    let others = (0..choice.open).filter(|other| choice.compete(*other, number) && choice.may_join(*other, rest));
+    for other in others.filter(|other| !choice.form(*other).is_called_as(choice.form(number))) {
+        let form = choice.form(other);
+        let delta_bic = own - choice.worth(without, other);
+        if delta_bic > FARTHEST {
+            continue;
+        }
+        let rival = TorqueRival { effect: form.cause.name(), place: form.place, delta_bic, probability: 0.0 };
+        match rivals.iter_mut().find(|known| known.effect == rival.effect && known.place == rival.place) {
+            Some(known) => known.delta_bic = known.delta_bic.min(delta_bic),
+            None => rivals.push(rival),
+        }
+    }
+    rivals.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
+    rivals
+}
+
+/// Shares what is not nothing at all among the name and its rivals.
+fn weigh(finding: &mut TorqueFinding, worth: f64) {
+    let weight = |delta: f64| (-delta.max(0.0) / (2.0 * TEMPERATURE)).exp();
+    let none = 0.5 * weight(worth.max(0.0)) + 0.01;
+    let whole = 1.0 + finding.rivals.iter().map(|rival| weight(rival.delta_bic)).sum::<f64>();
+    let mut here = 1.0;
+    for rival in &mut finding.rivals {
+        let share = weight(rival.delta_bic);
+        rival.probability = (1.0 - none) * share / whole;
+        here += if rival.place == finding.place { share } else { 0.0 };
+    }
+    finding.probabilities = Probabilities { name: (1.0 - none) / whole, place: (1.0 - none) * here / whole, none };
+}
+
+/// A finding that has no rivals in the pool: a latency, a contact.
+pub(super) fn plain_finding(
+    effect: &'static str,
+    place: Place,
+    statement: String,
+    parameters: Vec<TorqueParameter>,
+    gain: f64,
+    columns: f64,
+) -> TorqueFinding {
+    let mut finding = TorqueFinding {
+        effect,
+        place,
+        statement,
+        parameters,
+        evidence: TorqueEvidence {
+            gain,
+            f_statistic: gain / columns,
+            p_value: tail(gain / columns, columns, FREEDOM),
+            delta_bic: gain - columns * FREEDOM.ln(),
+            heldout_gain: None,
+            effect_rms: 0.0,
+        },
+        rivals: Vec::new(),
+        probabilities: Probabilities::default(),
+    };
+    weigh(&mut finding, gain);
+    finding
+}
+
+/// A push on the arm.
+pub(super) fn contact(event: &ContactEvent) -> TorqueFinding {
+    let joints: Vec<String> = event.joints.iter().map(|joint| (joint + 1).to_string()).collect();
+    let size = event.force.iter().map(|force| force * force).sum::<f64>().sqrt();
+    let number = |name: &str, value: f64, unit: &'static str, sigma: Option<f64>| TorqueParameter {
+        name: name.into(),
+        value,
+        unit,
+        sigma,
+    };
+    let mut parameters = vec![number("start", event.start, "s", None), number("end", event.end, "s", None)];
+    for (axis, name) in ["force_x", "force_y", "force_z"].iter().enumerate() {
+        parameters.push(number(name, event.force[axis], "N", Some(event.sigma[axis])));
+    }
+    let statement = format!(
+        "something touches the arm from {:.1} s to {:.1} s, most at joints {}: as {size:.0} N at the tool would",
+        event.start,
+        event.end,
+        joints.join(" and ")
+    );
+    plain_finding(super::CONTACT, Place::Arm, statement, parameters, event.gain, 3.0)
+}

@@ -1,0 +1,86 @@
+//! Torques of a moving arm: which physics a rigid inverse dynamics lacks.
+
+mod arm;
+mod base_parameters;
+mod bootstrap;
+#[cfg(test)]
+mod cases;
+mod cause;
+mod check;
+mod choice;
+mod clock;
+mod columns;
+mod contact;
+mod derivatives;
+mod errors;
+mod filter;
+mod findings;
+mod friction_curve;
+mod inertials;
+mod judge;
+mod latency;
+mod leftover;
+mod newton_euler;
+mod noise;
+mod outcome;
+mod problem;
+mod recording;
+mod reduce;
+mod refine;
+mod regressor;
+mod rich;
+mod scene;
+mod search;
+mod sign_width;
+mod solve;
+mod sweep;
+mod types;
+mod unseen;
+mod weighted;
+
+pub use arm::{DynamicArm, Inertial, InertialTolerance};
+pub use newton_euler::{INERTIAL_NUMBERS, InverseDynamics, JointMotion};
+pub use recording::TorqueRecording;
+pub use types::{
+    ContactEvent, FrictionCurve, InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueErrors, TorqueEvidence,
+    TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter, TorqueQuestion, TorqueRival,
+};
+
+use crate::error::{Error, Result};
+use clock::Clock;
+
+/// What torques that come late are called.
+const LATENCY: &str = "current_latency";
+/// What a push on the arm is called.
+const CONTACT: &str = "contact";
+/// Hz: the cut-off of the low-pass, where nothing else is asked.
+const CUTOFF: f64 = 10.0;
+/// Rows of the longest stretch without a jump, at least.
+const LEAST_STRETCH: usize = 200;
+/// At most this share of the rate.
+const HIGHEST_CUTOFF: f64 = 0.3;
+
+/// Diagnoses a recording of torques; `tell` receives the progress, a line each.
+///
+/// # Errors
+/// [`crate::error::Error::Data`] where the recording cannot be used: sizes, a clock that jumps, constant columns, units, or an arm that
+/// hardly moves.
+pub fn diagnose(
+    arm: &DynamicArm,
+    recording: &TorqueRecording,
+    question: &TorqueQuestion,
+    tell: &mut dyn FnMut(String),
+) -> Result<TorqueDiagnosis> {
+    check::check(arm, recording)?;
+    let clock = Clock::of(recording);
+    if clock.stretches.iter().all(|stretch| stretch.len() < LEAST_STRETCH) {
+        return Err(Error::data(
+            "time",
+            format!("the clock or a joint jumps in every {LEAST_STRETCH} rows: nothing can be filtered"),
+        ));
+    }
+    let remarks = check::remarks(recording, &clock);
+    let cutoff = question.cutoff.unwrap_or(CUTOFF).min(HIGHEST_CUTOFF * clock.rate);
+    let solved = solve::solve(arm, recording, question, &clock, cutoff, tell);
+    Ok(outcome::outcome(&solved, question.seed, remarks))
+}

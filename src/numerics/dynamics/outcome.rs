@@ -1,0 +1,176 @@
+//! The answer to a diagnosis of torques, from what was solved.
+
+use super::choice::CauseChoice;
+use super::errors::{errors, rests};
+use super::findings::{contact, findings, plain_finding};
+use super::friction_curve::friction_curves;
+use super::newton_euler::INERTIAL_NUMBERS;
+use super::noise::JointNoise;
+use super::problem::TorqueProblem;
+use super::solve::SolvedTorques;
+use super::sweep::Sweep;
+use super::types::{
+    InertialBasis, InertialEstimate, TorqueCourses, TorqueDiagnosis, TorqueFinding, TorqueLeftover, TorqueNoise, TorqueParameter,
+};
+use super::unseen::not_observable;
+use crate::diagnose::VerdictKind;
+use crate::effect::Place;
+use crate::error::counted;
+
+/// Times the noise beyond which held-out rows are not explained.
+const UNEXPLAINED: f64 = 1.5;
+/// Rows that count as one, from which on a residual is no noise.
+const LASTING: f64 = 8.0;
+
+/// All of it.
+pub(super) fn outcome(solved: &SolvedTorques, seed: u64, remarks: Vec<String>) -> TorqueDiagnosis {
+    let problem = &solved.problem;
+    let choice = CauseChoice::new(problem, &solved.weighted, seed);
+    let set = &solved.judged.set;
+    let sweep = choice.base.with(set);
+    let solution = sweep.solution();
+    let (first, last) = (problem.residual(&choice.base.solution()), problem.residual(&solution));
+    let counted_rows = |held_out: bool| problem.runs(held_out).into_iter().flatten().collect::<Vec<usize>>();
+    let held = counted_rows(true);
+    let judging = if held.is_empty() { counted_rows(false) } else { held.clone() };
+    let (before, after) = (errors(problem, &first, &judging), errors(problem, &last, &judging));
+    let mut found = findings(&choice, set, &held);
+    found.extend(problem.events.iter().map(contact));
+    found.extend(solved.latency.as_ref().map(late));
+    found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
+    let leftover = leftover(problem, &last);
+    let over = after.rms.iter().zip(&problem.noise).map(|(rms, noise)| rms / noise.sigma).fold(0.0, f64::max);
+    let verdict = match over > UNEXPLAINED {
+        true => VerdictKind::Unexplained,
+        false if found.is_empty() => VerdictKind::NothingMissing,
+        false => VerdictKind::Explained,
+    };
+    TorqueDiagnosis {
+        verdict,
+        statement: statement(verdict, &found, [before.nrmse_mean, after.nrmse_mean], over),
+        remarks,
+        basis: match problem.scene.declared {
+            Some(_) => InertialBasis::Declared,
+            None => InertialBasis::Free(problem.all.base),
+        },
+        cutoff: problem.reduction.cutoff,
+        rate: problem.reduction.rate,
+        noise: problem.noise.iter().map(|n| TorqueNoise { sigma: n.sigma, autocorrelation: n.autocorrelation() }).collect(),
+        before,
+        after,
+        held_out: !held.is_empty(),
+        findings: found,
+        withdrawn: withdrawn(&choice, &solved.judged.withdrawn),
+        not_observable: not_observable(&choice, set, &sweep),
+        leftover,
+        events: problem.events.clone(),
+        courses: courses(problem, &first, &last),
+        inertials: inertials(problem, set, &sweep, &solution),
+        friction: friction_curves(problem, set, &sweep),
+    }
+}
+
+fn late(latency: &super::latency::Latency) -> TorqueFinding {
+    let milliseconds = 1e3 * latency.seconds;
+    let parameter = TorqueParameter { name: "latency".into(), value: milliseconds, unit: "ms", sigma: Some(1e3 * latency.sigma) };
+    let statement = format!("torques come {milliseconds:.1} ms later than the positions beside them");
+    plain_finding(super::LATENCY, Place::Recording, statement, vec![parameter], latency.gain, 1.0)
+}
+
+fn statement(verdict: VerdictKind, found: &[TorqueFinding], nrmse: [f64; 2], over: f64) -> String {
+    let falls = format!("mean NRMSE of judged rows {:.3} before, {:.3} after", nrmse[0], nrmse[1]);
+    match verdict {
+        VerdictKind::NothingMissing => format!("the rigid arm explains the torques down to their noise ({falls})"),
+        VerdictKind::Explained => format!("{} bring the torques down to their noise ({falls})", counted(found.len(), "finding")),
+        _ => format!("{} leave up to {over:.1} times the noise ({falls})", counted(found.len(), "finding")),
+    }
+}
+
+fn withdrawn(choice: &CauseChoice, withdrawn: &[(usize, f64)]) -> Vec<String> {
+    let sentence = |(number, gain): &(usize, f64)| {
+        let form = choice.form(*number);
+        format!(
+            "{} at {}: held-out rows do not confirm it (their squared error changes by {gain:.1})",
+            form.cause.name(),
+            form.place
+        )
+    };
+    withdrawn.iter().map(sentence).collect()
+}
+
+/// What is left of fitted rows.
+fn leftover(problem: &TorqueProblem, residual: &[Vec<f64>]) -> Vec<TorqueLeftover> {
+    let runs = problem.runs(false);
+    let of = |(joint, course): (usize, &Vec<f64>)| {
+        let noise = JointNoise::of(course, &runs, 0.0);
+        let lasting = noise.autocorrelation();
+        let signature =
+            (lasting > LASTING).then(|| format!("joint {}: it lasts over {lasting:.0} rows: no white noise", joint + 1));
+        TorqueLeftover { rms: noise.sigma, over_noise: noise.sigma / problem.noise[joint].sigma, signature }
+    };
+    residual.iter().enumerate().map(of).collect()
+}
+
+fn courses(problem: &TorqueProblem, first: &[Vec<f64>], last: &[Vec<f64>]) -> TorqueCourses {
+    let (n, rows) = (problem.joints(), problem.reduction.rows.len());
+    let torque: Vec<Vec<f64>> = (0..n).map(|joint| problem.torque_at(joint, problem.latency)).collect();
+    let each = |value: &dyn Fn(usize, usize) -> f64| {
+        (0..rows).flat_map(|row| (0..n).map(move |joint| value(joint, row))).collect::<Vec<f64>>()
+    };
+    let declared = problem.scene.declared.is_some();
+    TorqueCourses {
+        row: problem.reduction.rows.clone(),
+        time: problem.reduction.rows.iter().map(|row| problem.start + problem.scene.time[*row]).collect(),
+        held_out: (0..rows).map(|row| problem.is_held_out(row)).collect(),
+        in_event: (0..rows).map(|row| problem.in_event(row)).collect(),
+        at_rest: (0..rows).flat_map(|row| (0..n).map(move |joint| rests(problem, joint, row))).collect(),
+        velocity: each(&|joint, row| problem.scene.velocity[joint][problem.reduction.rows[row]]),
+        measured: each(&|joint, row| torque[joint][row]),
+        simulated: each(&|joint, row| {
+            torque[joint][row] - if declared { problem.measured[joint][row] } else { first[joint][row] }
+        }),
+        corrected: each(&|joint, row| torque[joint][row] - last[joint][row]),
+    }
+}
+
+fn inertials(problem: &TorqueProblem, set: &[usize], sweep: &Sweep, solution: &[(usize, f64)]) -> Vec<InertialEstimate> {
+    const NAMES: [&str; INERTIAL_NUMBERS] = [
+        "mass",
+        "moment_x",
+        "moment_y",
+        "moment_z",
+        "inertia_xx",
+        "inertia_xy",
+        "inertia_xz",
+        "inertia_yy",
+        "inertia_yz",
+        "inertia_zz",
+    ];
+    const UNITS: [&str; 3] = ["kg", "kg m", "kg m2"];
+    let theta = problem.inertials(set, solution);
+    let mut estimates = Vec::new();
+    for link in 0..problem.joints() {
+        let changes = problem.inertial_changes(set, link);
+        let columns: Vec<usize> = changes.iter().map(|(column, _)| *column).collect();
+        let covariance = sweep.covariance(&columns);
+        for number in 0..INERTIAL_NUMBERS {
+            let along: Vec<f64> = changes.iter().map(|(_, ten)| ten[number]).collect();
+            let declared = problem.scene.declared.as_ref().map(|all| all.theta[INERTIAL_NUMBERS * link + number]);
+            if declared.is_none() && along.iter().all(|share| *share == 0.0) {
+                continue;
+            }
+            let count = along.len();
+            let variance: f64 =
+                (0..count * count).map(|entry| along[entry / count] * along[entry % count] * covariance[entry]).sum();
+            estimates.push(InertialEstimate {
+                link,
+                quantity: NAMES[number],
+                unit: UNITS[usize::from(number > 0) + usize::from(number > 3)],
+                value: theta[INERTIAL_NUMBERS * link + number],
+                declared,
+                sigma: variance.max(0.0).sqrt(),
+            });
+        }
+    }
+    estimates
+}

@@ -1,0 +1,253 @@
+//! A recording prepared for least squares: measured and rigid torque, base and forms in judged rows, and which of these count.
+
+use super::arm::DynamicArm;
+use super::cause::TorqueForm;
+use super::clock::Clock;
+use super::columns::TorqueColumns;
+use super::newton_euler::INERTIAL_NUMBERS;
+use super::noise::JointNoise;
+use super::recording::TorqueRecording;
+use super::reduce::Reduction;
+use super::regressor::ReducedRegressor;
+use super::scene::{DynamicScene, column};
+use super::types::{ContactEvent, TorqueQuestion};
+use super::weighted::{Weighing, WeightedColumns};
+use std::ops::Range;
+
+/// s around an event whose rows do not count either.
+const EVENT_MARGIN: f64 = 0.3;
+
+/// What all steps work on.
+pub(super) struct TorqueProblem<'a> {
+    pub scene: DynamicScene<'a>,
+    /// s, of the first row.
+    pub start: f64,
+    pub reduction: Reduction,
+    pub regressor: ReducedRegressor,
+    pub all: TorqueColumns,
+    /// 10 n numbers from which the base is counted.
+    pub theta: Vec<f64>,
+    /// `[joint][row]`, rows as recorded, filtered.
+    torque: Vec<Vec<f64>>,
+    /// s by which torques come late.
+    pub latency: f64,
+    /// `[joint]`: measured minus rigid torque of judged rows.
+    pub measured: Vec<Vec<f64>>,
+    /// Of judged rows.
+    held_out: Vec<bool>,
+    pub events: Vec<ContactEvent>,
+    pub noise: Vec<JointNoise>,
+}
+
+impl<'a> TorqueProblem<'a> {
+    /// Of a checked recording.
+    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, question: &TorqueQuestion, clock: &Clock, cutoff: f64) -> Self {
+        let scene = DynamicScene::new(arm, recording, clock, cutoff, question.free_inertials);
+        let reduction = Reduction::new(clock, cutoff);
+        let regressor = ReducedRegressor::of(&scene, &reduction);
+        let mut room = Vec::new();
+        let filtered = |joint: usize| {
+            let mut course = column(&recording.torque, recording.joints, joint);
+            reduction.filter(&mut course, &mut room);
+            course
+        };
+        let torque = (0..recording.joints).map(filtered).collect();
+        let theta = scene.declared.as_ref().map_or_else(|| vec![0.0; 10 * recording.joints], |declared| declared.theta.clone());
+        let mut problem = Self {
+            held_out: reduction.rows.iter().map(|row| recording.held_out[*row]).collect(),
+            all: TorqueColumns::empty(),
+            scene,
+            start: recording.time[0],
+            reduction,
+            regressor,
+            theta,
+            torque,
+            latency: 0.0,
+            measured: Vec::new(),
+            events: Vec::new(),
+            noise: Vec::new(),
+        };
+        problem.shift(0.0);
+        problem
+    }
+
+    /// Forms the columns.
+    pub fn form(&mut self, without: &[String]) {
+        self.all = TorqueColumns::new(&self.scene, &self.reduction, &self.regressor, without);
+    }
+
+    /// Takes a trial form; its number.
+    pub fn push(&mut self, form: TorqueForm) -> usize {
+        self.all.push(form, &self.scene, &self.reduction, &self.regressor)
+    }
+
+    /// Columns that change a link's inertial numbers, and by what: of the base, and of the forms of a set.
+    pub fn inertial_changes(&self, set: &[usize], link: usize) -> Vec<(usize, [f64; INERTIAL_NUMBERS])> {
+        let base = self.all.base_changes.iter().enumerate();
+        let mut changes: Vec<_> = base.filter(|(_, (own, _))| *own == link).map(|(column, (_, ten))| (column, *ten)).collect();
+        for number in set {
+            let form = &self.all.forms[*number];
+            let of_form = self.scene.declared.as_ref().and_then(|declared| form.cause.inertial(form, declared));
+            let columns = self.all.of(*number).zip(of_form.into_iter().flatten());
+            changes.extend(columns.filter(|(_, (own, _))| *own == link).map(|(column, (_, ten))| (column, ten)));
+        }
+        changes
+    }
+
+    /// Inertial numbers with what coefficients change of them.
+    pub fn inertials(&self, set: &[usize], solution: &[(usize, f64)]) -> Vec<f64> {
+        let mut theta = self.theta.clone();
+        for link in 0..self.joints() {
+            let own = &mut theta[INERTIAL_NUMBERS * link..INERTIAL_NUMBERS * (link + 1)];
+            for (column, ten) in self.inertial_changes(set, link) {
+                if let Some((_, value)) = solution.iter().find(|(pivot, _)| *pivot == column) {
+                    own.iter_mut().zip(ten).for_each(|(sum, part)| *sum += value * part);
+                }
+            }
+        }
+        theta
+    }
+
+    /// Makes columns of the rigid torque anew, from the inertial numbers of a fit.
+    pub fn believe(&mut self, theta: &[f64]) {
+        self.scene.believe(theta);
+        self.all.renew(&self.scene, &self.reduction, &self.regressor);
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.measured.len()
+    }
+
+    /// s, of judged rows, from the first recorded one.
+    pub fn time(&self, row: usize) -> f64 {
+        self.scene.time[self.reduction.rows[row]]
+    }
+
+    /// Measured torque of judged rows, as it was `latency` s later.
+    pub fn torque_at(&self, joint: usize, latency: f64) -> Vec<f64> {
+        let course = &self.torque[joint];
+        let stretch_of = |row: usize| self.scene.stretches.iter().find(|stretch| stretch.contains(&row));
+        let at = |row: &usize| {
+            let stretch = stretch_of(*row).cloned().unwrap_or(*row..*row + 1);
+            interpolated(&course[stretch.clone()], (row - stretch.start) as f64 + latency * self.scene.rate)
+        };
+        self.reduction.rows.iter().map(at).collect()
+    }
+
+    /// Measured minus rigid torque with torques that come `latency` s late.
+    pub fn difference(&self, latency: f64) -> Vec<Vec<f64>> {
+        let of = |joint: usize| {
+            let mut course = self.torque_at(joint, latency);
+            let rigid = self.regressor.torque(joint, &self.theta);
+            course.iter_mut().zip(rigid).for_each(|(value, rigid)| *value -= rigid);
+            course
+        };
+        (0..self.torque.len()).map(of).collect()
+    }
+
+    /// Takes a latency.
+    pub fn shift(&mut self, latency: f64) {
+        self.latency = latency;
+        self.measured = self.difference(latency);
+    }
+
+    /// Courses of the regressor at each joint in some judged rows.
+    pub fn base_courses(&self, rows: &[usize]) -> Vec<Vec<Vec<f64>>> {
+        let numbers = 10 * self.joints();
+        let of = |joint: usize| {
+            let courses = (10 * joint..numbers).map(|number| self.regressor.course(joint, number));
+            let used = courses.filter(|course| course.iter().any(|value| *value != 0.0));
+            used.map(|course| rows.iter().map(|row| course[*row]).collect()).collect()
+        };
+        (0..self.joints()).map(of).collect()
+    }
+
+    /// Whether a judged row lies in an event.
+    pub fn in_event(&self, row: usize) -> bool {
+        let time = self.time(row);
+        self.events.iter().any(|event| time > event.start - EVENT_MARGIN && time < event.end + EVENT_MARGIN)
+    }
+
+    /// Whether a judged row is held out.
+    pub fn is_held_out(&self, row: usize) -> bool {
+        self.held_out[row]
+    }
+
+    /// Runs of judged rows outside events, of the fitted or of the held-out ones.
+    pub fn runs(&self, held_out: bool) -> Vec<Range<usize>> {
+        self.runs_where(|row| self.held_out[row] == held_out && !self.in_event(row))
+    }
+
+    /// Runs of judged rows that count.
+    fn runs_where(&self, counts: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+        let mut runs = Vec::new();
+        for run in &self.reduction.runs {
+            let mut start = None;
+            for row in run.clone() {
+                match (counts(row), start) {
+                    (true, None) => start = Some(row),
+                    (false, Some(first)) => {
+                        runs.push(first..row);
+                        start = None;
+                    }
+                    _ => (),
+                }
+            }
+            runs.extend(start.map(|first| first..run.end));
+        }
+        runs
+    }
+
+    /// Inner products of fitted rows under the present noise.
+    pub fn weighted(&self) -> WeightedColumns {
+        let chosen: Vec<usize> = (0..self.all.columns.len()).collect();
+        WeightedColumns::new(&self.all, &self.measured, self.weighing(&self.runs(false)), &chosen)
+    }
+
+    /// Of some runs under the present noise.
+    pub fn weighing<'b>(&'b self, runs: &'b [Range<usize>]) -> Weighing<'b> {
+        Weighing { noise: &self.noise, runs }
+    }
+
+    /// Torques (`[joint][judged row]`) of coefficients.
+    pub fn predicted(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
+        let mut torques = vec![vec![0.0; self.reduction.rows.len()]; self.joints()];
+        for (column, value) in solution {
+            let column = &self.all.columns[*column];
+            for (joint, course) in column.joints.iter().zip(&column.courses) {
+                torques[*joint].iter_mut().zip(course).for_each(|(sum, part)| *sum += value * part);
+            }
+        }
+        torques
+    }
+
+    /// What coefficients leave of the measured torque, Nm.
+    pub fn residual(&self, solution: &[(usize, f64)]) -> Vec<Vec<f64>> {
+        let mut left = self.measured.clone();
+        for (course, predicted) in left.iter_mut().zip(self.predicted(solution)) {
+            course.iter_mut().zip(predicted).for_each(|(value, predicted)| *value -= predicted);
+        }
+        left
+    }
+}
+
+/// A smooth course between its rows: cubic through the four nearest.
+fn interpolated(course: &[f64], at: f64) -> f64 {
+    let last = course.len() - 1;
+    let at = at.clamp(0.0, last as f64);
+    let row = (at.floor() as usize).min(last.saturating_sub(1));
+    let share = at - row as f64;
+    if share == 0.0 || last < 3 {
+        return course[row] + share * (course[(row + 1).min(last)] - course[row]);
+    }
+    let first = row.saturating_sub(1).min(last - 3);
+    let x = at - first as f64;
+    (0..4)
+        .map(|node: usize| {
+            let others = (0..4).filter(|other| *other != node);
+            let weight: f64 = others.map(|other| (x - other as f64) / (node as f64 - other as f64)).product();
+            weight * course[first + node]
+        })
+        .sum()
+}

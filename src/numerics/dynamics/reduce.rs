@@ -1,0 +1,88 @@
+//! From rows as recorded to judged rows: one low-pass, alike for measured torque and every column, then fewer rows.
+
+use super::clock::Clock;
+use super::filter::ZeroPhase;
+use std::ops::Range;
+
+/// s cut off at each end of a stretch: the filters settle there.
+const SETTLING: f64 = 0.3;
+/// Judged rows a second over the cut-off.
+const RATE_OVER_CUTOFF: f64 = 2.5;
+/// Rows that a block of a long stretch holds, its margins apart.
+const BLOCK: usize = 1 << 14;
+
+/// The low-pass and the rows that are kept.
+#[derive(Debug, Clone)]
+pub(super) struct Reduction {
+    /// Hz.
+    pub cutoff: f64,
+    /// Hz, of kept rows.
+    pub rate: f64,
+    /// Kept rows of the recording, ascending.
+    pub rows: Vec<usize>,
+    /// Of the kept rows: runs without a gap.
+    pub runs: Vec<Range<usize>>,
+    filter: ZeroPhase,
+    stretches: Vec<Range<usize>>,
+    /// Rows beyond which a block does not feel what is filtered with it.
+    margin: usize,
+}
+
+impl Reduction {
+    /// Of a clock and a cut-off (Hz).
+    pub fn new(clock: &Clock, cutoff: f64) -> Self {
+        let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(1);
+        let settling = (SETTLING * clock.rate) as usize;
+        let (mut rows, mut runs) = (Vec::new(), Vec::new());
+        for stretch in &clock.stretches {
+            let first = rows.len();
+            rows.extend((stretch.start + settling..stretch.end.saturating_sub(settling)).step_by(every));
+            runs.push(first..rows.len());
+        }
+        runs.retain(|run| !run.is_empty());
+        Self {
+            cutoff,
+            rate: clock.rate / every as f64,
+            rows,
+            runs,
+            filter: ZeroPhase::new(clock.rate, cutoff),
+            stretches: clock.stretches.clone(),
+            margin: (10.0 * clock.rate / cutoff) as usize,
+        }
+    }
+
+    /// Filters a whole course (as long as the recording) in place.
+    pub fn filter(&self, course: &mut [f64], room: &mut Vec<f64>) {
+        self.stretches.iter().for_each(|stretch| self.filter.apply(&mut course[stretch.clone()], room));
+    }
+
+    /// The kept rows of a course as it was recorded; the course is spent.
+    pub fn reduce(&self, course: &mut [f64], room: &mut Vec<f64>) -> Vec<f64> {
+        self.filter(course, room);
+        self.rows.iter().map(|row| course[*row]).collect()
+    }
+
+    /// Kept rows of `width` courses that `write` makes for a range of rows, column after column (each as long as the range): the memory
+    /// is that of a block.
+    pub fn reduce_blocks(&self, width: usize, mut write: impl FnMut(Range<usize>, &mut [f64])) -> Vec<Vec<f64>> {
+        let mut kept = vec![Vec::with_capacity(self.rows.len()); width];
+        let (mut block, mut room, mut next) = (Vec::new(), Vec::new(), 0);
+        for stretch in &self.stretches {
+            for start in stretch.clone().step_by(BLOCK) {
+                let end = (start + BLOCK).min(stretch.end);
+                let wide = start.saturating_sub(self.margin).max(stretch.start)..(end + self.margin).min(stretch.end);
+                let long = wide.len();
+                block.clear();
+                block.resize(width * long, 0.0);
+                write(wide.clone(), &mut block);
+                let last = next + self.rows[next..].partition_point(|row| *row < end);
+                for (course, kept) in block.chunks_exact_mut(long).zip(&mut kept) {
+                    self.filter.apply(course, &mut room);
+                    kept.extend(self.rows[next..last].iter().map(|row| course[row - wide.start]));
+                }
+                next = last;
+            }
+        }
+        kept
+    }
+}

@@ -1,0 +1,61 @@
+//! Shape numbers of what was found: finer and finer grids about each.
+
+use super::cause::ShapeSpan;
+use super::problem::TorqueProblem;
+use super::sweep::Sweep;
+use super::weighted::WeightedColumns;
+
+/// Half widths of the grids: of the logarithm, or of the number itself.
+const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+/// Points on either side.
+const POINTS: i32 = 3;
+/// A gain that is worth a new shape.
+const BETTER: f64 = 0.05;
+
+/// Replaces forms of a set by better shaped ones; tells whether any was.
+pub(super) fn refine(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: &mut [usize]) -> bool {
+    let before = set.to_vec();
+    for place in 0..set.len() {
+        let form = &problem.all.forms[set[place]];
+        for span in form.cause.spans(form) {
+            HALVES.iter().for_each(|half| try_grid(problem, weighted, set, place, span, *half));
+        }
+    }
+    before != set
+}
+
+/// One grid about the present number.
+fn try_grid(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+    span: ShapeSpan,
+    half: f64,
+) {
+    let form = problem.all.forms[set[place]].clone();
+    let now = form.shape[span.index];
+    let mut trials = vec![set[place]];
+    for point in (-POINTS..=POINTS).filter(|point| *point != 0) {
+        let step = half * f64::from(point) / f64::from(POINTS);
+        let moved = if span.by_ratio { now * step.exp() } else { now + step };
+        if moved < span.least || moved > span.most {
+            continue;
+        }
+        let mut trial = form.clone();
+        trial.shape[span.index] = moved;
+        let number = problem.push(trial);
+        problem.all.of(number).for_each(|column| {
+            let runs = problem.runs(false);
+            weighted.push(&problem.all.columns[column], problem.weighing(&runs));
+        });
+        trials.push(number);
+    }
+    let rest: Vec<usize> = (0..set.len()).filter(|other| *other != place).map(|other| set[other]).collect();
+    let sweep = Sweep::base(&problem.all, weighted).with(&rest);
+    let gain = |number: usize| sweep.gain(number).square;
+    let best = trials.iter().copied().max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(set[place]);
+    if gain(best) > gain(set[place]) + BETTER {
+        set[place] = best;
+    }
+}

@@ -1,0 +1,170 @@
+//! The recording as causes see it: motion, rigid torque and clock at the recording's own rate, joint after joint.
+
+use super::arm::DynamicArm;
+use super::clock::Clock;
+use super::derivatives::derivatives;
+use super::filter::ZeroPhase;
+use super::inertials::DeclaredInertials;
+use super::newton_euler::{InverseDynamics, JointMotion, turn};
+use super::recording::TorqueRecording;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
+
+/// Positions are filtered at so many times the final cut-off before they are differentiated.
+const MOTION_BAND: f64 = 3.0;
+/// At most this share of the rate.
+const HIGHEST_BAND: f64 = 0.35;
+
+/// Courses of all rows, `[joint][row]`.
+pub(super) struct DynamicScene<'a> {
+    pub arm: &'a DynamicArm,
+    /// Hz.
+    pub rate: f64,
+    /// s from the first row.
+    pub time: Vec<f64>,
+    pub stretches: Vec<Range<usize>>,
+    /// rad.
+    pub position: Vec<Vec<f64>>,
+    /// rad/s.
+    pub velocity: Vec<Vec<f64>>,
+    /// rad/s^2.
+    pub acceleration: Vec<Vec<f64>>,
+    /// Nm, of the inertials as they are believed at present, payload included.
+    pub rigid: Vec<Vec<f64>>,
+    /// Nm, of the declared masses under a gravity of 9.81 m/s^2 along x, then along y of the base.
+    pub sideways: [Vec<Vec<f64>>; 2],
+    /// rad/s over which the sign of a velocity turns.
+    pub sign_width: f64,
+    /// Declared inertials; `None` where none are declared.
+    pub declared: Option<DeclaredInertials>,
+}
+
+impl<'a> DynamicScene<'a> {
+    /// Of a checked recording; the final low-pass will be at `cutoff` (Hz).
+    pub fn new(arm: &'a DynamicArm, recording: &TorqueRecording, clock: &Clock, cutoff: f64, free: bool) -> Self {
+        let n = recording.joints;
+        let (rows, first) = (recording.rows(), recording.time[0]);
+        let filter = ZeroPhase::new(clock.rate, (MOTION_BAND * cutoff).min(HIGHEST_BAND * clock.rate));
+        let mut room = Vec::new();
+        let mut scene = Self {
+            arm,
+            rate: clock.rate,
+            time: recording.time.iter().map(|time| time - first).collect(),
+            stretches: clock.stretches.clone(),
+            position: (0..n).map(|joint| column(&recording.position, n, joint)).collect(),
+            velocity: vec![vec![0.0; rows]; n],
+            acceleration: vec![vec![0.0; rows]; n],
+            rigid: vec![vec![0.0; rows]; n],
+            sideways: [vec![vec![0.0; rows]; n], vec![vec![0.0; rows]; n]],
+            sign_width: SIGN_WIDTHS[1],
+            declared: arm.links.as_ref().filter(|_| !free).map(|links| DeclaredInertials::of(arm, links)),
+        };
+        for joint in 0..n {
+            for stretch in &clock.stretches {
+                let course = &mut scene.position[joint][stretch.clone()];
+                filter.apply(course, &mut room);
+                let velocity = &mut scene.velocity[joint][stretch.clone()];
+                derivatives(course, clock.rate, velocity, &mut scene.acceleration[joint][stretch.clone()]);
+            }
+        }
+        if let Some(declared) = &scene.declared {
+            let theta = declared.theta.clone();
+            scene.believe(&theta);
+            scene.tilt(&theta);
+        }
+        scene
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.position.len()
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Smoothed sign of a velocity.
+    pub fn sign(&self, velocity: f64) -> f64 {
+        (velocity / self.sign_width).tanh()
+    }
+
+    /// s from first to last row.
+    pub fn duration(&self) -> f64 {
+        self.time.last().copied().unwrap_or(0.0)
+    }
+
+    /// Takes 10 n inertial numbers for the rigid torques.
+    pub fn believe(&mut self, theta: &[f64]) {
+        let gravity = self.arm.gravity;
+        self.rigid = self.torques(theta, &gravity, true);
+    }
+
+    /// Torques of a gravity from the side.
+    fn tilt(&mut self, theta: &[f64]) {
+        self.sideways = [Vector3::x(), Vector3::y()].map(|side| self.torques(theta, &(side * GRAVITY), false));
+    }
+
+    fn torques(&self, theta: &[f64], gravity: &Vector3<f64>, moving: bool) -> Vec<Vec<f64>> {
+        let (n, mut dynamics) = (self.joints(), InverseDynamics::new(self.arm));
+        let mut torques = vec![vec![0.0; self.rows()]; n];
+        let (mut motion, mut torque) = (vec![0.0; 3 * n], vec![0.0; n]);
+        for row in 0..self.rows() {
+            self.motion_into(row, &mut motion);
+            if !moving {
+                motion[n..].fill(0.0);
+            }
+            dynamics.torque(split(&motion, n), gravity, theta, &mut torque);
+            torques.iter_mut().zip(&torque).for_each(|(course, value)| course[row] = *value);
+        }
+        torques
+    }
+
+    /// Positions, velocities and accelerations (3 n) of a row.
+    pub fn motion_into(&self, row: usize, motion: &mut [f64]) {
+        let n = self.joints();
+        for joint in 0..n {
+            motion[joint] = self.position[joint][row];
+            motion[n + joint] = self.velocity[joint][row];
+            motion[2 * n + joint] = self.acceleration[joint][row];
+        }
+    }
+
+    /// Jacobian of the tool point in a row: per joint the velocity of the point per velocity of the joint.
+    pub fn tool_jacobian(&self, row: usize) -> Vec<Vector3<f64>> {
+        let (mut rotation, mut origin, mut before) = (Matrix3::identity(), Vector3::zeros(), Vector3::zeros());
+        let mut axes = Vec::with_capacity(self.joints());
+        for joint in 0..self.joints() {
+            origin += rotation * (self.arm.points[joint].coords - before);
+            before = self.arm.points[joint].coords;
+            let axis = rotation * self.arm.axes[joint];
+            axes.push((axis, origin));
+            match self.arm.prismatic[joint] {
+                true => origin += axis * self.position[joint][row],
+                false => rotation *= turn(&self.arm.axes[joint], self.position[joint][row]),
+            }
+        }
+        let tip = origin + rotation * (self.arm.tool.coords - before);
+        let moves = |(joint, (axis, origin)): (usize, &(Vector3<f64>, Vector3<f64>))| match self.arm.prismatic[joint] {
+            true => *axis,
+            false => axis.cross(&(tip - origin)),
+        };
+        axes.iter().enumerate().map(moves).collect()
+    }
+}
+
+/// m/s^2.
+pub(super) const GRAVITY: f64 = 9.81;
+/// rad/s, candidates of the width of a sign.
+pub(super) const SIGN_WIDTHS: [f64; 6] = [0.003, 0.006, 0.012, 0.025, 0.05, 0.1];
+
+/// The parts of 3 n numbers.
+pub(super) fn split(motion: &[f64], n: usize) -> JointMotion<'_> {
+    JointMotion { position: &motion[..n], velocity: &motion[n..2 * n], acceleration: &motion[2 * n..] }
+}
+
+/// One column of row-major values.
+pub(super) fn column(values: &[f64], n: usize, joint: usize) -> Vec<f64> {
+    values.iter().skip(joint).step_by(n).copied().collect()
+}

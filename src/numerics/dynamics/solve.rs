@@ -1,0 +1,107 @@
+//! The steps of a diagnosis of torques, one after the other.
+
+use super::arm::DynamicArm;
+use super::choice::{CauseChoice, backward};
+use super::clock::Clock;
+use super::contact::contacts;
+use super::judge::{JudgedSet, judge};
+use super::latency::{Latency, latency};
+use super::leftover::lasting_form;
+use super::noise::JointNoise;
+use super::problem::TorqueProblem;
+use super::recording::TorqueRecording;
+use super::refine::refine;
+use super::rich::{noise_beside, rich_forms};
+use super::search::search;
+use super::sign_width::sign_width;
+use super::types::TorqueQuestion;
+use super::weighted::WeightedColumns;
+
+/// Forms without a name that are looked for, at most.
+const NAMELESS: usize = 4;
+
+/// A recording with what explains it.
+pub(super) struct SolvedTorques<'a> {
+    pub problem: TorqueProblem<'a>,
+    pub weighted: WeightedColumns,
+    pub judged: JudgedSet,
+    pub latency: Option<Latency>,
+}
+
+/// Looks for causes.
+pub(super) fn solve<'a>(
+    arm: &'a DynamicArm,
+    recording: &TorqueRecording,
+    question: &TorqueQuestion,
+    clock: &Clock,
+    cutoff: f64,
+    tell: &mut dyn FnMut(String),
+) -> SolvedTorques<'a> {
+    let mut problem = TorqueProblem::new(arm, recording, question, clock, cutoff);
+    problem.scene.sign_width = sign_width(&mut problem);
+    problem.form(&question.without);
+    let found = latency(&problem).filter(|_| !question.without.iter().any(|name| name == super::LATENCY));
+    if let Some(latency) = &found {
+        tell(format!("torques come {:.1} ms after the positions", 1e3 * latency.seconds));
+        problem.shift(latency.seconds);
+    }
+    let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
+    problem.events = contacts(&problem, &residual, &sigmas(&noise), true);
+    learn(&mut problem, &[]);
+    let mut weighted = problem.weighted();
+    let mut set = {
+        let choice = CauseChoice::new(&problem, &weighted, question.seed);
+        let common = choice.common();
+        search(&choice, common)
+    };
+    tell(told(&problem, &set));
+    refine(&mut problem, &mut weighted, &mut set);
+    for _ in 0..NAMELESS {
+        set = again(&mut problem, &mut weighted, set, question.seed);
+        let lasting = lasting_form(&CauseChoice::new(&problem, &weighted, question.seed), &set);
+        let Some(form) = lasting else { break };
+        set.push(form);
+        tell(told(&problem, &set));
+    }
+    let residual = problem.residual(&CauseChoice::new(&problem, &weighted, question.seed).base.with(&set).solution());
+    problem.events = contacts(&problem, &residual, &sigmas(&problem.noise), false);
+    learn(&mut problem, &set);
+    weighted = problem.weighted();
+    let judged = judge(&CauseChoice::new(&problem, &weighted, question.seed), set);
+    SolvedTorques { problem, weighted, judged, latency: found }
+}
+
+/// From the fitted rigid torque and noise: searches on from a set and refines it.
+fn again(problem: &mut TorqueProblem, weighted: &mut WeightedColumns, set: Vec<usize>, seed: u64) -> Vec<usize> {
+    let theta = {
+        let sweep = CauseChoice::new(problem, weighted, seed).base.with(&set);
+        problem.inertials(&set, &sweep.solution())
+    };
+    problem.believe(&theta);
+    learn(problem, &set);
+    *weighted = problem.weighted();
+    let mut set = search(&CauseChoice::new(problem, weighted, seed), set);
+    if refine(problem, weighted, &mut set) {
+        backward(&CauseChoice::new(problem, weighted, seed), &mut set);
+    }
+    set
+}
+
+/// Takes noise from what the rich model and a set leave.
+fn learn(problem: &mut TorqueProblem, set: &[usize]) {
+    problem.noise = noise_beside(problem, &rich_forms(problem, set)).0;
+}
+
+/// Nm, per joint.
+fn sigmas(noise: &[JointNoise]) -> Vec<f64> {
+    noise.iter().map(|joint| joint.sigma).collect()
+}
+
+/// A set as a line.
+fn told(problem: &TorqueProblem, set: &[usize]) -> String {
+    let names = set.iter().map(|number| {
+        let form = &problem.all.forms[*number];
+        format!("{} {}", form.cause.name(), form.place)
+    });
+    format!("explained by {}", names.collect::<Vec<_>>().join(", "))
+}

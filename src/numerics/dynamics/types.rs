@@ -1,0 +1,240 @@
+//! What a diagnosis of joint torques is asked, and what it answers.
+
+use crate::diagnose::{Probabilities, VerdictKind};
+use crate::effect::Place;
+
+/// How a recording of torques is to be diagnosed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueQuestion {
+    /// Whether masses are identified without regard to what is declared.
+    pub free_inertials: bool,
+    /// Hz: of the low-pass applied alike to measured and simulated torque; `None`: chosen from the rate of the recording.
+    pub cutoff: Option<f64>,
+    /// Names of causes that are not tried.
+    pub without: Vec<String>,
+    /// Of the bootstrap.
+    pub seed: u64,
+}
+
+impl Default for TorqueQuestion {
+    fn default() -> Self {
+        Self { free_inertials: false, cutoff: None, without: Vec::new(), seed: 0 }
+    }
+}
+
+/// What the simulated torques rest on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InertialBasis {
+    /// Declared inertials, free within their tolerance: payload, link and torque constant can be findings.
+    Declared,
+    /// Identified ones, so many base parameters: errors of masses, of the payload and of torque constants vanish in them.
+    Free(usize),
+}
+
+/// Noise of a joint's torque after the low-pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TorqueNoise {
+    /// Nm.
+    pub sigma: f64,
+    /// How many judged rows in a row count as one.
+    pub autocorrelation: f64,
+}
+
+/// Differences of measured and predicted torque, per joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueErrors {
+    /// Nm.
+    pub rms: Vec<f64>,
+    /// Rms over rms of measured torque about its mean.
+    pub nrmse: Vec<f64>,
+    /// Mean of `nrmse` over joints.
+    pub nrmse_mean: f64,
+    /// Rms (Nm) of rows in which the joint moves; `None` where there are none.
+    pub rms_moving: Vec<Option<f64>>,
+    /// Rms (Nm) of rows in which the joint rests: friction is any value inside the Coulomb band there.
+    pub rms_rest: Vec<Option<f64>>,
+}
+
+/// A fitted number of a finding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueParameter {
+    /// E.g. `viscous`, `travel`, `mass`.
+    pub name: String,
+    /// In `unit`.
+    pub value: f64,
+    /// As people read it.
+    pub unit: &'static str,
+    /// One standard deviation with autocorrelation, where it was estimated.
+    pub sigma: Option<f64>,
+}
+
+/// How well a finding of torques stands.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TorqueEvidence {
+    /// Fall of the whitened squared residual by it beside all others, counted by effective rows.
+    pub gain: f64,
+    /// Of the finding beside all others.
+    pub f_statistic: f64,
+    /// Chance that noise gives as much to this form alone.
+    pub p_value: f64,
+    /// How much worse the criterion is without it.
+    pub delta_bic: f64,
+    /// Fall of the rms of held-out rows over all joints that it acts on, Nm; `None` where none are held out or the rows lie in an event.
+    pub heldout_gain: Option<f64>,
+    /// Rms of the whole effect over the recording, Nm.
+    pub effect_rms: f64,
+}
+
+/// Another explanation, which these data cannot separate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueRival {
+    /// Name of the cause.
+    pub effect: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// How much worse the criterion is with it in place of the finding.
+    pub delta_bic: f64,
+    /// That it is this cause and not the finding's.
+    pub probability: f64,
+}
+
+/// A cause of what the rigid arm leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueFinding {
+    /// Canonical name of the cause.
+    pub effect: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// The finding in a sentence, with its size.
+    pub statement: String,
+    /// Fitted numbers, in units that people read.
+    pub parameters: Vec<TorqueParameter>,
+    /// Its weight in the data.
+    pub evidence: TorqueEvidence,
+    /// Explanations that these data do not exclude, the closest first.
+    pub rivals: Vec<TorqueRival>,
+    /// Of its name and its place.
+    pub probabilities: Probabilities,
+}
+
+/// What is left at a joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueLeftover {
+    /// Nm, of fitted rows.
+    pub rms: f64,
+    /// The same over the noise.
+    pub over_noise: f64,
+    /// What it looks like, where it is not noise.
+    pub signature: Option<String>,
+}
+
+/// A time in which something pushed on the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactEvent {
+    /// s.
+    pub start: f64,
+    /// s.
+    pub end: f64,
+    /// Joints that feel it most, from 0, strongest first.
+    pub joints: Vec<usize>,
+    /// Peak force at the tool, N, base frame.
+    pub force: [f64; 3],
+    /// One standard deviation of each component, N.
+    pub sigma: [f64; 3],
+    /// Fall of the whitened squared residual by it.
+    pub gain: f64,
+}
+
+/// An inertial number as identified, in units that people read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InertialEstimate {
+    /// From 0.
+    pub link: usize,
+    /// `mass`, `moment_x` (mass times centre from the joint's point), ..., `inertia_xx` (about the joint's point), ...
+    pub quantity: &'static str,
+    /// kg, kg m, kg m^2.
+    pub unit: &'static str,
+    /// With the findings on masses and payload.
+    pub value: f64,
+    /// As declared, with the declared payload; `None` where nothing is declared.
+    pub declared: Option<f64>,
+    /// One standard deviation of the posterior.
+    pub sigma: f64,
+}
+
+/// Torque of friction over velocity, as found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrictionCurve {
+    /// From 0.
+    pub joint: usize,
+    /// rad/s, ascending, over the range of the recording.
+    pub velocity: Vec<f64>,
+    /// Nm.
+    pub torque: Vec<f64>,
+    /// One standard deviation, Nm.
+    pub sigma: Vec<f64>,
+}
+
+/// The judged rows (after low-pass and decimation), row-major (rows x n).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TorqueCourses {
+    /// Rows of the recording, length rows.
+    pub row: Vec<usize>,
+    /// s, length rows.
+    pub time: Vec<f64>,
+    /// Length rows.
+    pub held_out: Vec<bool>,
+    /// Whether the row lies in an event: neither fitted nor judged.
+    pub in_event: Vec<bool>,
+    /// Whether the joint rests, rows x n.
+    pub at_rest: Vec<bool>,
+    /// rad/s, rows x n.
+    pub velocity: Vec<f64>,
+    /// Nm, rows x n: measured, brought onto the clock of the positions.
+    pub measured: Vec<f64>,
+    /// Nm, rows x n: of the arm as declared (of the identified rigid arm where nothing is declared).
+    pub simulated: Vec<f64>,
+    /// Nm, rows x n: with the findings.
+    pub corrected: Vec<f64>,
+}
+
+/// The outcome of a diagnosis of torques.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueDiagnosis {
+    /// The answer in one word.
+    pub verdict: VerdictKind,
+    /// The verdict in a sentence, with what its noise rests on.
+    pub statement: String,
+    /// What is odd about the recording and what was decided from it, a sentence each.
+    pub remarks: Vec<String>,
+    /// Which of the two bases was run.
+    pub basis: InertialBasis,
+    /// Hz, of the low-pass.
+    pub cutoff: f64,
+    /// Hz, of the judged rows.
+    pub rate: f64,
+    /// Per joint.
+    pub noise: Vec<TorqueNoise>,
+    /// Of held-out rows (of the fitted ones where none are held out), with inertials alone.
+    pub before: TorqueErrors,
+    /// The same with the findings.
+    pub after: TorqueErrors,
+    /// Whether the errors are of held-out rows.
+    pub held_out: bool,
+    /// Strongest first.
+    pub findings: Vec<TorqueFinding>,
+    /// Findings that held-out rows did not confirm, a sentence each: they are not in the model.
+    pub withdrawn: Vec<String>,
+    /// What these data cannot show, a sentence each.
+    pub not_observable: Vec<String>,
+    /// Per joint.
+    pub leftover: Vec<TorqueLeftover>,
+    /// Pushes on the arm, in the order of time.
+    pub events: Vec<ContactEvent>,
+    /// Measured and predicted torques.
+    pub courses: TorqueCourses,
+    /// Ten a link.
+    pub inertials: Vec<InertialEstimate>,
+    /// Of joints with friction found.
+    pub friction: Vec<FrictionCurve>,
+}

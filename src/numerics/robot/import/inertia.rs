@@ -1,0 +1,69 @@
+//! Moments of inertia of a body and how far declared masses may be off, as robot files state them.
+
+use super::place::DocumentNode;
+use crate::description::{InertiaMoments, MassTolerance};
+use crate::robot::Bound;
+use crate::units::Unit;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+/// How far below zero, as a share of the largest, a principal moment may come by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// `[xx, xy, xz, yy, yz, zz]` of a file, kg m2, with a fault where no body can have them.
+pub(super) fn moments(value: &DocumentNode) -> InertiaMoments {
+    let moments = value.sized_vector::<6>(Bound::Inertia, Unit::KilogramSquareMetre);
+    if let Some(message) = impossible(&moments) {
+        value.fault(message);
+    }
+    moments
+}
+
+/// Why no body has these moments, if so.
+pub(super) fn impossible(moments: &InertiaMoments) -> Option<String> {
+    if moments.iter().any(|moment| moment.is_nan()) {
+        return None;
+    }
+    let principal = tensor(moments).symmetric_eigenvalues();
+    let (least, most) = (principal.min(), principal.max());
+    (least < -ROUNDING * most.abs()).then(|| {
+        format!("no body has a negative principal moment ({least:.4} kg m2); expected [xx, xy, xz, yy, yz, zz] about the centre")
+    })
+}
+
+/// The symmetric tensor of six moments.
+pub(super) fn tensor([xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Matrix3<f64> {
+    Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
+}
+
+/// The six moments of a symmetric tensor.
+pub(super) fn of_tensor(t: &Matrix3<f64>) -> InertiaMoments {
+    [t[(0, 0)], t[(0, 1)], t[(0, 2)], t[(1, 1)], t[(1, 2)], t[(2, 2)]]
+}
+
+/// The moments in the axes that `rotation` turns the body's own into.
+pub(super) fn turned(moments: &InertiaMoments, rotation: &Rotation3<f64>) -> InertiaMoments {
+    of_tensor(&(rotation.matrix() * tensor(moments) * rotation.matrix().transpose()))
+}
+
+/// The tensor of a point mass at `arm` from a centre: what moving the axes adds.
+pub(super) fn offset(mass: f64, arm: &Vector3<f64>) -> Matrix3<f64> {
+    mass * (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose())
+}
+
+/// One standard deviation of declared masses, by three keys; the centre in `length`.
+pub(super) fn tolerance(value: &DocumentNode, keys: [&str; 3], length: Unit) -> MassTolerance {
+    let value = value.clone().map(&keys);
+    let above = |key: &str, unit: Unit, bound: Bound| {
+        let value = value.get(key);
+        let number = value.sized(bound, unit);
+        if number <= 0.0 {
+            value.fault(format!("expected a number above 0, found {number}"));
+        }
+        number
+    };
+    MassTolerance {
+        mass: above(keys[0], Unit::One, Bound::Factor),
+        centre: above(keys[1], length, Bound::Length),
+        inertia: above(keys[2], Unit::One, Bound::Factor),
+    }
+}

@@ -1,0 +1,206 @@
+//! `diagnose_torques`: which physics the rigid inverse dynamics of the robot file lacks while the arm moves.
+
+use crate::dynamics::{TorqueQuestion, TorqueRecording, diagnose};
+use crate::error::{Error, Fault, Result, counted};
+use crate::stage::dynamic_arm::{dynamic_arm, torque_per_ampere};
+use crate::stage::{Context, Stage, reads, writes};
+use crate::table::{
+    Contacts, FrictionCurves, Inertials, JointTorques, Motion, Robot, TorqueCourse, TorqueFindings, TorqueNumbers, TorqueRivals,
+    TorqueVerdict,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of `diagnose_torques`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiagnoseTorques {
+    /// Labels of the recording's `usage` to fit; all other rows are predicted in the end and choose nothing.
+    #[serde(default = "fit")]
+    pub on: Vec<String>,
+    /// Rows that are held out instead of those that `usage` labels otherwise. Where neither says anything, the last 30 %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hold_out: Option<HoldOut>,
+    /// Whether masses are free within their tolerance, or identified without regard to what is declared.
+    #[serde(default)]
+    pub inertials: InertialSetting,
+    /// Hz, of the low-pass that measured and simulated torque have in common; without it, chosen from the recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cutoff_hz: Option<f64>,
+    /// Causes that are not tried and never named.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub without: Vec<String>,
+}
+
+/// Which rows are held out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum HoldOut {
+    /// So large a share at the end of the recording, between 0 and 1.
+    Last(f64),
+    /// These stretches of the recording, from 1.
+    Trajectories(Vec<i64>),
+    /// Every so manieth second of the recording, from 2: of 3 the third, the sixth and so on.
+    EverySecond(u32),
+}
+
+/// What masses rest on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum InertialSetting {
+    /// Declared, free within their tolerance; identified where the robot file lacks some.
+    #[default]
+    Declared,
+    /// Identified: errors of payload, links and torque constants vanish in them.
+    Free,
+}
+
+fn fit() -> Vec<String> {
+    vec!["fit".into()]
+}
+
+/// Share of the rows that is held out where nothing is said.
+const LAST: f64 = 0.3;
+
+reads! {
+    /// Input ports of [`DiagnoseTorques`].
+    pub struct DiagnoseTorquesReads {
+        robot: Robot,
+        motion: Motion,
+    }
+}
+writes! {
+    /// Output ports of [`DiagnoseTorques`].
+    pub struct DiagnoseTorquesWrites {
+        verdict: TorqueVerdict,
+        findings: TorqueFindings,
+        numbers: TorqueNumbers,
+        rivals: TorqueRivals,
+        joints: JointTorques,
+        course: TorqueCourse,
+        friction: FrictionCurves,
+        inertials: Inertials,
+        contacts: Contacts,
+    }
+}
+
+impl Stage for DiagnoseTorques {
+    const NAME: &'static str = "diagnose_torques";
+    const SUMMARY: &'static str = "names the physics that the simulated torques of a moving arm lack";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = DiagnoseTorquesReads;
+    type Writes = DiagnoseTorquesWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults: Vec<Fault> = crate::stage::no_set(&self.on, "fit").into_iter().collect();
+        match &self.hold_out {
+            Some(HoldOut::Last(share)) if !(*share > 0.0 && *share < 1.0) => {
+                faults.push(Fault::new("hold_out.last", "allowed: above 0 and below 1"));
+            }
+            Some(HoldOut::Trajectories(all)) if all.is_empty() => {
+                faults.push(Fault::new("hold_out.trajectories", "name at least one, e.g. [4]"));
+            }
+            Some(HoldOut::EverySecond(n)) if *n < 2 => {
+                faults.push(Fault::new("hold_out.every_second", "allowed: 2 and above"));
+            }
+            _ => {}
+        }
+        if self.cutoff_hz.is_some_and(|hz| !(hz > 0.0 && hz.is_finite())) {
+            faults.push(Fault::new("cutoff_hz", "expected a frequency above 0, Hz"));
+        }
+        faults
+    }
+
+    fn run(&self, reads: DiagnoseTorquesReads, context: &Context) -> Result<DiagnoseTorquesWrites> {
+        let robot = reads.robot.to_description()?;
+        let (mut arm, notes) = dynamic_arm(&robot)?;
+        notes.into_iter().for_each(|note| context.services.note(note));
+        let free = self.inertials == InertialSetting::Free;
+        if free {
+            arm.links = None;
+        }
+        let mut motion = reads.motion;
+        let held_out = self.held_out(&motion, context)?;
+        let (torque, from_current) = match (motion.torque.take(), motion.current.take()) {
+            (Some(torque), _) => (torque, false),
+            (None, Some(mut current)) => {
+                let factor = torque_per_ampere(&robot)?;
+                current.chunks_exact_mut(factor.len()).for_each(|row| row.iter_mut().zip(&factor).for_each(|(i, k)| *i *= k));
+                (current, true)
+            }
+            (None, None) => return Err(Error::data("table motion", "has neither torques nor currents")),
+        };
+        let recording = TorqueRecording {
+            joints: motion.joints,
+            time: motion.time,
+            position: motion.q,
+            velocity: motion.velocity,
+            torque,
+            temperature: motion.temperature,
+            trajectory: motion.trajectory.iter().map(|number| u32::try_from(*number).unwrap_or(u32::MAX)).collect(),
+            held_out,
+            from_current,
+        };
+        let question =
+            TorqueQuestion { free_inertials: free, cutoff: self.cutoff_hz, without: self.without.clone(), seed: context.seed };
+        let diagnosis = diagnose(&arm, &recording, &question, &mut |line| context.services.note(line))?;
+        diagnosis.remarks.iter().for_each(|remark| context.services.note(remark.clone()));
+        Ok(DiagnoseTorquesWrites {
+            verdict: TorqueVerdict::of(context.id, &diagnosis, from_current),
+            findings: TorqueFindings::of(&diagnosis),
+            numbers: TorqueNumbers::of(&diagnosis),
+            rivals: TorqueRivals::of(&diagnosis),
+            joints: JointTorques::of(&diagnosis),
+            course: TorqueCourse::of(&diagnosis, recording.joints, &motion.sequence),
+            friction: FrictionCurves::of(&diagnosis),
+            inertials: Inertials::of(&diagnosis),
+            contacts: Contacts::of(&diagnosis),
+        })
+    }
+}
+
+impl DiagnoseTorques {
+    /// Which rows judge in the end. Fails where none is left to fit.
+    fn held_out(&self, motion: &Motion, context: &Context) -> Result<Vec<bool>> {
+        let rows = motion.rows();
+        let last = |share: f64| {
+            let first = rows - (share * rows as f64).round() as usize;
+            (0..rows).map(|row| row >= first).collect::<Vec<bool>>()
+        };
+        let labelled = motion.usage.iter().any(Option::is_some);
+        let held_out = match &self.hold_out {
+            Some(HoldOut::Last(share)) => last(*share),
+            Some(HoldOut::Trajectories(all)) => {
+                if let Some(missing) = all.iter().find(|one| !motion.trajectory.contains(one)) {
+                    let most = motion.trajectory.last().copied().unwrap_or_default();
+                    let message = format!("there is no stretch {missing}; the recording has 1 to {most}");
+                    return Err(Error::data("with.hold_out.trajectories", message));
+                }
+                motion.trajectory.iter().map(|one| all.contains(one)).collect()
+            }
+            Some(HoldOut::EverySecond(n)) => {
+                let start = motion.time.first().copied().unwrap_or_default();
+                motion.time.iter().map(|time| (time - start).rem_euclid(f64::from(*n)) >= f64::from(*n) - 1.0).collect()
+            }
+            None if labelled => {
+                let fitted: Vec<bool> = motion.usages.iter().map(|label| self.on.contains(label)).collect();
+                motion.usage.iter().map(|usage| !usage.is_some_and(|usage| fitted[usize::from(usage)])).collect()
+            }
+            None => {
+                context.services.note(format!(
+                    "no row is labelled with its use: the last {:.0} % are held out (`hold_out`)",
+                    100.0 * LAST
+                ));
+                last(LAST)
+            }
+        };
+        let judging = held_out.iter().filter(|held| **held).count();
+        if judging == rows {
+            let labels = motion.usages.join(", ");
+            let message = format!("no row is left to fit; labels of the recording: {labels}; to fit: {}", self.on.join(", "));
+            return Err(Error::data("with.on", message));
+        }
+        context.services.note(format!("{} to fit, {judging} held out", counted((rows - judging) as u64, "row")));
+        Ok(held_out)
+    }
+}

@@ -1,0 +1,88 @@
+//! The arm whose torques are simulated, from the robot table.
+
+use crate::description::{InertiaMoments, JointDescription, JointKind, RobotDescription};
+use crate::dynamics::{DynamicArm, Inertial, InertialTolerance};
+use crate::error::{Error, Result};
+use nalgebra::{Matrix3, Point3, Vector3};
+
+/// How far masses may be off where the robot file does not say it: those of CAD models and of data sheets.
+const ASSUMED: InertialTolerance = InertialTolerance { mass_relative: 0.05, centre: 0.01, inertia_relative: 0.2 };
+
+/// The arm, and what a person should know of what the robot file leaves open. Fails with a joint that slides.
+pub(super) fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)> {
+    if let Some(joint) = robot.joints.iter().position(|joint| joint.kind == JointKind::Prismatic) {
+        let message = format!("joint {} slides; torques are diagnosed of revolute joints alone", joint + 1);
+        return Err(Error::data("table robot", message));
+    }
+    let mut notes = Vec::new();
+    let declared = |(index, joint): (usize, &JointDescription)| {
+        let moments = robot.inertias.links.get(index).copied().flatten();
+        match (joint.mass, joint.centre, moments) {
+            (Some(mass), Some(centre), Some(moments)) => Ok(inertial(mass, centre, &moments)),
+            _ => Err(index),
+        }
+    };
+    let links = match robot.joints.iter().enumerate().map(declared).collect::<std::result::Result<Vec<_>, usize>>() {
+        Ok(links) => Some(links),
+        Err(link) => {
+            notes.push(format!(
+                "link {} has no mass, centre or inertia in the robot file: masses are identified, their errors cannot be findings",
+                link + 1
+            ));
+            None
+        }
+    };
+    let tolerance = match robot.inertias.tolerance {
+        Some(own) => InertialTolerance { mass_relative: own.mass, centre: own.centre, inertia_relative: own.inertia },
+        None => {
+            if links.is_some() {
+                notes.push(format!(
+                    "the robot file does not say how far its masses may be off: assumed, one sigma, are masses {} %, centres {} mm, \
+                     inertias {} %",
+                    100.0 * ASSUMED.mass_relative,
+                    1e3 * ASSUMED.centre,
+                    100.0 * ASSUMED.inertia_relative
+                ));
+            }
+            ASSUMED
+        }
+    };
+    let payload = (robot.payload_mass > 0.0).then(|| {
+        let moments = robot.inertias.payload.unwrap_or_default();
+        inertial(robot.payload_mass, robot.payload_centre, &moments)
+    });
+    let arm = DynamicArm {
+        axes: robot.joints.iter().map(|joint| Vector3::from(joint.axis)).collect(),
+        points: robot.joints.iter().map(|joint| Point3::from(joint.point)).collect(),
+        prismatic: vec![false; robot.joints.len()],
+        tool: Point3::from(robot.tool),
+        links,
+        payload,
+        gravity: Vector3::from(robot.gravity),
+        ratio: robot.joints.iter().map(|joint| joint.reduction_ratio.unwrap_or(1.0)).collect(),
+        coupled: robot.couplings.iter().map(|coupling| (coupling.moved, coupling.by)).collect(),
+        tolerance,
+    };
+    Ok((arm, notes))
+}
+
+fn inertial(mass: f64, centre: [f64; 3], [xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Inertial {
+    let inertia = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
+    Inertial { mass, centre: Point3::from(centre), inertia }
+}
+
+/// Nm at the joint per ampere of its motor, joint by joint. Fails with the joints whose numbers are missing.
+pub(super) fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
+    let factor = |joint: &JointDescription| Some(joint.reduction_ratio? * joint.motor_constant?);
+    let all: Vec<Option<f64>> = robot.joints.iter().map(factor).collect();
+    let missing: Vec<String> =
+        (1..).zip(&all).filter(|(_, factor)| factor.is_none()).map(|(joint, _): (usize, _)| joint.to_string()).collect();
+    if missing.is_empty() {
+        return Ok(all.into_iter().flatten().collect());
+    }
+    let message = format!(
+        "the recording holds motor currents, and joint {} has no reduction ratio or no motor constant (Nm/A) in the robot file",
+        missing.join(", ")
+    );
+    Err(Error::data("table robot", message))
+}

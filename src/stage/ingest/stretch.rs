@@ -1,0 +1,139 @@
+//! The clock of an arm that moves: stretches without a gap, and faults of the clock.
+
+/// A gap is longer than so many steps of the clock.
+const GAP: f64 = 20.0;
+/// Steps that the usual one is known by.
+const STEPS: usize = 64;
+/// How near joints must come to where their velocity takes them in one step for the clock to have jumped, as a share of that step.
+const NEAR: f64 = 0.4;
+/// A step of a joint that shows that it moves, rad or m.
+const MOVES: f64 = 2e-4;
+
+/// Stretches of rows, numbered from 1.
+pub(super) struct Stretches {
+    number: i64,
+    name: Option<String>,
+    last: Option<(f64, Vec<f64>)>,
+    /// What each joint moves in a step, by the last two rows of the stretch.
+    step: Option<Vec<f64>>,
+    /// The first steps of the clock, sorted, s.
+    usual: Vec<f64>,
+    gap: Option<(u64, f64)>,
+    warned: u64,
+}
+
+/// Gaps that are told one by one.
+const TOLD: u64 = 5;
+
+impl Stretches {
+    pub(super) fn new() -> Self {
+        Self { number: 0, name: None, last: None, step: None, usual: Vec::new(), gap: None, warned: 0 }
+    }
+
+    /// Rows of another file follow: another stretch.
+    pub(super) fn begin(&mut self) {
+        (self.name, self.last, self.step) = (None, None, None);
+    }
+
+    /// How many there are.
+    pub(super) fn count(&self) -> i64 {
+        self.number
+    }
+
+    /// The stretch of the next row, of the trajectory `name`. Fails with what is wrong with the clock.
+    pub(super) fn next(&mut self, name: &str, time: f64, q: &[f64], line: u64) -> Result<i64, String> {
+        let last = self.last.take();
+        let goes_on = self.name.as_deref() == Some(name);
+        if let (Some((before, from)), true) = (&last, goes_on) {
+            let step = time - before;
+            if step <= 0.0 {
+                let how = if step < 0.0 { "goes back" } else { "stands" };
+                return Err(format!(
+                    "the clock {how}: {time} s after {before} s; allowed: ascending times within a trajectory (`trajectory` maps \
+                     where one ends)"
+                ));
+            }
+            let moved: Vec<f64> = q.iter().zip(from).map(|(to, from)| to - from).collect();
+            if self.is_gap(step) {
+                if self.went_on(&moved) {
+                    return Err(format!(
+                        "the clock jumps by {step:.3} s ({before} s to {time} s) while the joints go on as in one step of {:.4} s",
+                        self.usual_step().unwrap_or_default()
+                    ));
+                }
+                self.gap = Some((line, step));
+                self.start(name);
+            } else {
+                self.learn(step);
+                self.step = Some(moved);
+            }
+        } else {
+            self.start(name);
+        }
+        self.last = Some((time, q.to_vec()));
+        Ok(self.number)
+    }
+
+    fn start(&mut self, name: &str) {
+        self.number += 1;
+        self.name = Some(name.into());
+        self.step = None;
+    }
+
+    fn learn(&mut self, step: f64) {
+        if self.usual.len() < STEPS {
+            let at = self.usual.partition_point(|other| *other < step);
+            self.usual.insert(at, step);
+        }
+    }
+
+    fn usual_step(&self) -> Option<f64> {
+        self.usual.get(self.usual.len() / 2).copied()
+    }
+
+    fn is_gap(&self, step: f64) -> bool {
+        self.usual.len() >= STEPS / 8 && self.usual_step().is_some_and(|usual| step > GAP * usual)
+    }
+
+    /// Whether joints that move are where one step of the clock takes them.
+    fn went_on(&self, moved: &[f64]) -> bool {
+        let Some(step) = &self.step else { return false };
+        let size = step.iter().fold(0.0, |most: f64, one| most.max(one.abs()));
+        size > MOVES && moved.iter().zip(step).all(|(moved, step)| (moved - step).abs() < NEAR * size)
+    }
+
+    /// What a person should know of a gap that was just met.
+    pub(super) fn warning(&mut self, label: &str) -> Option<String> {
+        let (line, gap) = self.gap.take()?;
+        self.warned += 1;
+        match self.warned {
+            1..TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s; what follows is a stretch of its own")),
+            TOLD => Some(format!("{label}:{line}: no rows for {gap:.3} s, as at other lines before and perhaps after")),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Stretches;
+
+    fn rows(stretches: &mut Stretches, rows: std::ops::Range<i32>, later: f64, ahead: f64) -> Result<i64, String> {
+        let row = |k: i32| (0.01 * f64::from(k) + later, 0.003 * f64::from(k) + ahead);
+        rows.map(row).try_fold(0, |_, (time, q)| stretches.next("1", time, &[q, 0.0], 7))
+    }
+
+    #[test]
+    fn a_pause_begins_a_stretch_and_a_clock_that_jumps_is_refused() {
+        let mut paused = Stretches::new();
+        assert_eq!(rows(&mut paused, 0..50, 0.0, 0.0), Ok(1));
+        assert_eq!(rows(&mut paused, 50..90, 3.0, 0.9), Ok(2));
+        assert!(paused.warning("a.csv").expect("a gap").starts_with("a.csv:7: no rows for 3.010 s"));
+        let mut jumps = Stretches::new();
+        assert_eq!(rows(&mut jumps, 0..50, 0.0, 0.0), Ok(1));
+        assert!(rows(&mut jumps, 50..90, 3.0, 0.0).unwrap_err().starts_with("the clock jumps by 3.010 s"));
+        let mut back = Stretches::new();
+        assert_eq!(rows(&mut back, 0..50, 0.0, 0.0), Ok(1));
+        assert!(rows(&mut back, 20..21, 0.0, 0.0).unwrap_err().starts_with("the clock goes back"));
+    }
+}

@@ -1,0 +1,399 @@
+//! `ingest_torques`: from raw files of an arm that moves to one table of motion, in one reading and in chunks.
+//!
+//! Rows keep their order. A stretch of the table is a trajectory without a gap of the clock; per file, accepted + rejected = read.
+
+use super::arm::RobotJoints;
+use super::channel::TorqueChannel;
+use super::check;
+use super::layout::{FileLayout, LimitPolicy};
+use super::reading::{self, OpenedFile, ProgressCounter};
+use super::rejections::Rejections;
+use super::row::{Reason, RecordedRow, RowRefusal};
+use super::scan::{RefusalCounts, tally};
+use super::stretch::Stretches;
+use crate::error::{Error, Fault, Result, counted};
+use crate::stage::{Context, RawFile, Sink, Stage, StreamedTable, reads, writes};
+use crate::table::{Intake, IntakeRow, Motion, Rejected, RejectedRow, Robot, Table};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Reads recordings of joint torques or motor currents of a moving arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IngestTorques {
+    /// The raw files, each with all quantities; one continues the other. `q`, `time`, and one of `torque` and `current` are needed;
+    /// `trajectory`, `usage`, `velocity` and `temperature` are used where they are mapped.
+    pub files: Vec<FileLayout>,
+    /// On which side of the gears `torque` is stated.
+    #[serde(default)]
+    pub torque_side: TorqueSide,
+    /// What becomes of rows with a joint beyond the robot's limits.
+    #[serde(default)]
+    pub limits: LimitPolicy,
+    /// A file of which more than this share of rows is rejected is an error.
+    #[serde(default = "few")]
+    pub max_rejected_fraction: f64,
+}
+
+/// On which side of the gears a torque is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TorqueSide {
+    /// What moves the link.
+    #[default]
+    Joint,
+    /// Of the motor: times the reduction ratio it is the joint's.
+    Motor,
+}
+
+fn few() -> f64 {
+    0.05
+}
+
+/// Quantities that a recording of torques may have.
+const USED: [&str; 8] = ["q", "time", "torque", "current", "trajectory", "usage", "velocity", "temperature"];
+/// Rows of the table in memory at once.
+const CHUNK: usize = 1 << 16;
+/// More labels than these are no labels: another column is mapped.
+const MOST_LABELS: usize = 100;
+
+reads! {
+    /// Input ports of `ingest_torques`.
+    pub struct IngestTorquesReads {
+        robot: Robot,
+    }
+}
+writes! {
+    /// Output ports of `ingest_torques`.
+    pub struct IngestTorquesWrites {
+        motion: StreamedTable<Motion>,
+        rejected: StreamedTable<Rejected>,
+        intake: Intake,
+    }
+}
+
+impl Stage for IngestTorques {
+    const NAME: &'static str = "ingest_torques";
+    const SUMMARY: &'static str = "reads joint positions with torques or motor currents of an arm that moves";
+    const IMPLEMENTATION: u32 = 1;
+    type Reads = IngestTorquesReads;
+    type Writes = IngestTorquesWrites;
+
+    fn check(&self) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        if self.files.is_empty() {
+            faults.push(Fault::new("files", "no file; name at least one"));
+        }
+        if !(0.0..=1.0).contains(&self.max_rejected_fraction) {
+            faults.push(Fault::new("max_rejected_fraction", "allowed: 0 to 1"));
+        }
+        for (index, file) in self.files.iter().enumerate() {
+            let place = format!("files[{index}]");
+            check::file_faults(file, &place, &mut faults);
+            for name in file.names().into_iter().filter(|name| !USED.contains(name)) {
+                let message = format!("is not used of a recording of torques; allowed: {}", USED.join(", "));
+                faults.push(Fault::new(format!("{place}.columns.{name}"), message));
+            }
+            let mut missing: Vec<&str> = ["q", "time"].into_iter().filter(|name| !file.has(name)).collect();
+            if !file.has("torque") && !file.has("current") {
+                missing.push("torque or current");
+            }
+            if !missing.is_empty() {
+                faults.push(Fault::new(format!("{place}.columns"), format!("not mapped: {}", missing.join(", "))));
+            }
+        }
+        faults
+    }
+
+    fn files(&self) -> Vec<(String, RawFile)> {
+        self.files.iter().enumerate().map(|(index, file)| (format!("files[{index}].file"), file.file.clone())).collect()
+    }
+
+    fn look(&self, reads: Option<IngestTorquesReads>, context: &Context) -> Result<Option<IngestTorquesWrites>> {
+        let arm = reads.map(|reads| RobotJoints::of(&reads.robot)).transpose()?;
+        let mut faults = Vec::new();
+        for layout in &self.files {
+            match reading::header(layout, arm.as_ref(), self.limits, context) {
+                Err(Error::Data(more)) => faults.extend(more),
+                other => other?,
+            }
+        }
+        if faults.is_empty() { Ok(None) } else { Err(Error::Data(faults)) }
+    }
+
+    fn run(&self, reads: IngestTorquesReads, context: &Context) -> Result<IngestTorquesWrites> {
+        let faults = self.check();
+        if !faults.is_empty() {
+            return Err(Error::Spec(faults));
+        }
+        let arm = RobotJoints::of(&reads.robot)?;
+        let names: Vec<String> = self.files.iter().map(|file| own_name(&file.file.0)).collect();
+        let mut rejected = Rejections::new(&names, context)?;
+        let mut rows = MotionRows::new(self, &reads.robot, &arm, context)?;
+        let mut intake = Vec::new();
+        for (layout, name) in self.files.iter().zip(&names) {
+            intake.push(rows.file(layout, name, &mut rejected, context)?);
+        }
+        intake.sort_by(|a: &IntakeRow, b| a.file.cmp(&b.file));
+        Ok(IngestTorquesWrites { motion: rows.finish(context)?, rejected: rejected.finish()?, intake: Intake(intake) })
+    }
+}
+
+fn own_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// The table of motion, chunk by chunk.
+struct MotionRows<'a> {
+    settings: &'a IngestTorques,
+    arm: &'a RobotJoints,
+    sink: Box<dyn Sink + 'a>,
+    chunk: Motion,
+    written: i64,
+    stretches: Stretches,
+    /// What a motor-side torque is multiplied by, a joint each.
+    ratio: Vec<f64>,
+    /// Which of `current` and `torque` the files have; the first file decides.
+    signal: Option<&'static str>,
+    channels: Vec<TorqueChannel>,
+    /// Places of usage and trajectory among the texts of a row.
+    usage: usize,
+    trajectory: usize,
+}
+
+impl<'a> MotionRows<'a> {
+    fn new(settings: &'a IngestTorques, robot: &Robot, arm: &'a RobotJoints, context: &Context<'a>) -> Result<Self> {
+        let joints = robot.0.iter().filter(|row| row.kind == "revolute" || row.kind == "prismatic");
+        let ratio = joints.map(|row| match (settings.torque_side, row.reduction_ratio) {
+            (TorqueSide::Joint, _) => Ok(1.0),
+            (TorqueSide::Motor, Some(ratio)) => Ok(ratio),
+            (TorqueSide::Motor, None) => {
+                let message = format!("joint {} has no reduction ratio; `torque_side: motor` needs it in the robot file", row.body);
+                Err(Error::data("with.torque_side", message))
+            }
+        });
+        let place = |name: &str| arm.slots.texts().iter().position(|text| *text == name).unwrap_or(usize::MAX);
+        Ok(Self {
+            settings,
+            arm,
+            sink: context.services.sink(Motion::KIND)?,
+            chunk: Motion::default(),
+            written: 0,
+            stretches: Stretches::new(),
+            ratio: ratio.collect::<Result<_>>()?,
+            signal: None,
+            channels: vec![TorqueChannel::default(); arm.joints()],
+            usage: place("usage"),
+            trajectory: place("trajectory"),
+        })
+    }
+
+    fn file(&mut self, layout: &FileLayout, name: &str, rejected: &mut Rejections, context: &Context) -> Result<IntakeRow> {
+        let source = context.services.open(&layout.file)?;
+        let size = source.size;
+        let mut open = OpenedFile::open(source, layout, self.arm, self.settings.limits)?;
+        let label = open.label.clone();
+        context.services.begin(&format!("reading {label}"), size, "bytes");
+        self.signal_of(&open, &label)?;
+        let given = open.binding().slots();
+        let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
+        let optional = [has("velocity"), has("temperature")];
+        self.agree(optional, &label)?;
+        self.stretches.begin();
+        let (mut pace, mut refused) = (ProgressCounter::new(context), RefusalCounts::new());
+        let mut accepted = 0u64;
+        while let Some(judged) = open.next()? {
+            match judged.and_then(|()| self.complete(&open.row)) {
+                Ok(()) => {
+                    self.push(&open.row, &label, context)?;
+                    accepted += 1;
+                }
+                Err(refusal) => {
+                    tally(&mut refused, open.row.line, &refusal);
+                    rejected.push(RejectedRow {
+                        file: name.into(),
+                        line: open.row.line as i64,
+                        point_id: None,
+                        reason: refusal.reason.word().into(),
+                        detail: refusal.detail,
+                        text: open.record.text(),
+                    })?;
+                }
+            }
+            pace.row(open.bytes());
+        }
+        let read = open.row.number;
+        self.few_rejected(&label, read, accepted, &refused)?;
+        context.services.note(format!("{name}: {} read, {accepted} used, {} rejected", counted(read, "row"), read - accepted));
+        Ok(IntakeRow {
+            file: name.into(),
+            lines: open.lines() as i64,
+            read: read as i64,
+            accepted: accepted as i64,
+            rejected: (read - accepted) as i64,
+        })
+    }
+
+    /// Which of currents and torques a file has: one of them, and the same in each file.
+    fn signal_of(&mut self, open: &OpenedFile, label: &str) -> Result<()> {
+        let given = open.binding().slots();
+        let has = |setting: &str| given.contains(&self.arm.slots.of(setting).start);
+        let own = match (has("torque"), has("current")) {
+            (true, false) => "torque",
+            (false, true) => "current",
+            (true, true) => {
+                return Err(Error::data(label, "has torques and currents; map one of them: the other would not be used"));
+            }
+            (false, false) => {
+                let lacks = open.binding().missing.join("; ");
+                return Err(Error::data(label, format!("has neither torques nor motor currents of the joints: {lacks}")));
+            }
+        };
+        match self.signal.replace(own) {
+            Some(first) if first != own => {
+                Err(Error::data(label, format!("holds {own}s, the files before hold {first}s; allowed: the same in each")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Every file has the same quantities beside.
+    fn agree(&mut self, [velocity, temperature]: [bool; 2], label: &str) -> Result<()> {
+        if self.written == 0 && self.chunk.rows() == 0 {
+            self.chunk.velocity = velocity.then(Vec::new);
+            self.chunk.temperature = temperature.then(Vec::new);
+        }
+        for (name, first, own) in [
+            ("velocity", self.chunk.velocity.is_some(), velocity),
+            ("temperature", self.chunk.temperature.is_some(), temperature),
+        ] {
+            if first != own {
+                let which = if own { "has" } else { "lacks" };
+                return Err(Error::data(label, format!("{which} the quantity `{name}`, other than the files before")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a row without the torque of a joint: columns may be missing, cells may not.
+    fn complete(&self, row: &RecordedRow) -> Result<(), RowRefusal> {
+        let signal = self.signal.unwrap_or("torque");
+        let blank = |setting: &str| {
+            row.values.get(self.arm.slots.of(setting)).unwrap_or_default().iter().position(|value| value.is_nan())
+        };
+        let velocity = self.chunk.velocity.as_ref().and_then(|_| blank("velocity").map(|joint| ("velocity", joint)));
+        let lacking = blank(signal).map(|joint| (signal, joint)).or(velocity);
+        let time = row.values.get(self.arm.slots.time).is_some_and(|time| time.is_nan());
+        let lacking = lacking.map(|(what, joint)| format!("the {what} of joint {} is blank", joint + 1));
+        match lacking.or_else(|| time.then(|| "time is blank".into())) {
+            Some(detail) => Err(RowRefusal { reason: Reason::Blank, detail }),
+            None => Ok(()),
+        }
+    }
+
+    fn push(&mut self, row: &RecordedRow, label: &str, context: &Context) -> Result<()> {
+        let values = |setting: &str| row.values.get(self.arm.slots.of(setting)).unwrap_or_default();
+        let (q, time) = (values("q"), row.values.get(self.arm.slots.time).copied().unwrap_or(f64::NAN));
+        let trajectory = row.texts.get(self.trajectory).map_or("", String::as_str);
+        let stretch = self
+            .stretches
+            .next(trajectory, time, q, row.line)
+            .map_err(|message| Error::data(format!("{label}:{}", row.line), message))?;
+        if let Some(warning) = self.stretches.warning(label) {
+            context.services.warn(warning);
+        }
+        let signal = values(self.signal.unwrap_or("torque"));
+        self.channels.iter_mut().zip(signal).for_each(|(channel, value)| channel.push(*value));
+        let chunk = &mut self.chunk;
+        chunk.time.push(time);
+        chunk.trajectory.push(stretch);
+        chunk.q.extend_from_slice(q);
+        if self.signal == Some("current") {
+            chunk.current.get_or_insert_default().extend_from_slice(signal);
+        } else {
+            let joint_side = signal.iter().zip(&self.ratio).map(|(torque, ratio)| torque * ratio);
+            chunk.torque.get_or_insert_default().extend(joint_side);
+        }
+        chunk.velocity.iter_mut().for_each(|all| all.extend_from_slice(values("velocity")));
+        chunk.temperature.iter_mut().for_each(|all| all.extend_from_slice(values("temperature")));
+        let usage = row.texts.get(self.usage).map_or("", String::as_str);
+        let known = chunk.usages.iter().position(|known| known == usage);
+        let usage = match (usage.is_empty(), known) {
+            (true, _) => None,
+            (false, Some(known)) => Some(known as u16),
+            (false, None) if chunk.usages.len() >= MOST_LABELS => {
+                let message = format!("`usage` has more than {MOST_LABELS} labels; allowed: such as fit and validate");
+                return Err(Error::data(format!("{label}:{}", row.line), message));
+            }
+            (false, None) => {
+                chunk.usages.push(usage.into());
+                Some((chunk.usages.len() - 1) as u16)
+            }
+        };
+        chunk.usage.push(usage);
+        self.written += 1;
+        chunk.sequence.push(self.written);
+        if chunk.rows() >= CHUNK { self.flush() } else { Ok(()) }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        let next = Motion {
+            usages: self.chunk.usages.clone(),
+            velocity: self.chunk.velocity.as_ref().map(|_| Vec::new()),
+            temperature: self.chunk.temperature.as_ref().map(|_| Vec::new()),
+            ..Motion::default()
+        };
+        let mut full = std::mem::replace(&mut self.chunk, next);
+        full.joints = self.arm.joints();
+        full.prismatic.clone_from(&self.arm.prismatic);
+        self.sink.push(full.to_frame()?)
+    }
+
+    fn few_rejected(&self, label: &str, read: u64, accepted: u64, refused: &RefusalCounts) -> Result<()> {
+        let share = self.settings.max_rejected_fraction;
+        if read == 0 {
+            return Err(Error::data(label, "has a header but no data row; allowed: at least one"));
+        }
+        if accepted > 0 && (read - accepted) as f64 <= share * read as f64 {
+            return Ok(());
+        }
+        let worst = refused.values().max_by_key(|count| count.rows);
+        let (line, why) = worst.map_or((0, ""), |count| (count.first_line, count.first_detail.as_str()));
+        let message = format!(
+            "{} of {read} rows are rejected, allowed: up to {} % (`max_rejected_fraction`); the first: {why}",
+            read - accepted,
+            share * 100.0
+        );
+        Err(Error::data(format!("{label}:{line}"), message))
+    }
+
+    fn finish(mut self, context: &Context) -> Result<StreamedTable<Motion>> {
+        let signal = self.signal.unwrap_or("torque");
+        let dead: Vec<Fault> = (1..)
+            .zip(&self.channels)
+            .filter_map(|(joint, channel)| Some((joint, channel.constant()?)))
+            .map(|(joint, value)| {
+                let message = format!("the {signal} of joint {joint} is {value} in each of {} rows: a dead channel", self.written);
+                Fault::new(format!("table motion, {signal} of joint {joint}"), message)
+            })
+            .collect();
+        if !dead.is_empty() {
+            return Err(Error::Data(dead));
+        }
+        for (joint, channel) in (1..).zip(&self.channels) {
+            if let Some(clipped) = channel.clipped() {
+                context.services.warn(format!("the {signal} of joint {joint} {clipped}: saturated?"));
+            }
+        }
+        if self.chunk.rows() > 0 || self.written == 0 {
+            self.flush()?;
+        }
+        context.services.note(format!(
+            "{} of {signal}s, {}",
+            counted(self.written as u64, "row"),
+            counted(self.stretches.count() as u64, "stretch").replace("stretchs", "stretches")
+        ));
+        Ok(StreamedTable::new(self.sink.finish()?))
+    }
+}

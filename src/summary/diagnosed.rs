@@ -1,0 +1,82 @@
+//! A diagnosis of either kind: of positions or of torques.
+
+use super::{DiagnosisSummary, TorqueSummary};
+use crate::error::{Error, Result};
+use crate::pipeline::StageReport;
+use crate::stage::{DiagnoseTorques, Stage};
+use crate::store::Store;
+use serde_json::Value;
+
+/// What a stage that diagnoses wrote.
+pub enum Diagnosed {
+    /// By `diagnose`.
+    Positions(Box<DiagnosisSummary>),
+    /// By `diagnose_torques`.
+    Torques(TorqueSummary),
+}
+
+impl Diagnosed {
+    /// What the stage of a run wrote. Fails where a table has left the store.
+    pub fn read(run: &str, stage: &StageReport, store: &Store) -> Result<Self> {
+        if stage.uses == DiagnoseTorques::NAME {
+            return TorqueSummary::read(stage, store).map(Self::Torques);
+        }
+        DiagnosisSummary::read(run, stage, store).map(|told| Self::Positions(Box::new(told)))
+    }
+
+    /// Whether the files do not belong together as they are read.
+    pub fn is_wrong_setup(&self) -> bool {
+        match self {
+            Self::Positions(told) => told.is_wrong_setup(),
+            Self::Torques(told) => told.is_wrong_setup(),
+        }
+    }
+
+    /// The proposed formula of a finding as a file that declares it; of torques there is none.
+    pub fn effect_file(&self, finding: Option<i64>) -> Result<String> {
+        match self {
+            Self::Positions(told) => told.effect_file(finding),
+            Self::Torques(_) => Err(Error::spec("--export-effect", "findings on torques have no formula of their own")),
+        }
+    }
+
+    /// The diagnosis as one document; `store` is the `--store` of the commands that it proposes.
+    pub fn document(&self, store: &str) -> Value {
+        match self {
+            Self::Positions(told) => told.document(store),
+            Self::Torques(told) => told.document(),
+        }
+    }
+
+    /// All of it, for a person.
+    pub fn text(&self, store: &str) -> String {
+        match self {
+            Self::Positions(told) => told.text(store),
+            Self::Torques(told) => told.text(),
+        }
+    }
+
+    /// The verdict and a line a finding.
+    pub fn short(&self, store: &str) -> String {
+        match self {
+            Self::Positions(told) => told.short(store),
+            Self::Torques(told) => told.short(),
+        }
+    }
+
+    /// The verdict and what it rests on, in one sentence.
+    pub fn verdict(&self) -> String {
+        match self {
+            Self::Positions(told) => told.verdict(),
+            Self::Torques(told) => told.verdict(),
+        }
+    }
+
+    /// The largest findings in a line; nothing where nothing was found.
+    pub fn strongest(&self) -> Option<String> {
+        match self {
+            Self::Positions(told) => told.strongest(),
+            Self::Torques(told) => told.strongest(),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! An arm that moves: joints and their torques or motor currents, in the order of time. SI in Rust, mm and rad in the table.
+
+use super::torque_course::interleaved;
+use crate::error::Result;
+use crate::store::frame::{Cell, Frame, FrameBuilder};
+use crate::table::Table;
+use crate::units::Unit;
+use std::collections::BTreeMap;
+
+/// Rows in the order of time; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Motion {
+    /// Joints of the arm.
+    pub joints: usize,
+    /// Which joints are prismatic.
+    pub prismatic: Vec<bool>,
+    /// From 1.
+    pub sequence: Vec<i64>,
+    /// Stretch of the recording, from 1.
+    pub trajectory: Vec<i64>,
+    /// What rows may be for.
+    pub usages: Vec<String>,
+    /// Which of [`Motion::usages`] a row is for; none where the recording says nothing.
+    pub usage: Vec<Option<u16>>,
+    /// s, ascending in a trajectory.
+    pub time: Vec<f64>,
+    /// rad or m.
+    pub q: Vec<f64>,
+    /// rad/s or m/s.
+    pub velocity: Option<Vec<f64>>,
+    /// A, of the motors.
+    pub current: Option<Vec<f64>>,
+    /// Nm, on the side of the joints.
+    pub torque: Option<Vec<f64>>,
+    /// C; NaN where a row has none.
+    pub temperature: Option<Vec<f64>>,
+}
+
+/// Stored names of a per-joint quantity and their units; `sliding` is that of prismatic joints.
+#[derive(Clone, Copy)]
+struct PerJoint {
+    turning: (&'static str, Unit),
+    sliding: (&'static str, Unit),
+}
+
+const Q: PerJoint = PerJoint { turning: ("q{j}_rad", Unit::Radian), sliding: ("q{j}_mm", Unit::Millimetre) };
+const VELOCITY: PerJoint =
+    PerJoint { turning: ("dq{j}_rad_s", Unit::RadianPerSecond), sliding: ("dq{j}_mm_s", Unit::MillimetrePerSecond) };
+const CURRENT: PerJoint = PerJoint { turning: ("i{j}_a", Unit::Ampere), sliding: ("i{j}_a", Unit::Ampere) };
+const TORQUE: PerJoint = PerJoint { turning: ("tau{j}_nm", Unit::NewtonMetre), sliding: ("tau{j}_nm", Unit::NewtonMetre) };
+
+impl PerJoint {
+    fn column(self, joint: usize, prismatic: bool) -> (String, Unit) {
+        let (name, unit) = if prismatic { self.sliding } else { self.turning };
+        (name.replace("{j}", &(joint + 1).to_string()), unit)
+    }
+
+    fn push(self, frame: &mut FrameBuilder, prismatic: &[bool], all: &[f64]) {
+        for (joint, slides) in prismatic.iter().enumerate() {
+            let (name, unit) = self.column(joint, *slides);
+            let values = all.iter().skip(joint).step_by(prismatic.len());
+            frame.push(name, Cell::to_array(values.map(|value| unit.from_si(*value)).collect::<Vec<f64>>()));
+        }
+    }
+
+    /// Row-major, SI; none where the table has no such columns.
+    fn read(self, frame: &Frame, prismatic: &[bool]) -> Result<Option<Vec<f64>>> {
+        let named: Vec<(String, Unit)> =
+            prismatic.iter().enumerate().map(|(joint, slides)| self.column(joint, *slides)).collect();
+        if named.first().is_none_or(|(name, _)| frame.column(name).is_none()) {
+            return Ok(None);
+        }
+        let mut columns = Vec::with_capacity(named.len());
+        for (name, unit) in &named {
+            let mut values = frame.read::<f64>(name)?;
+            values.iter_mut().for_each(|value| *value = unit.to_si(*value));
+            columns.push(values);
+        }
+        Ok(Some(interleaved(&columns)))
+    }
+}
+
+impl Motion {
+    /// How many rows.
+    pub fn rows(&self) -> usize {
+        self.sequence.len()
+    }
+}
+
+impl Table for Motion {
+    const KIND: &'static str = "motion";
+
+    fn to_frame(&self) -> Result<Frame> {
+        let mut frame = FrameBuilder::new(Self::KIND);
+        frame.push("sequence", Cell::to_array(self.sequence.clone()));
+        frame.push("trajectory", Cell::to_array(self.trajectory.clone()));
+        let name = |usage: &Option<u16>| usage.and_then(|usage| self.usages.get(usize::from(usage)).cloned());
+        frame.push("usage", Cell::to_array(self.usage.iter().map(name).collect::<Vec<Option<String>>>()));
+        frame.push("time_s", Cell::to_array(self.time.clone()));
+        Q.push(&mut frame, &self.prismatic, &self.q);
+        for (quantity, all) in [(VELOCITY, &self.velocity), (CURRENT, &self.current), (TORQUE, &self.torque)] {
+            all.iter().for_each(|all| quantity.push(&mut frame, &self.prismatic, all));
+        }
+        if let Some(all) = &self.temperature {
+            let stored = all.iter().map(|value| (!value.is_nan()).then_some(*value));
+            frame.push("temp_c", Cell::to_array(stored.collect::<Vec<Option<f64>>>()));
+        }
+        frame.finish()
+    }
+
+    fn from_frame(frame: &Frame) -> Result<Self> {
+        let has = |name: String| frame.column(&name).is_some();
+        let prismatic: Vec<bool> = (1..)
+            .map(|joint| (has(format!("q{joint}_rad")), has(format!("q{joint}_mm"))))
+            .take_while(|(turns, slides)| *turns || *slides)
+            .map(|(_, slides)| slides)
+            .collect();
+        let (mut usages, mut numbers) = (Vec::new(), BTreeMap::new());
+        let mut number = |name: Option<String>| {
+            let name = name?;
+            Some(*numbers.entry(name).or_insert_with_key(|name| {
+                usages.push(name.clone());
+                (usages.len() - 1) as u16
+            }))
+        };
+        let usage = frame.read::<Option<String>>("usage")?.into_iter().map(&mut number).collect();
+        let temperature = match frame.column("temp_c") {
+            Some(_) => {
+                let all = frame.read::<Option<f64>>("temp_c")?;
+                Some(all.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+            }
+            None => None,
+        };
+        Ok(Self {
+            joints: prismatic.len(),
+            sequence: frame.read("sequence")?,
+            trajectory: frame.read("trajectory")?,
+            usage,
+            usages,
+            time: frame.read("time_s")?,
+            q: Q.read(frame, &prismatic)?.unwrap_or_default(),
+            velocity: VELOCITY.read(frame, &prismatic)?,
+            current: CURRENT.read(frame, &prismatic)?,
+            torque: TORQUE.read(frame, &prismatic)?,
+            temperature,
+            prismatic,
+        })
+    }
+}

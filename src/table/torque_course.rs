@@ -1,0 +1,109 @@
+//! Measured and predicted torques over time.
+
+use crate::dynamics::TorqueDiagnosis;
+use crate::error::Result;
+use crate::store::frame::{Cell, Frame, FrameBuilder};
+use crate::table::Table;
+
+/// The judged rows; key `sequence`. Per-joint quantities are row-major (`row * joints + joint`).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TorqueCourse {
+    /// Joints of the arm.
+    pub joints: usize,
+    /// Row of the recording.
+    pub sequence: Vec<i64>,
+    /// s.
+    pub time: Vec<f64>,
+    /// Whether no step was fitted to the row.
+    pub held_out: Vec<bool>,
+    /// Whether something pushed on the arm.
+    pub in_event: Vec<bool>,
+    /// Whether the joint rests.
+    pub rest: Vec<bool>,
+    /// rad/s.
+    pub velocity: Vec<f64>,
+    /// Nm.
+    pub measured: Vec<f64>,
+    /// Nm: of the rigid arm alone.
+    pub simulated: Vec<f64>,
+    /// Nm: with the findings.
+    pub corrected: Vec<f64>,
+}
+
+impl TorqueCourse {
+    /// The courses of a diagnosis; `sequence` numbers the rows of the recording.
+    pub fn of(diagnosis: &TorqueDiagnosis, joints: usize, sequence: &[i64]) -> Self {
+        let courses = &diagnosis.courses;
+        Self {
+            joints,
+            sequence: courses.row.iter().map(|row| sequence[*row]).collect(),
+            time: courses.time.clone(),
+            held_out: courses.held_out.clone(),
+            in_event: courses.in_event.clone(),
+            rest: courses.at_rest.clone(),
+            velocity: courses.velocity.clone(),
+            measured: courses.measured.clone(),
+            simulated: courses.simulated.clone(),
+            corrected: courses.corrected.clone(),
+        }
+    }
+
+    /// A joint's part of a row-major list, by row.
+    pub fn of_joint<'a, T: Copy>(&self, all: &'a [T], joint: usize) -> impl Iterator<Item = T> + use<'a, T> {
+        all.iter().skip(joint).step_by(self.joints.max(1)).copied()
+    }
+}
+
+impl Table for TorqueCourse {
+    const KIND: &'static str = "torque_course";
+
+    fn to_frame(&self) -> Result<Frame> {
+        let mut frame = FrameBuilder::new(Self::KIND);
+        frame.push("sequence", Cell::to_array(self.sequence.clone()));
+        frame.push("time_s", Cell::to_array(self.time.clone()));
+        frame.push("held_out", Cell::to_array(self.held_out.clone()));
+        frame.push("in_event", Cell::to_array(self.in_event.clone()));
+        for joint in 0..self.joints {
+            frame.push(format!("rest{}", joint + 1), Cell::to_array(self.of_joint(&self.rest, joint).collect()));
+        }
+        for (name, all) in [
+            ("dq{j}_rad_s", &self.velocity),
+            ("measured{j}_nm", &self.measured),
+            ("simulated{j}_nm", &self.simulated),
+            ("corrected{j}_nm", &self.corrected),
+        ] {
+            for joint in 0..self.joints {
+                let name = name.replace("{j}", &(joint + 1).to_string());
+                frame.push(name, Cell::to_array(self.of_joint(all, joint).collect()));
+            }
+        }
+        frame.finish()
+    }
+
+    fn from_frame(frame: &Frame) -> Result<Self> {
+        let joints = (1..).take_while(|joint| frame.column(&format!("rest{joint}")).is_some()).count();
+        let all = |name: &str| -> Result<Vec<f64>> {
+            let read = |joint: usize| frame.read::<f64>(&name.replace("{j}", &joint.to_string()));
+            Ok(interleaved(&(1..=joints).map(read).collect::<Result<Vec<_>>>()?))
+        };
+        let rest = (1..=joints).map(|joint| frame.read::<bool>(&format!("rest{joint}"))).collect::<Result<Vec<_>>>()?;
+        Ok(Self {
+            joints,
+            sequence: frame.read("sequence")?,
+            time: frame.read("time_s")?,
+            held_out: frame.read("held_out")?,
+            in_event: frame.read("in_event")?,
+            rest: interleaved(&rest),
+            velocity: all("dq{j}_rad_s")?,
+            measured: all("measured{j}_nm")?,
+            simulated: all("simulated{j}_nm")?,
+            corrected: all("corrected{j}_nm")?,
+        })
+    }
+}
+
+/// Columns of equal length -> row-major.
+pub(super) fn interleaved<T: Copy>(columns: &[Vec<T>]) -> Vec<T> {
+    let rows = columns.first().map_or(0, Vec::len);
+    (0..rows).flat_map(|row| columns.iter().map(move |column| column[row])).collect()
+}

@@ -1,0 +1,17 @@
+//! Torques of a moving arm whose truth is known: recordings of currents or torque sensors with concealed physics.
+//!
+//! [`rigid`] moves bodies and adds what they take about each axis, `path` moves the joints, `law` holds what is concealed, `draw` draws
+//! a case of a seed, `record` measures it, `visible` says how much of each effect data can show, `folder` writes the files.
+
+mod draw;
+mod folder;
+mod law;
+mod names;
+mod path;
+mod record;
+pub mod rigid;
+mod visible;
+
+pub use draw::{TorqueCase, TorqueDesign};
+pub use folder::TorqueFile;
+pub use record::TorqueRows;

@@ -1,0 +1,263 @@
+//! How much of each effect data can show: its squared size over the noise, after masses within their tolerance and the other concealed
+//! effects have absorbed what they can; and which other names would say the same.
+
+use super::draw::TorqueCase;
+use super::law::{Law, Moment};
+use super::record::{LASTS, TorqueRows};
+use super::rigid::Machine;
+
+/// Rows that are averaged into one: as a low-pass does.
+const AVERAGED: usize = 4;
+/// What is left of an effect beside another name, as a share and as L, where data cannot separate the two.
+const SAME_SHARE: f64 = 0.02;
+const SAME: f64 = 12.0;
+/// Added to the diagonal so that what is not determined absorbs nothing, as a share.
+const HELD: f64 = 1e-9;
+
+/// An effect as data show it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Visible {
+    /// After and before projection.
+    pub l: f64,
+    pub before: f64,
+    /// Names and places that say the same.
+    pub same: Vec<(String, String)>,
+}
+
+/// Averaged and whitened columns of the rows to fit.
+struct Columns<'a> {
+    case: &'a TorqueCase,
+    rows: &'a TorqueRows,
+    weight: Vec<f64>,
+}
+
+impl TorqueCase {
+    /// Of each law; `rows` are those with all of them.
+    pub(super) fn visible(&self, rows: &TorqueRows) -> Vec<Visible> {
+        let all: Vec<usize> = (0..self.laws.len()).collect();
+        let columns = Columns::new(self, rows);
+        let without = |index: usize| {
+            let others: Vec<usize> = all.iter().copied().filter(|other| *other != index).collect();
+            let less = self.rows(&others);
+            columns.of(rows.torque.iter().zip(&less.torque).map(|(with, less)| with - less))
+        };
+        let effects: Vec<Vec<f64>> = all.iter().map(|index| without(*index)).collect();
+        let base = columns.inertial();
+        let rivals = columns.rivals();
+        let seen = |index: usize| {
+            let others = effects.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, column)| column.as_slice());
+            // Masses cost what their tolerance says: their columns are in standard deviations, with 1 on the diagonal.
+            let held: Vec<(&[f64], f64)> = base.iter().map(|c| (c.as_slice(), 1.0)).chain(others.map(|c| (c, 0.0))).collect();
+            let space = Space::new(&held);
+            let own = space.projected(&effects[index]);
+            let (l, before) = (space.dot(&own, &own), square(&effects[index]));
+            let law = &self.laws[index];
+            let known = (law.name().to_string(), law.place());
+            let says_the_same = |rival: &&(String, String, Vec<Vec<f64>>)| {
+                space.left(&own, &rival.2, l) < SAME.max(SAME_SHARE * l)
+            };
+            let same = rivals.iter().filter(says_the_same).map(|(name, place, _)| (name.clone(), place.clone()));
+            let same = same.filter(|rival| *rival != known).collect();
+            Visible { l, before, same }
+        };
+        all.iter().map(|index| seen(*index)).collect()
+    }
+}
+
+impl<'a> Columns<'a> {
+    fn new(case: &'a TorqueCase, rows: &'a TorqueRows) -> Self {
+        // Lasting noise counts as one value in so many averaged rows.
+        let lasts = LASTS.powi(AVERAGED as i32);
+        let lasting = (1.0 + lasts) / (1.0 - lasts);
+        let weight = case.white.iter().zip(&case.lasting);
+        let weight = weight.map(|(white, own)| (white * white / AVERAGED as f64 + own * own * lasting).sqrt().recip());
+        Self { case, rows, weight: weight.collect() }
+    }
+
+    /// Of torques in all rows.
+    fn of(&self, torque: impl Iterator<Item = f64>) -> Vec<f64> {
+        let n = self.weight.len();
+        let torque: Vec<f64> = torque.collect();
+        let fit = self.rows.validate.iter().filter(|validate| !**validate).count();
+        let mut out = Vec::with_capacity(fit / AVERAGED * n);
+        for block in torque[..fit * n].chunks_exact(AVERAGED * n) {
+            for (joint, weight) in self.weight.iter().enumerate() {
+                let sum: f64 = block.iter().skip(joint).step_by(n).sum();
+                out.push(weight * sum / AVERAGED as f64);
+            }
+        }
+        out
+    }
+
+    fn of_machine(&self, change: impl Fn(&mut Machine)) -> Vec<f64> {
+        let mut machine = self.case.stated.clone();
+        change(&mut machine);
+        let less = |state| {
+            let with = machine.torque(state);
+            let without = self.case.stated.torque(state);
+            with.into_iter().zip(without).map(|(with, less)| with - less)
+        };
+        self.of(self.rows.state.iter().flat_map(less))
+    }
+
+    /// Every number of every body changed by one standard deviation.
+    fn inertial(&self) -> Vec<Vec<f64>> {
+        let tolerance = self.case.robot.inertias.tolerance;
+        let (mass, centre, inertia) = tolerance.map_or((0.05, 0.01, 0.2), |one| (one.mass, one.centre, one.inertia));
+        let mut columns = Vec::new();
+        for link in 0..self.case.stated.links.len() {
+            columns.push(self.of_machine(|machine| machine.links[link].mass *= 1.0 + mass));
+            columns.extend((0..3).map(|k| self.of_machine(|machine| machine.links[link].centre[k] += centre)));
+            for k in 0..6 {
+                let most = self.case.stated.links[link].inertia.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+                columns.push(self.of_machine(|machine| machine.links[link].inertia[k] += inertia * most));
+            }
+        }
+        columns
+    }
+
+    /// Linear effects of unit size, by name and place.
+    fn rivals(&self) -> Vec<(String, String, Vec<Vec<f64>>)> {
+        let n = self.weight.len();
+        let mut rivals: Vec<(String, String, Vec<Vec<f64>>)> = Vec::new();
+        let mut add = |law: &Law, columns: Vec<Vec<f64>>| rivals.push((law.name().into(), law.place(), columns));
+        for joint in 0..n {
+            for law in per_joint(joint) {
+                add(&law, vec![self.of_law(&law)]);
+            }
+            let law = Law::TorqueConstant { joint, share: 0.0 };
+            let own = self.rows.torque.iter().enumerate().map(|(k, torque)| if k % n == joint { *torque } else { 0.0 });
+            if !self.case.sensors {
+                add(&law, vec![self.of(own)]);
+            }
+            add(&Law::LinkMass { link: joint, share: 0.0 }, vec![self.of_machine(|machine| machine.links[joint].mass += 1.0)]);
+            let centre = (0..3).map(|k| self.of_machine(|machine| machine.links[joint].centre[k] += 0.01));
+            add(&Law::LinkCentre { link: joint, shift: [0.0; 3] }, centre.collect());
+            let inertia = (0..6).map(|k| self.of_machine(|machine| machine.links[joint].inertia[k] += 0.1));
+            add(&Law::LinkInertia { link: joint, share: 0.0 }, inertia.collect());
+        }
+        let payload = |change: fn(&mut super::rigid::Body)| {
+            self.of_machine(|machine| machine.payload.iter_mut().for_each(change))
+        };
+        let payload: Vec<Vec<f64>> = vec![
+            payload(|body| body.mass += 1.0),
+            payload(|body| body.centre[0] += 0.01),
+            payload(|body| body.centre[1] += 0.01),
+            payload(|body| body.centre[2] += 0.01),
+        ];
+        add(&Law::Payload { mass: 0.0, centre: [0.0; 3] }, payload);
+        let tilt = [0, 1].map(|k| self.of_machine(|machine| machine.gravity[k] += 0.1));
+        add(&Law::Tilt { by: [0.0; 2] }, tilt.into());
+        rivals
+    }
+
+    /// The torques of a law alone, on the rigid arm.
+    fn of_law(&self, law: &Law) -> Vec<f64> {
+        let n = self.weight.len();
+        let mut all = Vec::with_capacity(self.rows.torque.len());
+        let mut past = law.begin(&self.rows.rigid[..n]);
+        let friction = vec![0.0; n];
+        for (row, state) in self.rows.state.iter().enumerate() {
+            let rigid = &self.rows.rigid[row * n..(row + 1) * n];
+            let mut torque = vec![0.0; n];
+            let now = Moment { time: self.rows.time[row], step: 1.0 / self.case.rate, state, rigid, friction: &friction };
+            law.add(&now, &mut past, &mut torque);
+            all.extend(torque);
+        }
+        self.of(all.into_iter())
+    }
+}
+
+/// Effects of a joint that are linear in their size, in usual forms.
+fn per_joint(joint: usize) -> Vec<Law> {
+    let width = 0.008;
+    vec![
+        Law::Viscous { joint, size: 1.0, exponent: 1.0 },
+        Law::Coulomb { joint, size: 1.0, width },
+        Law::Asymmetric { joint, size: 1.0, width },
+        Law::Stribeck { joint, size: 1.0, speed: 0.05, exponent: 1.0 },
+        Law::Stribeck { joint, size: 1.0, speed: 0.1, exponent: 1.0 },
+        Law::Load { joint, share: 1.0, exponent: 1.0, width },
+        Law::Rotor { joint, inertia: 1.0 },
+        Law::Offset { joint, size: 1.0 },
+        Law::Cable { joint, stiffness: 1.0, zero: 0.0, hardening: 0.0 },
+        Law::Spring { joint, size: 1.0, zero: 0.0 },
+        Law::Spring { joint, size: 1.0, zero: 1.5707963 },
+    ]
+}
+
+fn square(column: &[f64]) -> f64 {
+    column.iter().map(|x| x * x).sum()
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The space of held columns, each with what its number costs; a Cholesky factor of their normal matrix.
+struct Space<'a> {
+    held: Vec<&'a [f64]>,
+    factor: Vec<Vec<f64>>,
+}
+
+/// A column beside what the held ones make of it.
+struct Projected {
+    column: Vec<f64>,
+    /// L^-1 of its products with the held columns.
+    seen: Vec<f64>,
+}
+
+impl<'a> Space<'a> {
+    fn new(held: &[(&'a [f64], f64)]) -> Self {
+        let gram = |i: usize, j: usize| {
+            let own = product(held[i].0, held[j].0);
+            if i == j { own * (1.0 + HELD) + held[i].1 + f64::MIN_POSITIVE } else { own }
+        };
+        let mut factor: Vec<Vec<f64>> = Vec::with_capacity(held.len());
+        for i in 0..held.len() {
+            let mut row = Vec::with_capacity(i + 1);
+            for j in 0..=i {
+                let sum: f64 = product(&row, &factor.get(j).map_or(&row[..], |other| other)[..j.min(row.len())]);
+                let rest = gram(i, j) - sum;
+                row.push(if i == j { rest.max(HELD * gram(i, i)).max(f64::MIN_POSITIVE).sqrt() } else { rest / factor[j][j] });
+            }
+            factor.push(row);
+        }
+        Self { held: held.iter().map(|(column, _)| *column).collect(), factor }
+    }
+
+    fn projected(&self, column: &[f64]) -> Projected {
+        let mut seen: Vec<f64> = Vec::with_capacity(self.held.len());
+        for (row, held) in self.factor.iter().zip(&self.held) {
+            let rest = product(held, column) - product(&row[..seen.len()], &seen);
+            seen.push(rest / row[seen.len()]);
+        }
+        Projected { column: column.to_vec(), seen }
+    }
+
+    fn dot(&self, a: &Projected, b: &Projected) -> f64 {
+        product(&a.column, &b.column) - product(&a.seen, &b.seen)
+    }
+
+    /// What is left of `own` (of square `l`) beside these columns.
+    fn left(&self, own: &Projected, columns: &[Vec<f64>], l: f64) -> f64 {
+        let mut basis: Vec<Projected> = Vec::new();
+        let mut left = l;
+        for column in columns {
+            let mut next = self.projected(column);
+            let before = square(column).max(f64::MIN_POSITIVE);
+            for other in &basis {
+                let share = self.dot(&next, other) / self.dot(other, other);
+                next.column.iter_mut().zip(&other.column).for_each(|(x, y)| *x -= share * y);
+                next.seen.iter_mut().zip(&other.seen).for_each(|(x, y)| *x -= share * y);
+            }
+            let size = self.dot(&next, &next);
+            if size > 1e-6 * before {
+                let along = self.dot(own, &next);
+                left -= along * along / size;
+                basis.push(next);
+            }
+        }
+        left
+    }
+}
