@@ -11,8 +11,8 @@ const AVERAGED: f64 = 0.8;
 /// Events of a recording, at most.
 const MOST: usize = 4;
 /// Median absolute deviations above the median, and times the median, at which a time is looked at.
-const DEVIATIONS: f64 = 8.0;
-const TIMES_USUAL: f64 = 3.0;
+const DEVIATIONS: f64 = 6.0;
+const TIMES_USUAL: f64 = 1.7;
 /// s that are tried.
 const DURATIONS: [f64; 6] = [0.6, 0.9, 1.2, 1.6, 2.0, 2.6];
 /// s beside the highest point that are tried as middles: steps on either side, and their length.
@@ -25,8 +25,8 @@ const FINE_STEPS: i32 = 3;
 const FEWEST: usize = 4;
 /// s on either side of an event where no other is looked for.
 const APART: f64 = 1.6;
-/// What a force must gain, and which share of the residual it must explain.
-const GAIN: f64 = 150.0;
+/// What a force must gain, and which share it must explain of what stands above the noise.
+const GAIN: f64 = 100.0;
 const SHARE: f64 = 0.6;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
@@ -93,7 +93,7 @@ fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], ti
     best.filter(|(event, share)| event.gain > GAIN && *share > SHARE).map(|(event, _)| event)
 }
 
-/// A push that rises and falls as sin^2 over a window, fitted; and the share of the squared residual that it explains.
+/// A push that rises and falls as sin^2 over a window, fitted; and the share that it explains of the squared residual above the noise.
 fn pushed(
     problem: &TorqueProblem,
     residual: &[Vec<f64>],
@@ -103,6 +103,7 @@ fn pushed(
     duration: f64,
     rows: std::ops::Range<usize>,
 ) -> (ContactEvent, f64) {
+    let usual = (rows.len() * sigma.len()) as f64;
     let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     let mut by_joint = vec![0.0; sigma.len()];
     for row in rows {
@@ -131,7 +132,7 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    (event, gain / square.max(f64::MIN_POSITIVE))
+    (event, gain / (square - usual).max(gain))
 }
 
 /// Whether the arm moves in a good part of an event.
