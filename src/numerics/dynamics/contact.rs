@@ -28,6 +28,8 @@ const APART: f64 = 1.6;
 /// What a force must gain, and which share it must explain of what stands above the noise.
 const GAIN: f64 = 100.0;
 const SHARE: f64 = 0.6;
+/// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
+const OTHERS: f64 = 0.1;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
 
@@ -106,6 +108,7 @@ fn pushed(
     let usual = (rows.len() * sigma.len()) as f64;
     let (mut gram, mut right, mut square) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     let mut by_joint = vec![0.0; sigma.len()];
+    let mut along_force = vec![(Matrix3::zeros(), Vector3::zeros()); sigma.len()];
     for row in rows {
         let push = (PI * (time[row] - start) / duration).sin().powi(2);
         let jacobian = problem.scene.tool_jacobian(problem.reduction.rows[row]);
@@ -115,12 +118,16 @@ fn pushed(
             right += column * value;
             square += value * value;
             by_joint[joint] += value * value;
+            along_force[joint].0 += column * column.transpose();
+            along_force[joint].1 += column * value;
         }
     }
     let ridge = 1e-8 * gram.trace();
     let inverse = (gram + Matrix3::identity() * ridge).try_inverse().unwrap_or_else(Matrix3::zeros);
     let force = inverse * right;
-    let gain = 2.0 * force.dot(&right) - force.dot(&(gram * force));
+    let gained = |(gram, right): &(Matrix3<f64>, Vector3<f64>)| 2.0 * force.dot(right) - force.dot(&(gram * force));
+    let gain = gained(&(gram, right));
+    let most = along_force.iter().map(gained).fold(0.0, f64::max);
     let mut joints: Vec<usize> = (0..sigma.len()).collect();
     joints.sort_by(|a, b| by_joint[*b].total_cmp(&by_joint[*a]));
     joints.truncate(2);
@@ -132,7 +139,8 @@ fn pushed(
         sigma: [0, 1, 2].map(|axis| inverse[(axis, axis)].max(0.0).sqrt()),
         gain,
     };
-    (event, gain / (square - usual).max(gain))
+    let share = if gain - most < OTHERS * gain { 0.0 } else { gain / (square - usual).max(gain) };
+    (event, share)
 }
 
 /// Whether the arm moves in a good part of an event.
