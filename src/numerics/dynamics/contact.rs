@@ -28,14 +28,26 @@ const APART: f64 = 1.6;
 /// What a force must gain, and which share it must explain of what stands above the noise.
 const GAIN: f64 = 100.0;
 const SHARE: f64 = 0.6;
+/// The same beside a rich model, which takes part of it away: there rows are only set aside.
+const RICH_SHARE: f64 = 0.35;
 /// Share of the gain that is not of one joint: what only one joint feels is no force at the tool.
 const OTHERS: f64 = 0.1;
 /// Share of the rows in which the arm must move: at rest a slow change of torque is stiction.
 const MOVING: f64 = 0.3;
 
-/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time; only fitted rows are
-/// looked at where the residual is of a model too rich for others.
-pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], fitted_only: bool) -> Vec<ContactEvent> {
+/// What a residual is left by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beside {
+    /// A model too rich for rows that it was not fitted to.
+    RichModel,
+    /// A model that is still searched for: held-out rows are not looked at.
+    PresentModel,
+    /// The model that stands.
+    JudgedModel,
+}
+
+/// Contacts in a residual (`[joint][judged row]`, Nm) under noise of `sigma` (Nm per joint), in the order of time.
+pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], beside: Beside) -> Vec<ContactEvent> {
     let rows = problem.reduction.rows.len();
     let time: Vec<f64> = (0..rows).map(|row| problem.time(row)).collect();
     let energy: Vec<f64> = (0..rows)
@@ -43,12 +55,13 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
             residual.iter().zip(sigma).map(|(course, sigma)| (course[row] / sigma).powi(2)).sum::<f64>() / sigma.len() as f64
         })
         .collect();
-    let shown: Vec<usize> = (0..rows).filter(|row| !fitted_only || !problem.is_held_out(*row)).collect();
+    let shown: Vec<usize> = (0..rows).filter(|row| beside == Beside::JudgedModel || !problem.is_held_out(*row)).collect();
     let energy: Vec<f64> = shown.iter().map(|row| energy[*row]).collect();
     let average = averaged(&energy, ((AVERAGED * problem.reduction.rate) as usize).max(3));
     let median = nearest(&mut average.clone(), 0.5).unwrap_or(0.0);
     let mut apart: Vec<f64> = average.iter().map(|value| (value - median).abs()).collect();
     let spread = 1.4826 * nearest(&mut apart, 0.5).unwrap_or(0.0);
+    let least_share = if beside == Beside::RichModel { RICH_SHARE } else { SHARE };
     let (mut used, mut events) = (vec![false; shown.len()], Vec::new());
     for _ in 0..MOST {
         let free = (0..shown.len()).filter(|row| !used[*row]);
@@ -56,7 +69,7 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
         if average[highest] < median + DEVIATIONS * spread || average[highest] < TIMES_USUAL * median {
             break;
         }
-        let found = best_window(problem, residual, sigma, &time, time[shown[highest]]);
+        let found = best_window(problem, residual, sigma, &time, time[shown[highest]], least_share);
         events.extend(found.filter(|event| moves(problem, &time, event)));
         let near = |row: &usize| (time[shown[*row]] - time[shown[highest]]).abs() < APART;
         (0..shown.len()).filter(near).for_each(|row| used[row] = true);
@@ -66,7 +79,14 @@ pub(super) fn contacts(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[
 }
 
 /// The window about `middle` in which a force gains most, if it explains the residual there.
-fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], time: &[f64], middle: f64) -> Option<ContactEvent> {
+fn best_window(
+    problem: &TorqueProblem,
+    residual: &[Vec<f64>],
+    sigma: &[f64],
+    time: &[f64],
+    middle: f64,
+    least_share: f64,
+) -> Option<ContactEvent> {
     let mut best: Option<(ContactEvent, f64)> = None;
     let mut look = |start: f64, duration: f64| {
         let first = time.partition_point(|time| *time < start);
@@ -92,7 +112,7 @@ fn best_window(problem: &TorqueProblem, residual: &[Vec<f64>], sigma: &[f64], ti
             now = look(start + begin, duration + end - begin);
         }
     }
-    best.filter(|(event, share)| event.gain > GAIN && *share > SHARE).map(|(event, _)| event)
+    best.filter(|(event, share)| event.gain > GAIN && *share > least_share).map(|(event, _)| event)
 }
 
 /// A push that rises and falls as sin^2 over a window, fitted; and the share that it explains of the squared residual above the noise.
