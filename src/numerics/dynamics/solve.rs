@@ -72,7 +72,14 @@ pub(super) fn solve<'a>(
     look_for_contacts(&mut problem, &weighted, &set, Beside::JudgedModel);
     learn(&mut problem, &set);
     weighted = problem.weighted();
-    let judged = judge(&CauseChoice::new(&problem, &weighted, question.seed), set);
+    let judged = {
+        let choice = CauseChoice::new(&problem, &weighted, question.seed);
+        backward(&choice, &mut set);
+        let mut judged = judge(&choice, set);
+        // What only stood for something that was withdrawn.
+        backward(&choice, &mut judged.set);
+        judged
+    };
     SolvedTorques { problem, weighted, judged, latency: found }
 }
 
