@@ -9,7 +9,7 @@ const SETTLING: f64 = 0.3;
 /// Judged rows a second over the cut-off.
 const RATE_OVER_CUTOFF: f64 = 2.5;
 /// Judged rows at most: of longer recordings fewer a second.
-const MOST: usize = 8000;
+const MOST: usize = 4000;
 /// Rows that a block of a long stretch holds, its margins apart.
 const BLOCK: usize = 1 << 14;
 
