@@ -1,6 +1,6 @@
 //! From rows as recorded to judged rows: one low-pass, alike for measured torque and every column, then fewer rows.
 
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::filter::ZeroPhase;
 use std::ops::Range;
 
@@ -32,7 +32,7 @@ pub(super) struct Reduction {
 
 impl Reduction {
     /// Of a clock and a cut-off (Hz).
-    pub fn new(clock: &Clock, cutoff: f64) -> Self {
+    pub fn new(clock: &RecordingClock, cutoff: f64) -> Self {
         let recorded: usize = clock.stretches.iter().map(Range::len).sum();
         let every = ((clock.rate / (RATE_OVER_CUTOFF * cutoff)).round() as usize).max(recorded.div_ceil(MOST)).max(1);
         let settling = (SETTLING * clock.rate) as usize;
