@@ -112,6 +112,12 @@ fn nothing_is_found_in_the_torques_of_the_declared_arm() {
 }
 
 #[test]
+fn the_same_recording_gets_the_same_answer() {
+    let recording = record(&arm(), 0.0, &|row| if row.0 == 2 { 0.4 * (row.3 / 0.003).tanh() } else { 0.0 });
+    assert_eq!(diagnosed(&recording), diagnosed(&recording));
+}
+
+#[test]
 fn friction_of_a_joint_is_found_within_a_hundredth() {
     let rough = record(&arm(), 0.0, &|(joint, _, _, velocity, ..)| {
         if joint == 1 { 6.0 * velocity + 5.0 * (velocity / 0.003).tanh() } else { 0.0 }
