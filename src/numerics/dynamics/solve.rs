@@ -52,14 +52,14 @@ pub(super) fn solve<'a>(
     }
     let (noise, residual) = noise_beside(&problem, &rich_forms(&problem, &[]));
     if touched {
-        problem.events = contacts(&problem, &residual, &sigmas(&noise), ContactModel::RichModel);
+        problem.events = contacts(&problem, &residual, &sigmas(&noise), ContactModel::Rich);
     }
     learn(&mut problem, &[]);
     let mut weighted = problem.weighted();
     let mut set = from_common(&problem, &weighted, question.seed);
     let before = problem.events.clone();
     if touched {
-        look_for_contacts(&mut problem, &weighted, &set, ContactModel::PresentModel);
+        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Present);
     }
     if !alike(&before, &problem.events) {
         learn(&mut problem, &[]);
@@ -76,7 +76,7 @@ pub(super) fn solve<'a>(
         tell(told(&problem, &set));
     }
     if touched {
-        look_for_contacts(&mut problem, &weighted, &set, ContactModel::JudgedModel);
+        look_for_contacts(&mut problem, &weighted, &set, ContactModel::Judged);
     }
     learn(&mut problem, &set);
     weighted = problem.weighted();
