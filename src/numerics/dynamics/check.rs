@@ -1,9 +1,9 @@
 //! Whether a recording can be used at all: each fault is said with its joint or row and what is allowed.
 
 use super::arm::DynamicArm;
-use super::clock::Clock;
+use super::clock::RecordingClock;
 use super::inertials::DeclaredInertials;
-use super::newton_euler::{InverseDynamics, JointMotion};
+use super::newton_euler::{InverseDynamics, MotionRow};
 use super::recording::TorqueRecording;
 use crate::error::{Error, Fault, Result};
 use crate::statistics::nearest;
@@ -105,8 +105,8 @@ fn numbers(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
         faults.push(fault("points", format!("{far:.0} m from the base: lengths are in m (millimetres?)")));
     }
     let ranges: Vec<f64> = (0..n).map(|joint| range(recording, joint)).collect();
-    for joint in 0..n {
-        faults.extend(joint_faults(arm, recording, joint, ranges[joint]));
+    for (joint, range) in ranges.iter().enumerate() {
+        faults.extend(joint_faults(arm, recording, joint, *range));
     }
     let moving = ranges.iter().filter(|range| **range > 0.2 * LEAST_RANGE).count();
     let widest = ranges.iter().copied().fold(0.0, f64::max);
@@ -193,7 +193,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let mut products = vec![vec![0.0; n]; n];
     for row in 0..recording.rows() {
         let position = &recording.position[row * n..(row + 1) * n];
-        dynamics.torque(JointMotion { position, velocity: &still, acceleration: &still }, &arm.gravity, &theta, &mut gravity);
+        dynamics.torque(MotionRow { position, velocity: &still, acceleration: &still }, &arm.gravity, &theta, &mut gravity);
         for joint in 0..n {
             let torque = recording.torque[row * n + joint];
             measured_square[joint] += torque * torque;
@@ -208,7 +208,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
     let heaviest = weighty.iter().copied().max_by(|a, b| gravity_square[*a].total_cmp(&gravity_square[*b]));
     if let (Some(usual), Some(heaviest)) = (nearest(&mut ratios, 0.5), heaviest) {
         let own = (measured_square[heaviest] / gravity_square[heaviest]).sqrt();
-        if own > UNIT_RATIO || own < 1.0 / UNIT_RATIO {
+        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&own) {
             faults.push(fault(
                 "torque",
                 format!("torques are {own:.3e} times those of the declared masses at joint {} ({usual:.3e} at most joints): a unit, ratio or torque constant is wrong (by 1,000?)", heaviest + 1),
@@ -233,7 +233,7 @@ fn torque_faults(arm: &DynamicArm, recording: &TorqueRecording) -> Vec<Fault> {
 }
 
 /// What is odd about a recording that can be used, a sentence each.
-pub(super) fn remarks(recording: &TorqueRecording, clock: &Clock) -> Vec<String> {
+pub(super) fn remarks(recording: &TorqueRecording, clock: &RecordingClock) -> Vec<String> {
     let mut remarks = Vec::new();
     let usual = 1.0 / clock.rate;
     for stretch in &clock.stretches[1..] {

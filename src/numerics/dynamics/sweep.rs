@@ -20,7 +20,7 @@ pub(super) struct Gain {
 
 /// The base and a set of forms, swept out of all columns.
 #[derive(Clone)]
-pub(super) struct Sweep<'a> {
+pub(super) struct SweptColumns<'a> {
     all: &'a TorqueColumns,
     weighted: &'a WeightedColumns,
     pivots: Vec<usize>,
@@ -34,7 +34,7 @@ pub(super) struct Sweep<'a> {
     pub square: f64,
 }
 
-impl<'a> Sweep<'a> {
+impl<'a> SweptColumns<'a> {
     /// The base alone.
     pub fn base(all: &'a TorqueColumns, weighted: &'a WeightedColumns) -> Self {
         let mut sweep = Self {
@@ -167,8 +167,8 @@ impl<'a> Sweep<'a> {
                 }
                 half[i] /= self.rows[i][self.pivots[i]];
                 let value = half[i];
-                for m in i + 1..count {
-                    half[m] -= value * self.rows[i][self.pivots[m]];
+                for (entry, pivot) in half.iter_mut().zip(&self.pivots).skip(i + 1) {
+                    *entry -= value * self.rows[i][*pivot];
                 }
             }
         }

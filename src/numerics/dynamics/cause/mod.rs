@@ -32,6 +32,7 @@ use crate::effect::Place;
 pub(super) use coulomb::COULOMB;
 pub(super) use offset::OFFSET;
 pub(super) use rotor::ROTOR;
+pub(super) use unknown::UNKNOWN;
 pub(super) use viscous::VISCOUS;
 
 /// All causes with columns; latency and contacts are looked for before.
@@ -41,8 +42,8 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &offset::Offset,
     &asymmetric::Asymmetric,
     &stribeck::Stribeck,
-    &presliding::Presliding,
-    &load::Load,
+    &presliding::PreslidingFriction,
+    &load::LoadFriction,
     &warmup::Warmup,
     &rotor::Rotor,
     &torque_constant::TorqueConstant,
@@ -53,9 +54,9 @@ pub(super) const TORQUE_CAUSES: [&dyn TorqueCause; 22] = [
     &spikes::Spikes,
     &wrist_coupling::WristCoupling,
     &payload::Payload,
-    &link_mass::LinkMass,
-    &link_com::LinkCom,
-    &link_inertia::LinkInertia,
+    &link_mass::WrongLinkMass,
+    &link_com::WrongLinkCentre,
+    &link_inertia::WrongLinkInertia,
     &gravity_direction::GravityDirection,
     &unknown::Unnamed,
 ];
@@ -107,6 +108,10 @@ pub(super) trait TorqueCause: Sync {
     fn is_inertial(&self) -> bool {
         false
     }
+    /// Whether its columns are the same at whatever joint it acts.
+    fn is_alike_at_joints(&self) -> bool {
+        false
+    }
     /// Whether its columns are made of the rigid torque.
     fn is_of_rigid(&self) -> bool {
         false
@@ -124,14 +129,14 @@ pub(super) trait TorqueCause: Sync {
         None
     }
     /// Its numbers as people read them.
-    fn parameters(&self, form: &TorqueForm, fitted: &[Fitted]) -> Vec<TorqueParameter>;
+    fn parameters(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter>;
     /// A sentence without a full stop, with its size.
-    fn statement(&self, form: &TorqueForm, fitted: &[Fitted]) -> String;
+    fn statement(&self, form: &TorqueForm, fitted: &[FittedNumber]) -> String;
 }
 
 /// A coefficient and its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Fitted {
+pub(super) struct FittedNumber {
     pub value: f64,
     pub sigma: f64,
 }
@@ -181,7 +186,7 @@ impl TorqueForm {
 }
 
 /// A parameter that is one coefficient.
-fn plain(name: &str, fitted: Fitted, unit: &'static str) -> TorqueParameter {
+fn plain(name: &str, fitted: FittedNumber, unit: &'static str) -> TorqueParameter {
     TorqueParameter { name: name.into(), value: fitted.value, unit, sigma: Some(fitted.sigma) }
 }
 
