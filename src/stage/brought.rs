@@ -60,7 +60,10 @@ pub(super) fn faults(known: &KnownCell) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (name, KnownPoint { mm, sigma }) in *points {
         if !(mm.iter().all(|value| value.is_finite()) && *sigma > 0.0 && sigma.is_finite()) {
-            faults.push(Fault::new(format!("points.{name}"), "expected a place and a sigma above 0, e.g. {mm: [400, 0, 50], sigma: 0.05}"));
+            faults.push(Fault::new(
+                format!("points.{name}"),
+                "expected a place and a sigma above 0, e.g. {mm: [400, 0, 50], sigma: 0.05}",
+            ));
         }
     }
     for (index, KnownDistance { between: [from, to], mm, sigma }) in distances.iter().enumerate() {
@@ -235,7 +238,10 @@ fn note_scale(context: &Context, model: &Model, fitted: &Fitted, data: &Measurem
     match scale.sigma {
         Some(sigma) => {
             let beyond = match scale.beyond > TOLD_BEYOND {
-                true => format!("; links differ {:.1} times as much as their priors say, and so much wider it is stated", scale.beyond),
+                true => format!(
+                    "; links differ {:.1} times as much as their priors say, and so much wider it is stated",
+                    scale.beyond
+                ),
                 false => String::new(),
             };
             let apart = match scale.independent.filter(|independent| *independent < LEANING * sigma) {

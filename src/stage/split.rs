@@ -6,8 +6,8 @@
 
 use crate::error::{Error, Fault, Result, counted};
 use crate::robot::pose_groups::{NEAR, SAME, near};
-use crate::stage::parameter_set::matches;
 use crate::stage::copied::{self, copied_rows};
+use crate::stage::parameter_set::matches;
 use crate::stage::{Context, Stage, reads, writes};
 use crate::table::{Recording, Split, SplitRow};
 use rand::SeedableRng;
@@ -282,7 +282,9 @@ impl SplitBy {
     /// Sets that must not stay empty.
     fn names(&self) -> BTreeSet<&str> {
         match self {
-            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } | Self::Named { set, rest, .. } => [set.as_str(), rest].into(),
+            Self::Every { set, rest, .. } | Self::Random { set, rest, .. } | Self::Named { set, rest, .. } => {
+                [set.as_str(), rest].into()
+            }
             Self::Blocks { sets, .. } => sets.iter().map(String::as_str).collect(),
             Self::Usage { .. } => BTreeSet::new(),
             Self::Order { sets } => sets.iter().map(|stretch| stretch.set.as_str()).collect(),

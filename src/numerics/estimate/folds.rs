@@ -129,9 +129,10 @@ fn positions(data: &Measurements, rows: &[usize]) -> Option<Vec<Vec<usize>>> {
     let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     let kinds = kinds(data);
     for row in rows {
-        let name = kinds.iter().filter(|kind| kind.axes(data, *row) > 0).try_fold("", |_, kind| {
-            Some(kind.reading(data, *row)?.anchor).filter(|_| kind.is_brought())
-        })?;
+        let name = kinds
+            .iter()
+            .filter(|kind| kind.axes(data, *row) > 0)
+            .try_fold("", |_, kind| Some(kind.reading(data, *row)?.anchor).filter(|_| kind.is_brought()))?;
         places.entry(name.rsplit_once('/').map_or(name, |(place, _)| place)).or_default().push(*row);
     }
     (places.len() > 1).then(|| places.into_values().collect())

@@ -57,8 +57,7 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         // How the scale follows the mean of each prior, in standard deviations of that.
         let lengths = parameters.iter().enumerate().filter(|(_, k)| model.stack.specs()[**k].unit == Unit::Millimetre);
         let lengths = lengths.filter(|(_, k)| links.contains(k));
-        let parts: Vec<f64> =
-            lengths.filter_map(|(row, k)| Some(along[row].abs() / model.known(*k).prior?.sigma)).collect();
+        let parts: Vec<f64> = lengths.filter_map(|(row, k)| Some(along[row].abs() / model.known(*k).prior?.sigma)).collect();
         let apart: f64 = parts.iter().map(|part| part * part).sum();
         let together = (whole - apart).max(0.0) + parts.iter().sum::<f64>().powi(2);
         Some([together, whole].map(|variance| beyond * variance.max(0.0).sqrt()))
@@ -70,7 +69,9 @@ pub fn scale(model: &Model, data: &Measurements, rows: &[usize], covariance: Opt
         sigma: sigmas.map(|[together, _]| together),
         independent: sigmas.map(|[_, independent]| independent),
         beyond,
-        by_length: !model.lengths.is_empty() || known_places(model) > 1 || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
+        by_length: !model.lengths.is_empty()
+            || known_places(model) > 1
+            || model.known.iter().any(|(k, known)| is_radius(*k) && known.prior.is_some()),
         by_priors: told("link_geometry") || told(ToolOffset::NAME),
         reach: points.iter().map(|point| (point - model.base().translation).norm()).fold(0.0, f64::max),
     })

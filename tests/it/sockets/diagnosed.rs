@@ -62,8 +62,10 @@ fn a_cyclic_error_of_a_gear_is_named_at_its_joint() {
 fn rows_of_a_plate_that_slipped_are_named_in_the_verdict() {
     let robot = fixture::seven();
     let mut recording = touched(&robot, &truth(&robot, 34), &cell(30), 34);
-    let moved: Vec<Fixture> =
-        cell(30).into_iter().map(|own| Fixture { centre_mm: [own.centre_mm[0] + 1.5, own.centre_mm[1], own.centre_mm[2] + 1.0], ..own }).collect();
+    let moved: Vec<Fixture> = cell(30)
+        .into_iter()
+        .map(|own| Fixture { centre_mm: [own.centre_mm[0] + 1.5, own.centre_mm[1], own.centre_mm[2] + 1.0], ..own })
+        .collect();
     let slipped = touched(&robot, &truth(&robot, 34), &moved, 35);
     // Rows 20 to 25 of b/0, which is the third socket.
     let joints = recording.joints;
