@@ -48,8 +48,8 @@ impl Sheet {
 
 /// An arm with motor currents.
 fn case() -> (TorqueCase, Sheet) {
-    let design = TorqueDesign { seed: 5, nulls: 1.0, other_forms: 0.0, most: 0, seconds: 16.0, rate: 50.0 };
-    let case = (0..20).map(|number| TorqueCase::draw(&design, number)).find(|case| case.robot.name == "sr210d").expect("one");
+    let design = TorqueDesign { seed: 5, nulls: 1.0, other_forms: 0.0, most: 0, seconds: 32.0, rate: 50.0 };
+    let case = (0..20).map(|number| TorqueCase::draw(&design, number)).find(|case| case.robot.name == "compact6").expect("one");
     let sheet = Sheet::read(&case.recording()[1].1);
     (case, sheet)
 }
@@ -135,6 +135,6 @@ fn rows_that_cannot_be_read_are_counted_and_too_many_are_refused() {
     };
     refused(spoiled(10), &["recording.csv:2", "rows are rejected", "`lost` is not a number"]);
     let folder = tempfile::tempdir().expect("a folder");
-    let (code, said) = told(spoiled(200), folder.path());
+    let (code, said) = told(spoiled(400), folder.path());
     assert_eq!(code, 0, "{said}");
 }
